@@ -13,8 +13,14 @@ from thermal_robot import report
 from thermal_robot.teller import told_by
 
 if TYPE_CHECKING:
-    from thermal_robot.campaign import Campaign, campaign_from_table, read_campaign, read_samples, write_campaign
-    from thermal_robot.campaign.describe import describe
+    from thermal_robot.campaign import (
+        Campaign,
+        campaign_from_table,
+        describe,
+        read_campaign,
+        read_samples,
+        write_campaign,
+    )
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
     from thermal_robot.diagnosis import Diagnosis

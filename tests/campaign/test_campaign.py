@@ -1,150 +1,227 @@
-"""A campaign as a value: frozen, sliced by rows, robbed of a column, pickled."""
+"""A campaign as a value: frozen, sliced, robbed of a column, appended, turned round, shown; of figures that can be."""
 
 from __future__ import annotations
 
-import dataclasses
 import pickle
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from campaign.files import URDF, full
+from campaign.files import full
 
-from thermal_robot.campaign import Campaign, Settings, Units
+import thermal_robot as tr
+from thermal_robot.campaign import Campaign, Settings
+from thermal_robot.campaign.campaign import appended, read_alike, turned_round
+from thermal_robot.campaign.checked import checked_array
 from thermal_robot.campaign.targets import posed
 from thermal_robot.errors import CampaignError
-from thermal_robot.robot import Robot, load_robot
 
 
-@pytest.fixture
-def robot(tmp_path: Path) -> Robot:
-    return load_robot(URDF, "tool")
+@pytest.fixture(scope="module")
+def demo() -> Campaign:
+    return tr.demo_campaign()
 
 
-def test_arrays_are_read_only(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    arrays = [
-        campaign.q,
-        campaign.position,
-        campaign.target,
-        campaign.rows,
-        *campaign.covariates.values(),
-    ]
-    for array in [*arrays, *campaign.labels.values(), campaign.take([0]).q]:
+def test_arrays_are_read_only_and_the_callers_stay_writable() -> None:
+    campaign = full()
+    arrays = [campaign.q, campaign.position, campaign.target, campaign.rows, campaign.take([0]).q]
+    for array in [*arrays, *campaign.covariates.values(), *campaign.labels.values()]:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
-
-
-def test_the_callers_array_stays_writable(robot: Robot) -> None:
     q = np.zeros((2, 4))
-    campaign = Campaign("mine", robot, q, np.zeros((2, 3)))
+    mine = Campaign("mine", campaign.robot, q, np.zeros((2, 3)))
     q[0, 0] = 1.0
-    assert campaign.q[0, 0] == 0.0
-    assert campaign.rows.tolist() == [2, 3]
-
-
-def test_shapes_are_checked(robot: Robot) -> None:
+    assert mine.q[0, 0] == 0.0
+    assert mine.rows.tolist() == [2, 3]
+    own = np.ones(3)
+    held = checked_array("<c>", "target", own, (3,), np.float64)
+    assert (own.flags.writeable, held.flags.writeable) == (True, False)
+    assert checked_array("<c>", "target", held, (3,), np.float64) is held
     with pytest.raises(CampaignError, match=r"<mine>, column 'position'.*found \(2, 2\), expected \(2, 3\)"):
-        Campaign("mine", robot, np.zeros((2, 4)), np.zeros((2, 2)))
+        Campaign("mine", campaign.robot, np.zeros((2, 4)), np.zeros((2, 2)))
 
 
-@pytest.mark.parametrize("rows", [[2, 0], np.array([True, False, True]), []])
-def test_take(tmp_path: Path, rows: object) -> None:
-    campaign = full(tmp_path / "c")
+@pytest.mark.parametrize("rows", [[2, 0], np.array([True, False, True]), [], [2, 0, 1]])
+def test_take(rows: Any) -> None:
+    campaign = full()
     part = campaign.take(rows)
-    index = np.arange(3)[np.asarray(rows, dtype=bool if len(rows) == 3 else int)]
-    np.testing.assert_array_equal(part.q, campaign.q[index])
-    np.testing.assert_array_equal(part.orientation, campaign.orientation[index])
+    index = np.arange(3)[np.asarray(rows, dtype=np.asarray(rows).dtype if len(rows) else int)]
+    for key in ("q", "orientation", "rows"):
+        np.testing.assert_array_equal(getattr(part, key), getattr(campaign, key)[index])
     np.testing.assert_array_equal(part.covariates["temperature"], campaign.covariates["temperature"][index])
     np.testing.assert_array_equal(part.labels["session"], campaign.labels["session"][index])
-    np.testing.assert_array_equal(part.rows, campaign.rows[index])
-    assert part.samples == len(index)
-    assert part.settings == campaign.settings
+    assert (part.samples, part.settings) == (len(index), campaign.settings)
+    if len(index):
+        np.testing.assert_array_equal(part.take([0]).q, campaign.q[index[:1]])
+    with pytest.raises(CampaignError, match=r"has no such rows.*expected row numbers from 0 to 2, or 3 booleans"):
+        campaign.take([3])
 
 
-def test_drop_covariate(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
+def test_drop_covariate() -> None:
+    campaign = full()
     less = campaign.drop_covariate("humidity").drop_covariate("time").drop_covariate("session")
     assert {"humidity", "time"}.isdisjoint(less.covariates)
-    assert less.extra == ()
-    assert set(less.labels) == {"pose"}
+    assert (less.extra, set(less.labels)) == ((), {"pose"})
     assert "time" in campaign.covariates
     with pytest.raises(CampaignError, match="no such covariate"):
         less.drop_covariate("time")
 
 
-def test_pickles(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    again = pickle.loads(pickle.dumps(campaign))
-    np.testing.assert_array_equal(again.q, campaign.q)
-    assert again.settings == campaign.settings
+def test_it_pickles_and_is_one_line() -> None:
+    again = pickle.loads(pickle.dumps(full()))
+    np.testing.assert_array_equal(again.q, full().q)
+    assert again.settings == full().settings
+    assert repr(full()) == "<Campaign 'hall_3': 3 samples of pose, 4 joints, 15 covariates>"
 
 
-def test_repr_is_one_line(tmp_path: Path) -> None:
-    assert repr(full(tmp_path / "c")) == "<Campaign 'c': 3 samples of pose, 4 joints, 15 covariates>"
-
-
-def test_rows_taken_twice_are_the_rows_taken_at_once(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    twice, once = campaign.take([2, 0, 1]).take([0, 1]), campaign.take([2, 0])
-    np.testing.assert_array_equal(twice.q, once.q)
-    assert twice.rows.tolist() == once.rows.tolist() == [4, 2]
-    assert twice.labels["pose"].tolist() == ["3", "1"]
-
-
-def test_settings_hold_all_that_is_not_in_the_table(tmp_path: Path) -> None:
-    settings = full(tmp_path / "c").settings
-    assert settings == Settings(
-        urdf="robot.urdf",
-        tool_frame="tool",
-        root_frame="base",
-        gravity=(0.0, 0.0, -9.81),
-        reference_temperature=22.5,
-        units=Units("deg", "mm"),
-        base_known=False,
-        tool_known=True,
-        target=(0.001, 0.002, 0.08),
-        noise_position=settings.noise_position,
-        noise_orientation=3e-5,
-        payload_com=(0.0, 0.0, 0.05),
-        priors={"joint_offset": 1e-3},
-        gears={"lift": 101.0},
-    )
-    assert settings.noise_position == pytest.approx(2e-5)
-
-
-def test_noise_of_rows_is_relative_to_their_root_mean_square(tmp_path: Path) -> None:
-    campaign = dataclasses.replace(
-        full(tmp_path / "c"), noise_position=None, noise_of_rows=np.array([1e-5, 5e-5, 7e-5])
-    )
+def test_noise_of_rows_is_relative_to_their_root_mean_square() -> None:
+    campaign = replace(full(), noise_position=None, noise_of_rows=np.array([1e-5, 5e-5, 7e-5]))
     assert campaign.noise_position == pytest.approx(5e-5)
     relative = campaign.relative_noise
-    assert relative is not None
     np.testing.assert_allclose(relative, [[f] * 3 + [1.0] * 3 for f in (0.2, 1.0, 1.4)])
-    part = campaign.take([2, 0])
-    assert part.relative_noise is not None
-    np.testing.assert_array_equal(part.relative_noise, relative[[2, 0]])
-    alike = dataclasses.replace(campaign, noise_position=None, noise_of_rows=np.full(3, 0.1 + 0.2))
-    assert alike.noise_position == 0.1 + 0.2
-    assert alike.relative_noise is None
+    np.testing.assert_array_equal(campaign.take([2, 0]).relative_noise, relative[[2, 0]])
+    alike = replace(campaign, noise_position=None, noise_of_rows=np.full(3, 0.1 + 0.2))
+    assert (alike.noise_position, alike.relative_noise) == (0.1 + 0.2, None)
 
 
-@pytest.mark.parametrize(("sigmas", "words"), [([1e-5, 0.0, 1e-5], "index 1"), ([1e-5], "wrong shape")])
-def test_a_noise_of_rows_that_is_none_is_refused(tmp_path: Path, sigmas: list[float], words: str) -> None:
-    with pytest.raises(CampaignError, match=words) as caught:
-        dataclasses.replace(full(tmp_path / "c"), noise_of_rows=np.array(sigmas))
-    assert caught.value.column == "noise_of_rows"
+WRONG: dict[str, Any] = {
+    "q": [None, "abc", 1.0, {}, [[1, 2], [3]]],
+    "position": ["a", np.zeros((2, 3)), np.full((6, 3), np.nan), np.ones((6, 3)) + 1j],
+    "orientation": [np.full((6, 4), np.inf), np.zeros((6, 3)), np.zeros((6, 4)), np.full((6, 4), 0.3)],
+    "target": [None, [0, 0], [0, 0, np.nan], "abc"],
+    "rows": [["a"] * 6, np.full(6, np.nan), None],
+    "covariates": [None, [1], {1: np.ones(6)}, {"time": ["a"] * 6}, {"time": np.full(6, np.nan)}, {"time": None}],
+    "labels": [None, {"pose": ["a"]}],
+    "noise_position": [np.nan, -1.0, "a", [1.0], 1j, 1e-300],
+    "noise_of_rows": [np.full(6, 0.0), [1e-5]],
+    "reference_temperature": [np.nan, None, "a", 1e300],
+    "priors": [None, [1], {"joint_offset": np.nan}, {"joint_offset": 0.0}, {"joint_offset": "a"}],
+    "gears": [{"joint_1": -1.0}, {"joint_22": 100.0}],
+    "robot": [None, "builtin:rv_m2"],
+    "units": [None, "mm"],
+    "targets": ["three", 3],
+    "moves": [None, "sideways", ["direct"]],
+    "warnings": [None, "text", [1]],
+    "base_known": ["unknown"],
+}
 
 
-@pytest.mark.parametrize("given", ["three", 3])
-def test_targets_that_are_none_or_of_other_rows_are_refused(tmp_path: Path, given: Any) -> None:
-    campaign = full(tmp_path / "c")
-    with pytest.raises(CampaignError, match="wrong kind of value"):
-        dataclasses.replace(campaign, targets=given)
+@pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in WRONG.items() for value in values])
+def test_what_is_wrong_is_refused_by_its_name(demo: Campaign, key: str, value: Any) -> None:
+    named = key if key not in ("covariates", "labels") else "time|pose|covariates|labels"
+    with pytest.raises(CampaignError, match=named):
+        replace(demo.take(np.arange(6)), **{key: value})
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"orientation": np.array([[1.0, 0, 0, 0], [0.0, 0, 0, 0], [0.5, 0, 0, 0]])}, r"'orientation'.* at index 1"),
+        ({"covariates": {"payload": np.array([1.0, 2.0, -3.0])}}, r"'payload': impossible value; found -3 at index 2"),
+        ({"covariates": {"temperature": np.full(3, -300.0)}}, "'temperature': impossible value"),
+        ({"covariates": {"approach.joint_1": np.array([1.0, 0.5, 1.0])}}, "found 0.5 at index 1, expected -1, 0 or 1"),
+        ({"gears": {"joint_22": 100.0}}, r"gears\.joint_22.*did you mean 'joint_2'"),
+        ({"noise_of_rows": np.array([1e-5, 0.0, 1e-5])}, "'noise_of_rows': no standard deviation; found 0 at index 1"),
+        ({"position": np.ma.masked_equal([[1.0, 2, 3], [4, 5, 6], [7, 8, 9]], 6)}, r"position.*at index 1"),
+        *(({key: figure}, f"{key}.*at index 1") for key in ("q", "position") for figure in (np.nan, np.inf, -1e300)),
+    ],
+)
+def test_what_no_table_may_hold_no_campaign_made_by_hand_holds(demo, changed, told):
+    plain = demo.take(np.arange(3))
+    for key, value in changed.items():
+        if isinstance(value, float):
+            changed = {key: np.where(np.arange(3)[:, None] == 1, value, getattr(plain, key))}
+    with pytest.raises(CampaignError, match=told):
+        replace(plain, **changed)
+
+
+def test_lists_other_kinds_of_number_and_quaternions_of_few_digits_are_taken(demo: Campaign) -> None:
+    plain = demo.take(np.arange(3))
+    rounded = np.round(np.full((3, 4), [0.924, 0.383, 0.0, 0.0]), 2)
+    changes = {"noise_position": np.float32(0.5), "noise_orientation": 0, "orientation": rounded}
+    changes |= {"extra": ["a\0b"], "warnings": ("\ud800",)}  # whatever a table's header or cell held
+    again = replace(plain, q=plain.q.tolist(), rows=np.array([4.0, 5.0, 6.0]), **changes)
+    np.testing.assert_array_equal(again.q, plain.q)
+    np.testing.assert_array_equal(again.orientation, rounded)
+    assert (again.noise_position, again.noise_orientation, again.rows.tolist()) == (0.5, None, [4, 5, 6])
+
+
+def test_nothing_measured_is_not_diagnosed(demo: Campaign) -> None:
+    for nothing in (replace(demo, position=None, orientation=None), demo.take([])):
+        with pytest.raises(CampaignError, match="nothing was measured"):
+            tr.diagnose(nothing)
+
+
+def test_targets_of_other_rows_are_refused() -> None:
     points = np.random.default_rng(0).normal(size=(1, 4, 3)) + np.arange(5.0)[:, None, None]
     told = posed((1, 2, 3, 4), points)
     assert told is not None
     with pytest.raises(CampaignError, match=r"targets.*other rows than the commands, expected 3 rows"):
-        dataclasses.replace(campaign, targets=told.targets)
-    assert dataclasses.replace(campaign, targets=told.targets.take(np.arange(3))).samples == 3
+        replace(full(), targets=told.targets)
+    assert replace(full(), targets=told.targets.take(np.arange(3))).samples == 3
+
+
+def test_what_was_taken_apart_is_the_same_again(demo: Campaign) -> None:
+    again = appended([demo.take(np.arange(40)), demo.take(np.arange(40, 41)), demo.take(np.arange(41, 120))])
+    assert again.to_frame().equals(demo.to_frame())
+    assert again.since_turn.keys() == demo.since_turn.keys()
+    assert all((again.since_turn[name] == demo.since_turn[name]).all() for name in demo.since_turn)
+    assert appended([demo]) is demo
+
+
+def test_appended_rows_keep_what_all_have(demo: Campaign) -> None:
+    both = appended([demo, demo.drop_covariate("temperature")])
+    assert "temperature" in demo.covariates
+    assert "temperature" not in both.covariates
+    assert both.samples == 2 * demo.samples
+    both = appended([demo, replace(demo, missing={"temperature": np.arange(120) < 7})])
+    assert both.missing["temperature"].nonzero()[0].tolist() == [*range(120, 127)]
+    with pytest.raises(CampaignError, match="differs in orientation"):
+        appended([demo, replace(demo, orientation=np.tile([1.0, 0.0, 0.0, 0.0], (120, 1)))])
+
+
+@pytest.mark.parametrize("quantity", ["approach", "temperature", "torque", "gravity"])
+def test_a_quantity_turned_round_twice_is_as_it_was(demo: Campaign, quantity: str) -> None:
+    once = turned_round(demo, quantity)
+    again = turned_round(once, quantity)
+    assert again.turned == ()
+    np.testing.assert_array_equal(again.robot.gravity, demo.robot.gravity)
+    assert (once.robot.gravity != demo.robot.gravity).any() == (quantity == "gravity")
+    for name, values in demo.covariates.items():
+        np.testing.assert_allclose(again.covariates[name], values, atol=1e-12)
+        changed = (once.covariates[name] != values).any()
+        assert changed == (name.startswith(quantity) and (values != 0.0).any())
+
+
+def test_rows_are_read_as_those_of_another_campaign_and_settings_keep_it(demo: Campaign) -> None:
+    other = turned_round(turned_round(demo, "approach"), "gravity")
+    read = read_alike(demo, other.robot, other.turned)
+    assert (read.turned, read.robot) == (other.turned, other.robot)
+    assert read_alike(read, other.robot, other.turned) is read
+    for name, values in other.covariates.items():
+        np.testing.assert_array_equal(read.covariates[name], values)
+    assert Settings.from_dict(other.settings.to_dict()) == other.settings
+
+
+def test_the_frame_read_again_gives_the_same_arrays(demo: Campaign) -> None:
+    table = demo.to_frame().assign(session=["a"] * 60 + ["b"] * 60)
+    again = tr.campaign_from_table(demo.robot, table)  # it carries its units
+    np.testing.assert_allclose(again.q, demo.q, atol=1e-15)
+    np.testing.assert_allclose(again.position, demo.position, atol=1e-15)
+    assert set(again.covariates) == set(demo.covariates)
+    for name, values in demo.covariates.items():
+        np.testing.assert_allclose(again.covariates[name], values, rtol=1e-15, err_msg=name)
+    assert again.to_frame()["session"].tolist() == ["a"] * 60 + ["b"] * 60
+    # who says otherwise has changed the table
+    table[["x", "y", "z"]] *= 1e-3
+    again = tr.campaign_from_table(demo.robot, table, length_unit="m")
+    np.testing.assert_allclose(again.position, demo.position, atol=1e-12)
+    part = demo.take([5, 2]).to_frame()
+    assert (part.index.name, part.index.tolist()) == ("row", [7, 4])
+
+
+def test_a_notebook_shows_joints_and_warnings(demo: Campaign) -> None:
+    shown = replace(demo, warnings=("is this so?",))._repr_html_()
+    assert all(text in shown for text in (*demo.robot.joint_names, demo.name, "is this so?"))
+    assert shown.count("<table>") == shown.count("</table>") == 4

@@ -28,7 +28,7 @@ from thermal_robot.robot import load_robot
 )
 def test_reading_again_gives_the_same(tmp_path: Path, angle: str, length: str) -> None:
 
-    campaign = dataclasses.replace(full(tmp_path / "c"), units=Units(angle, length), name="copy")
+    campaign = dataclasses.replace(full(), units=Units(angle, length), name="copy")
     again = read_campaign(write_campaign(campaign, tmp_path / "copy"))
     for name in ("q", "position", "orientation", "simulated_position", "simulated_orientation", "target"):
         np.testing.assert_allclose(getattr(again, name), getattr(campaign, name), rtol=1e-12, err_msg=name)
@@ -47,8 +47,7 @@ def test_reading_again_gives_the_same(tmp_path: Path, angle: str, length: str) -
 
 
 def test_samples_are_no_campaign_but_have_a_table(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    samples = read_samples(tmp_path / "c" / "measurements.csv", campaign)
+    campaign, samples = full(), dataclasses.replace(full(), position=None, orientation=None)
     with pytest.raises(CampaignError, match="without measured positions"):
         write_campaign(samples, tmp_path / "copy")
     write_table(samples, tmp_path / "fresh.csv")
@@ -87,11 +86,11 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
         write_predictions(tmp_path / "nowhere" / "p.csv", predicted([[0, 0, 0]]))
     (tmp_path / "taken").write_text("")
     with pytest.raises(CampaignError, match="cannot be written"):
-        write_campaign(full(tmp_path / "c"), tmp_path / "taken")
+        write_campaign(full(), tmp_path / "taken")
 
 
 def test_a_second_copy_is_the_first_to_the_last_letter(tmp_path: Path) -> None:
-    first = write_campaign(full(tmp_path / "c"), tmp_path / "first").parent
+    first = write_campaign(full(), tmp_path / "first").parent
     second = write_campaign(read_campaign(first), tmp_path / "second").parent
     for name in ("campaign.toml", "robot.urdf"):
         assert (first / name).read_text() == (second / name).read_text()
@@ -109,7 +108,7 @@ def test_predictions_keep_every_digit(tmp_path: Path) -> None:
 
 
 def test_the_noise_of_each_row_is_written_and_read_again(tmp_path: Path) -> None:
-    whole = full(tmp_path / "c")
+    whole = full()
     sigmas = np.array([2e-5, 7e-5, 3e-5])
     campaign = dataclasses.replace(whole, noise_position=None, noise_of_rows=sigmas)
     file = write_campaign(campaign, tmp_path / "copy")
@@ -118,12 +117,3 @@ def test_the_noise_of_each_row_is_written_and_read_again(tmp_path: Path) -> None
     assert again.noise_position == pytest.approx(campaign.noise_position, rel=1e-12)
     np.testing.assert_allclose(campaign.to_frame()["noise"], sigmas / campaign.units.length_scale, rtol=1e-12)
     assert "position =" not in file.read_text()
-
-
-def test_samples_to_predict_may_have_a_noise_that_says_nothing(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    table = pd.read_csv(tmp_path / "c" / "measurements.csv").assign(noise="unknown")
-    table.to_csv(tmp_path / "s.csv", index=False)
-    samples = read_samples(tmp_path / "s.csv", campaign)
-    assert samples.noise_of_rows is None
-    assert "noise" not in samples.extra

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from campaign.files import add
+from campaign.files import FULL, TOML, URDF
 from conftest import AWKWARD
 from coupled import COUPLED, PARALLELOGRAM
 from simulate import conditions
@@ -82,19 +82,9 @@ def several_targets() -> Files:
 
 
 def every_column() -> Files:
-    """The table of the tests of reading, in which every kind of column stands."""
-    from campaign.files import ROWS as TABLE
-    from campaign.files import TOML, URDF
-
-    table = add(
-        TABLE, qw="1 0 0.6", qx="0 -1 0", qy="0 0 0.8", qz="0 0 0", time="0 1.5 3", temperature__beam="20 21 22",
-        payload="0 5 5",
-        approach__lift="1 -1 0", velocity__slide="10 20 30", acceleration__roll="1 2 3", torque__lift="1.5 2.5 3.5",
-        encoder__lift="20.1 15.1 -44.9", speed="0.1 0.5 1", order="3 1 2", humidity="40 _ 43", session="a a b",
-        pose="1 2 3",
-        sim__x="1000 900 800", sim__y="0 100 200", sim__z="500 510 520",
-    )  # fmt: skip
+    """The table of the tests of reading, in which every kind of column stands, with a gap."""
     toml = TOML.format(angle="deg", length="mm")
+    table = FULL.replace(",41,", ",,")
     return {"robot.urdf": URDF.encode(), "campaign.toml": toml.encode(), "measurements.csv": table.encode()}
 
 

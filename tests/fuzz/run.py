@@ -65,24 +65,17 @@ class Worker:
 
     def _begin(self) -> subprocess.Popen[str]:
         alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "env": alone}
         with self.errors.open("w") as errors:
-            self.process = subprocess.Popen(
-                [sys.executable, str(HERE / "worker.py")],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                text=True,
-                env=alone,
-            )
+            self.process = subprocess.Popen([sys.executable, str(HERE / "worker.py")], stderr=errors, **pipes)
         self.process.stdout.readline()  # it is ready: what it imports is not the trial's time
         return self.process
 
     def _dead(self, process: subprocess.Popen[str], late: bool) -> tuple[str, str, str]:
         self.close()
         said = self.errors.read_text(errors="replace")
-        place = next(
-            (s.strip() for s in said.splitlines() if "thermal_robot" in s and "File" in s), said.strip()[-200:]
-        )
+        own = [line.strip() for line in said.splitlines() if "thermal_robot" in line and "File" in line]
+        place = own[0] if own else said.strip()[-200:]
         code = -process.returncode if process.returncode else 0
         if late or code == signal.SIGPROF:
             return "hang", "no answer" if late else "too much CPU", place
@@ -122,22 +115,15 @@ class Tally:
             folder = self.into / target / f"{outcome}-{number}"
             folder.mkdir(parents=True, exist_ok=True)
             put(files, folder)
-            told = {
-                "target": target,
-                "seed": self.seed,
-                "number": number,
-                "outcome": outcome,
-                "said": said,
-                "place": place,
-            }
+            told = {"target": target, "seed": self.seed, "number": number}
+            told |= {"outcome": outcome, "said": said, "place": place}
             (folder / "finding.json").write_text(json.dumps(told, indent=1) + "\n")
 
     def markdown(self) -> str:
         """The table of docs/reliability.md."""
-        lines = [f"| target | trials | {' | '.join(OUTCOMES)} |", "|---|" + "--:|" * (len(OUTCOMES) + 1)]
-        for name, count in self.counts.items():
-            lines.append(f"| {name} | {count.total()} | " + " | ".join(str(count[o]) for o in OUTCOMES) + " |")
-        return "\n".join(lines)
+        rows = [["target", "trials", *OUTCOMES], ["---", *["--:"] * (len(OUTCOMES) + 1)]]
+        rows += [[name, count.total(), *(count[o] for o in OUTCOMES)] for name, count in self.counts.items()]
+        return "\n".join(f"| {' | '.join(map(str, row))} |" for row in rows)
 
     def told(self) -> str:
         """The causes, the commonest first."""

@@ -15,8 +15,7 @@ import tomli_w
 from fuzz import checks, corpus, harmless, mutate
 from fuzz.corpus import Files
 from fuzz.drawn import drawn
-from fuzz.extremes import NUMBERS, WORDS
-from fuzz.frames import spoilt_frame
+from fuzz.mutate import NUMBERS, WORDS, spoilt_frame
 
 from thermal_robot.campaign.document import tomllib
 
@@ -122,27 +121,18 @@ def parquet(rng: Random) -> Files:
 
 def frame(rng: Random) -> Files:
     files = rng.choice(corpus.campaigns())
-    robot = tomllib.loads(files["campaign.toml"].decode())
-    given = {
-        "angle_unit": robot["measurements"]["angle_unit"],
-        "length_unit": robot["measurements"]["length_unit"],
-        **(
-            {"target": [0.0, 0.0, 80.0], "noise_position": 0.02, "gears": {}, "priors": {}}
-            if rng.random() < 0.5
-            else {}
-        ),
-    }
+    units = tomllib.loads(files["campaign.toml"].decode())["measurements"]
+    given = {key: units[key] for key in ("angle_unit", "length_unit")}
+    if rng.random() < 0.5:
+        given |= {"target": [0.0, 0.0, 80.0], "noise_position": 0.02, "gears": {}, "priors": {}}
     table = corpus.as_frame(files)
     for _ in range(rng.choice((0, 1, 1, 2))):
         table = spoilt_frame(rng, table)
     spoilt = mutate.spoilt_tree(rng, given) if rng.random() < 0.3 else given
-    spoilt = {str(k): v for k, v in spoilt.items()} if isinstance(spoilt, dict) else given
+    spoilt = spoilt if isinstance(spoilt, dict) else given
     known = {k: v for k, v in spoilt.items() if k in given}  # an unknown argument is Python's own to refuse
-    return {
-        "robot.urdf": files["robot.urdf"],
-        "campaign.toml": files["campaign.toml"],
-        "table.pickle": pickle.dumps((table, known)),
-    }
+    kept = {name: files[name] for name in ("robot.urdf", "campaign.toml")}
+    return {**kept, "table.pickle": pickle.dumps((table, known))}
 
 
 def model(rng: Random) -> Files:
@@ -153,42 +143,24 @@ def model(rng: Random) -> Files:
     return {**files, "model.json": again(rng, change, files["model.json"])}
 
 
-COMMANDS = ("demo", "check", "effects", "diagnose", "predict", "iso9283", "paper", "blind")
+COMMANDS = (
+    "demo -x", "check campaign.toml", "effects campaign.toml", "diagnose campaign.toml --json out.json",
+    "predict model.json samples.csv -o out.csv", "iso9283 campaign.toml", "paper --json out.json", "blind --seed x",
+)  # fmt: skip
 OPTIONS = (
-    "--json",
-    "--csv",
-    "--report",
-    "--model",
-    "--without",
-    "--only",
-    "-o",
-    "--output",
-    "--l5",
-    "--markdown",
-    "--help",
-    "-V",
-    "--",
-    "-",
-)
+    "--json", "--csv", "--report", "--model", "--without", "--only", "-o", "--output", "--l5", "--markdown", "--help",
+    "-V", "--", "-",
+)  # fmt: skip
 PLACES = (
     "campaign.toml", ".", "measurements.csv", "robot.urdf", "model.json", "samples.csv", "out.csv", "out.json",
-    "out.html", "no/such/out",
-    "campaign.toml/x", "joint_offset", "backlash", "no_effect", "a" * 300, "0.15",
+    "out.html", "no/such/out", "campaign.toml/x", "joint_offset", "backlash", "no_effect", "a" * 300, "0.15",
 )  # fmt: skip
 
 
 def arguments(rng: Random) -> Files:
     """Some words of the command line; blind trials, which last, only where they are refused at once."""
     files = {**corpus.campaigns()[0], **corpus.models()[0]}
-    commands = {
-        "check": ["campaign.toml"], "effects": ["campaign.toml"], "iso9283": ["campaign.toml"],
-        "paper": ["--json", "out.json"],
-        "blind": ["--seed", "x"],
-        "diagnose": ["campaign.toml", "--json", "out.json"], "predict": ["model.json", "samples.csv", "-o",
-        "out.csv"], "demo": ["-x"],
-    }  # fmt: skip
-    command = rng.choice(COMMANDS)
-    words = [command, *commands[command]]
+    words = rng.choice(COMMANDS).split()
     for _ in range(rng.randrange(4)):
         at = rng.randrange(len(words) + 1)
         new = rng.choice((rng.choice(OPTIONS), rng.choice(PLACES), rng.choice(WORDS), str(rng.choice(NUMBERS))[:50]))
@@ -224,13 +196,11 @@ def whole(rng: Random) -> Files:
     if rng.random() < 0.4:
         document["frames"].update(base=rng.choice(("known", "unknown")), tool=rng.choice(("known", "unknown")))
     if rng.random() < 0.3:
-        document["noise"] = rng.choice(
-            ({}, {"position": 1e-12}, {"position": 1e12}, {"position": 0.02, "orientation": 1e-15})
-        )
+        noises = {}, {"position": 1e-12}, {"position": 1e12}, {"position": 0.02, "orientation": 1e-15}
+        document["noise"] = rng.choice(noises)
     if rng.random() < 0.2:
-        document["robot"].update(
-            rng.choice(({"moves": "unknown"}, {"gravity": [0.0, 0.0, 0.0]}, {"reference_temperature": -400.0}))
-        )
+        robots = {"moves": "unknown"}, {"gravity": [0.0, 0.0, 0.0]}, {"reference_temperature": -400.0}
+        document["robot"].update(rng.choice(robots))
     if rng.random() < 0.2:
         document["priors"] = {rng.choice(("joint_offset", "geometric", "backlash")): rng.choice((1e-30, 1e30, 1.0))}
     return {**harmless.with_table(files, [head, *body]), "campaign.toml": tomli_w.dumps(document).encode()}

@@ -44,9 +44,8 @@ def judged(target, folder: Path) -> tuple[str, str, str]:
             return "memory", "MemoryError", _place(error)
         except Exception as error:
             return "traceback", f"{type(error).__name__}: {error}", _place(error)
-    noise = [
-        w for w in heard if issubclass(w.category, (RuntimeWarning, DeprecationWarning, FutureWarning, UserWarning))
-    ]
+    kinds = (RuntimeWarning, DeprecationWarning, FutureWarning, UserWarning)
+    noise = [warning for warning in heard if issubclass(warning.category, kinds)]
     if noise:
         return "warning", str(noise[0].message), f"{Path(noise[0].filename).name}:{noise[0].lineno}"
     return "right", "", ""

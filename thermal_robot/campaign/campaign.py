@@ -2,68 +2,76 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import description, names
 from thermal_robot.campaign.checked import (
+    SMALLEST,
     check_covariate,
     check_joints,
     check_quaternions,
     checked_array,
     checked_mapping,
-    checked_noise,
-    checked_number,
-    checked_sigmas,
-    checked_sizes,
+    first_true,
 )
-from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.settings import HOW_MOVED, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
-from thermal_robot.campaign.units import Units
-from thermal_robot.errors import CampaignError
+from thermal_robot.campaign.units import Units, covariate_scale
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot, load_robot
+from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
-class Shower(Protocol):
-    """Who shows a campaign to pandas and to a notebook."""
-
-    def frame(self, campaign: Any, /) -> pd.DataFrame:
-        """Return its table, in the units of the file."""
-
-    def html(self, campaign: Any, /) -> str:
-        """Return what is said of it."""
-
-
-_showers: list[Shower] = []
-
-
-def shown_by(new: Shower) -> None:
-    """Register who shows every campaign from now on."""
-    _showers[:] = [new]
-
-
-def shower() -> Shower:
-    """Return who shows campaigns."""
-    if not _showers:
-        raise RuntimeError("nobody can show a campaign: import thermal_robot.campaign, or call shown_by")
-    return _showers[0]
-
-
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
 TextArray: TypeAlias = NDArray[np.str_]
 
-_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "noise_of_rows", "rows")
-_BY_NAME = ("covariates", "labels", "missing", "travelled")
+
+def _instance(kind: Any, expected: str) -> Kind:
+    """Take an object of a type."""
+
+    def take(value: Any, path: str) -> Any:
+        if not isinstance(value, kind):
+            raise MisfitError(path, value, expected)
+        return value
+
+    return take
+
+
+def _sigma(value: Any, path: str) -> float | None:
+    """Take a standard deviation; 0 says the same as ``None``, that none is given."""
+    if value is None or (isinstance(value, (int, float, np.number)) and value == 0):
+        return None
+    return float(number(least=SMALLEST, expected="a number above 0, or None")(value, path))
+
+
+_SIZES = mapping(number(least=SMALLEST, expected="a number above 0"))
+_TEXTS = listed(_instance(str, "a tuple of texts"), expected="a tuple of texts")
+_KINDS: dict[str, Kind] = {
+    "robot": _instance(Robot, "a robot, from load_robot"),
+    "units": _instance(Units, "Units"),
+    "targets": _instance((Targets, type(None)), "Targets, as read from columns x.1 …, or None"),
+    "moves": HOW_MOVED,
+    **dict.fromkeys(("extra", "derived", "turned", "warnings"), _TEXTS),
+    **dict.fromkeys(("base_known", "tool_known"), boolean),
+    **dict.fromkeys(("noise_position", "noise_orientation"), _sigma),
+    **dict.fromkeys(("priors", "gears"), _SIZES),
+    "reference_temperature": number(expected="a number"),
+}
+"""What each part may be that is no array."""
+_WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simulated_orientation": 4}
+"""Figures in a row of each (N, k) array; of the commands as many as the chain has joints."""
+_PER_SAMPLE = (*_WIDE, "noise_of_rows", "rows")
+_BY_NAME = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_, "travelled": np.float64}
+"""Arrays (N,) by name, and their types."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,91 +155,52 @@ class Campaign:
 
     name: str
     robot: Robot
-    q: FloatArray
-    position: FloatArray | None = None
-    orientation: FloatArray | None = None
-    covariates: Mapping[str, FloatArray] = field(default_factory=dict)
+    q: Array
+    position: Array | None = None
+    orientation: Array | None = None
+    covariates: Mapping[str, Array] = field(default_factory=dict)
     extra: tuple[str, ...] = ()
     derived: tuple[str, ...] = ()
     labels: Mapping[str, TextArray] = field(default_factory=dict)
-    simulated_position: FloatArray | None = None
-    simulated_orientation: FloatArray | None = None
+    simulated_position: Array | None = None
+    simulated_orientation: Array | None = None
     base_known: bool = False
     tool_known: bool = False
-    target: FloatArray = field(default_factory=lambda: np.zeros(3))
+    target: Array = field(default_factory=lambda: np.zeros(3))
     noise_position: float | None = None
     noise_orientation: float | None = None
-    noise_of_rows: FloatArray | None = None
+    noise_of_rows: Array | None = None
     targets: Targets | None = None
-    payload_com: FloatArray = field(default_factory=lambda: np.zeros(3))
+    payload_com: Array = field(default_factory=lambda: np.zeros(3))
     moves: str = "direct"
     reference_temperature: float = STANDARD_TEMPERATURE
     priors: Mapping[str, float] = field(default_factory=dict)
     gears: Mapping[str, float] = field(default_factory=dict)
     units: Units = field(default_factory=Units)
-    rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     warnings: tuple[str, ...] = ()
     missing: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     urdf: str = ""
-    travelled: Mapping[str, FloatArray] = field(default_factory=dict)
+    travelled: Mapping[str, Array] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         file = f"<{self.name}>"
-        self._require_kinds(file)
+        for key, kind in _KINDS.items():
+            self._set(key, given(file, key, getattr(self, key), kind))
         samples = len(self.q) if hasattr(self.q, "__len__") else 0
         if np.size(self.rows) == 0 and samples:
-            object.__setattr__(self, "rows", np.arange(2, samples + 2))
-        shapes: dict[str, tuple[int, ...]] = {
-            "q": (samples, self.robot.n),
-            "position": (samples, 3),
-            "orientation": (samples, 4),
-            "simulated_position": (samples, 3),
-            "simulated_orientation": (samples, 4),
-            "rows": (samples,),
-            "target": (3,),
-            "payload_com": (3,),
-        }
-        optional = ("position", "orientation", "simulated_position", "simulated_orientation")
-        for key, shape in shapes.items():
-            value = getattr(self, key)
-            if value is not None or key not in optional:
-                number = np.int64 if key == "rows" else np.float64
-                object.__setattr__(self, key, checked_array(file, key, value, shape, number))
-        kinds: dict[str, Any] = {
-            "covariates": np.float64,
-            "labels": np.str_,
-            "missing": np.bool_,
-            "travelled": np.float64,
-        }
-        for key, kind in kinds.items():
+            self._set("rows", np.arange(2, samples + 2))
+        for key, wide in _WIDE.items():
+            if key == "q" or getattr(self, key) is not None:
+                self._hold(key, (samples, wide or self.robot.n))
+        for key in ("target", "payload_com"):
+            self._hold(key, (3,))
+        self._hold("rows", (samples,), np.int64)
+        for key, kind in _BY_NAME.items():
             held = checked_mapping(file, key, getattr(self, key)).items()
-            arrays = {name: checked_array(file, name, value, (samples,), kind) for name, value in held}
-            object.__setattr__(self, key, arrays)
-        for key in ("noise_position", "noise_orientation"):
-            object.__setattr__(self, key, checked_noise(file, key, getattr(self, key)))
+            self._set(key, {name: checked_array(file, name, value, (samples,), kind) for name, value in held})
         self._weigh_rows(file, samples)
-        for key in ("priors", "gears"):
-            object.__setattr__(self, key, checked_sizes(file, key, getattr(self, key)))
-        warmth = checked_number(file, "reference_temperature", self.reference_temperature)
-        object.__setattr__(self, "reference_temperature", warmth)
-        self._require_possible(file)
-
-    def _weigh_rows(self, file: str, samples: int) -> None:
-        """Take targets and the noise of each row; where none is given for all, it is their root mean square."""
-        if self.targets is not None and len(self.targets.points) != samples:
-            raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
-        if self.noise_of_rows is None:
-            return
-        sigmas = checked_sigmas(file, "noise_of_rows", self.noise_of_rows, samples)
-        object.__setattr__(self, "noise_of_rows", sigmas)
-        if self.noise_position is None and samples:
-            place, turn = sigma_of_all(sigmas, self.targets)
-            object.__setattr__(self, "noise_position", place)
-            object.__setattr__(self, "noise_orientation", turn or self.noise_orientation)
-
-    def _require_possible(self, file: str) -> None:
-        """Refuse what no table may say either."""
         for name, values in self.covariates.items():
             check_covariate(file, name, values)
         for key in ("orientation", "simulated_orientation"):
@@ -239,26 +208,27 @@ class Campaign:
                 check_quaternions(file, key, getattr(self, key))
         check_joints(file, "gears", self.gears, self.robot.joint_names)
 
-    def _require_kinds(self, file: str) -> None:
-        """Refuse what is not of its kind, and has no shape."""
-        kinds: dict[str, Any] = {"robot": (Robot, "a robot, from load_robot"), "units": (Units, "Units")}
-        kinds["targets"] = ((Targets, type(None)), "Targets, as read from columns x.1 …, or None")
-        for key, (kind, expected) in kinds.items():
-            if not isinstance(getattr(self, key), kind):
-                found = type(getattr(self, key)).__name__
-                raise CampaignError(file, "wrong kind of value", column=key, found=found, expected=expected)
-        if self.moves not in MOVES:
-            expected = " or ".join(map(repr, MOVES))
-            raise CampaignError(file, "unknown word", column="moves", found=repr(self.moves), expected=expected)
-        for key in ("extra", "derived", "turned", "warnings"):
-            names = getattr(self, key)
-            if not isinstance(names, (tuple, list)) or not all(isinstance(name, str) for name in names):
-                raise CampaignError(
-                    file, "wrong kind of value", column=key, found=repr(names), expected="a tuple of texts"
-                )
-        for key in ("base_known", "tool_known"):
-            if not isinstance(getattr(self, key), (bool, np.bool_)):
-                raise CampaignError(file, "wrong kind of value", column=key, expected="True or False")
+    def _set(self, key: str, value: Any) -> None:
+        object.__setattr__(self, key, value)
+
+    def _hold(self, key: str, shape: tuple[int, ...], kind: Any = np.float64) -> None:
+        self._set(key, checked_array(f"<{self.name}>", key, getattr(self, key), shape, kind))
+
+    def _weigh_rows(self, file: str, samples: int) -> None:
+        """Take targets and the noise of each row; where none is given for all, it is their root mean square."""
+        if self.targets is not None and len(self.targets.points) != samples:
+            raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
+        if self.noise_of_rows is None:
+            return
+        self._hold("noise_of_rows", (samples,))
+        row = first_true(self.noise_of_rows < SMALLEST)
+        if row is not None:
+            found, problem = f"{self.noise_of_rows[row]:.15g} at index {row}", "no standard deviation"
+            raise CampaignError(file, problem, column="noise_of_rows", found=found, expected="a number above 0")
+        if self.noise_position is None and samples:
+            place, turn = sigma_of_all(self.noise_of_rows, self.targets)
+            self._set("noise_position", place)
+            self._set("noise_orientation", turn or self.noise_orientation)
 
     def __repr__(self) -> str:
         """One line; the arrays stay out of a notebook."""
@@ -269,7 +239,7 @@ class Campaign:
         )
 
     def _repr_html_(self) -> str:
-        return shower().html(self)
+        return description.html(self)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
@@ -278,7 +248,7 @@ class Campaign:
         -------
         DataFrame
             The columns of the file that :func:`write_campaign` would write, filled gaps and derived directions
-            included; the index ``row`` counts as a text editor does.
+            included; the index ``row`` counts as a text editor does, ``attrs`` hold the units.
 
         Examples
         --------
@@ -287,7 +257,12 @@ class Campaign:
         >>> list(table.columns[:6]), len(table)
         (['joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'x'], 120)
         """
-        return shower().frame(self)
+        import pandas as pd
+
+        labels = {name: labels.astype(object) for name, labels in self.labels.items()}
+        shown = pd.DataFrame({**table_columns(self), **labels}, index=pd.Index(self.rows, name="row"))
+        shown.attrs = {"angle_unit": self.units.angle, "length_unit": self.units.length}
+        return shown
 
     @property
     def samples(self) -> int:
@@ -305,12 +280,12 @@ class Campaign:
         return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
 
     @cached_property
-    def relative_noise(self) -> FloatArray | None:
+    def relative_noise(self) -> Array | None:
         """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
         return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
 
     @property
-    def clock(self) -> FloatArray | None:
+    def clock(self) -> Array | None:
         """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
         return clock_of(self.covariates)
 
@@ -327,7 +302,7 @@ class Campaign:
         return _read_only(np.where((pose != "") & (path != ""), of_path, pose))
 
     @cached_property
-    def since_turn(self) -> Mapping[str, FloatArray]:
+    def since_turn(self) -> Mapping[str, Array]:
         """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
 
         It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
@@ -340,12 +315,10 @@ class Campaign:
     @property
     def settings(self) -> Settings:
         """What is not in the table; the chain's root and gravity as the robot has them."""
-        alike = ("urdf", "moves", "reference_temperature", "units", "base_known", "tool_known", "turned")
-        own: dict[str, Any] = {key: getattr(self, key) for key in (*alike, "noise_position", "noise_orientation")}
-        own |= {key: as_vector(getattr(self, key)) for key in ("target", "payload_com")}
-        own |= {key: dict(getattr(self, key)) for key in ("priors", "gears")}
+        own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
+        own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
-        return Settings(**own, gravity=as_vector(self.robot.gravity))
+        return Settings(**{**own, "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
         """Return the campaign of some of the rows, without validating again.
@@ -379,7 +352,7 @@ class Campaign:
             changes[key] = {name: _read_only(value[index]) for name, value in held.items()}
         if self.targets is not None:
             changes["targets"] = self.targets.take(index)
-        return dataclasses.replace(self, **changes)
+        return replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:
         """Return the campaign as if the table had no such column (a covariate or a label).
@@ -402,7 +375,7 @@ class Campaign:
         }
         for key in ("extra", "derived"):
             changes[key] = tuple(other for other in getattr(self, key) if other != name)
-        return dataclasses.replace(self, **changes)
+        return replace(self, **changes)
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -412,8 +385,49 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-GRAVITY = "gravity"
-"""The quantity that no column holds: the robot has it."""
+def table_columns(campaign: Campaign) -> dict[str, Array]:
+    """Return the numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
+    robot, units, several = campaign.robot, campaign.units, campaign.targets
+    scales = [units.joint_scale(kind) for kind in robot.joint_types]
+    columns: dict[str, Array] = dict(zip(robot.joint_names, (campaign.q / scales).T, strict=True))
+    if several is not None:
+        for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
+            columns |= dict(zip(names.axes_of(number), points / units.length_scale, strict=True))
+    for group, values, scale in (
+        (names.POSITION, None if several else campaign.position, units.length_scale),
+        (names.ORIENTATION, None if several else campaign.orientation, 1.0),
+        (names.SIMULATED_POSITION, campaign.simulated_position, units.length_scale),
+        (names.SIMULATED_ORIENTATION, campaign.simulated_orientation, 1.0),
+    ):
+        if values is not None:
+            columns |= dict(zip(group, values.T / scale, strict=True))
+    if campaign.noise_of_rows is not None:
+        columns[names.NOISE] = campaign.noise_of_rows / units.length_scale
+    return columns | {name: v / covariate_scale(name, robot, units) for name, v in campaign.covariates.items()}
+
+
+def describe(campaign: Campaign) -> str:
+    """Describe a campaign to the person who measured it, in the units of the file.
+
+    Returns
+    -------
+    str
+        Plain text of several lines: robot, what was measured, frames, noise, joints against their limits,
+        covariates with their ranges and gaps, repeats, sessions, warnings.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> print(tr.describe(tr.demo_campaign()))
+    Campaign demo
+      robot   rv_m2, chain from base_link to tool0, 5 movable joints
+    ...
+    """
+    require("describe()", campaign, (Campaign,), "a campaign")
+    return description.text(campaign)
+
+
+GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:
@@ -497,23 +511,16 @@ def appended(campaigns: Sequence[Campaign]) -> Campaign:
             changes[key] = np.concatenate(values)
     if any(one.targets is not None for one in campaigns):
         raise CampaignError(first.name, "has several targets of each pose: rows of another file cannot be put to them")
-    for key in ("covariates", "labels"):
-        changes[key] = _joined([getattr(one, key) for one in campaigns])
-    changes["missing"] = _missing(campaigns, changes["covariates"])
-    changes["travelled"] = _joined([one.since_turn for one in campaigns])
-    names = changes["covariates"]
-    changes["extra"] = tuple(name for name in first.extra if name in names)
-    changes["derived"] = tuple(name for name in first.derived if name in names)
+    for key in ("covariates", "labels", "since_turn"):
+        by_name = [getattr(one, key) for one in campaigns]
+        common = [name for name in by_name[0] if all(name in other for other in by_name)]
+        changes[key] = {name: np.concatenate([own[name] for own in by_name]) for name in common}
+    changes["travelled"] = changes.pop("since_turn")
+    known = changes["covariates"]
+    filled = dict.fromkeys(name for one in campaigns for name in one.missing if name in known)
+    changes["missing"] = {
+        name: np.concatenate([one.missing.get(name, np.zeros(one.samples, dtype=bool)) for one in campaigns])
+        for name in filled
+    }
+    changes |= {key: tuple(name for name in getattr(first, key) if name in known) for key in ("extra", "derived")}
     return replace(first, **changes)
-
-
-def _joined(by_name: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    names = [name for name in by_name[0] if all(name in other for other in by_name)]
-    return {name: np.concatenate([own[name] for own in by_name]) for name in names}
-
-
-def _missing(campaigns: Sequence[Campaign], covariates: Mapping[str, Any]) -> dict[str, Any]:
-    """Return which cells were filled in, of the columns where any was."""
-    names = dict.fromkeys(name for one in campaigns for name in one.missing if name in covariates)
-    none = {id(one): np.zeros(one.samples, dtype=bool) for one in campaigns}
-    return {name: np.concatenate([one.missing.get(name, none[id(one)]) for one in campaigns]) for name in names}

@@ -9,30 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import SMALLEST
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import (
-    ANGLE_UNIT,
-    GEARS,
-    HOW_MOVED,
-    LENGTH_UNIT,
-    PRIORS,
-    SIGMA,
-    TEMPERATURE,
-    VECTOR,
-    WORD,
-    Settings,
-)
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
 from thermal_robot.schema import Kind, MisfitError, record, shown, text, word
+from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-_KNOWN = word(("unknown", "known"), WORD)
+_KNOWN = word(("unknown", "known"), kinds.WORD)
 
 
 def _named(meaning: str) -> Kind:
@@ -40,7 +31,7 @@ def _named(meaning: str) -> Kind:
 
 
 def _sigma(value: Any, path: str) -> float:
-    sigma = float(SIGMA(value, path))
+    sigma = float(kinds.SIGMA(value, path))
     if 0.0 < sigma < SMALLEST:
         raise MisfitError(path, value, "a number above 0, or 0 for not given", "smaller than any noise")
     return sigma
@@ -48,7 +39,7 @@ def _sigma(value: Any, path: str) -> float:
 
 def _vector(value: Any, path: str) -> Any:
     try:
-        return VECTOR(value, path)
+        return kinds.VECTOR(value, path)
     except MisfitError:
         raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
 
@@ -60,60 +51,56 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "root_frame": _named("the URDF link where the chain starts"),
         "kinematics": _named("the path of a kinematics.yaml of Universal Robots"),
         "gravity": _vector,
-        "moves": HOW_MOVED,
-        "reference_temperature": TEMPERATURE,
+        "moves": kinds.HOW_MOVED,
+        "reference_temperature": kinds.TEMPERATURE,
     },
-    "measurements": {"file": _named("the path of the table"), "angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
+    "measurements": {
+        "file": _named("the path of the table"),
+        "angle_unit": kinds.ANGLE_UNIT,
+        "length_unit": kinds.LENGTH_UNIT,
+    },
     "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
     "noise": {"position": _sigma, "orientation": _sigma},
     "payload": {"com": _vector},
-    "priors": PRIORS,
-    "gears": GEARS,
+    "priors": kinds.PRIORS,
+    "gears": kinds.GEARS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
-_LARGEST_FILE = 1 << 16
-"""Bytes: it holds a few lines, and a line for every joint and every effect."""
+_LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
 
 
 class Document:
-    """The parsed file together with its text, so that an error can name the line.
+    """A parsed TOML file together with its text, so that an error can name the line.
 
-    Parameters
-    ----------
-    file
-        Its path.
-    kinds
-        What each key of each section may be; of a section whose keys are the user's own, what the whole may be.
-
-    Attributes
-    ----------
-    sections
-        Values by section and key, each of its kind; what is not stated is absent.
+    ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``kinds`` says
+    what each key of each section may be; of a section whose keys are the user's own, what the whole may be.
     """
 
     def __init__(self, file: Path, kinds: Mapping[str, Mapping[str, Kind] | Kind] = KINDS) -> None:
         self.file, self.kinds = str(file), kinds
+        self.text, data = self._parsed(file)
+        for section, content in data.items():
+            self._refuse_unknown(section, content)
+        self.sections = {section: self._fitted(section, content) for section, content in data.items()}
+
+    def _parsed(self, file: Path) -> tuple[str, dict[str, Any]]:
         try:
             if file.stat().st_size > _LARGEST_FILE:
                 raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 64 KiB")
-            self.text = file.read_text(encoding="utf-8-sig")
-            self.data: dict[str, Any] = tomllib.loads(self.text)
+            text = file.read_text(encoding="utf-8-sig")
+            return text, tomllib.loads(text)
         except OSError as error:
             raise CampaignError(self.file, f"cannot be read: {error.strerror}") from error
         except UnicodeDecodeError as error:
             raise CampaignError(self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8") from error
         except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
-            row = int(line[1]) if line else None
-            raise CampaignError(self.file, f"not valid TOML: {error}", row=row) from error
+            raise CampaignError(self.file, f"not valid TOML: {error}", row=int(line[1]) if line else None) from error
         except RecursionError as error:
-            raise CampaignError(
-                self.file, "values stand within each other too deep", expected="lists of numbers"
-            ) from error
+            problem = "values stand within each other too deep"
+            raise CampaignError(self.file, problem, expected="lists of numbers") from error
         except ValueError as error:  # an integer of thousands of digits
             raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
-        self._refuse_unknown()
-        self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
 
     def row(self, section: str, key: str = "") -> int | None:
         """Return the line of a section or key, ``None`` where it is written in some unusual way."""
@@ -134,21 +121,19 @@ class Document:
         column = column or (f"{section}.{key}" if key else section)
         return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
 
-    def _refuse_unknown(self) -> None:
-        for section, content in self.data.items():
-            if section not in self.kinds:
-                expected = f"one of the sections {', '.join(self.kinds)}"
-                problem = f"unknown section or key{did_you_mean(section, self.kinds)}"
-                raise self._error(problem, section, expected=expected)
-            if not isinstance(content, dict):
-                found, expected = shown(content), f"a section [{section}]"
-                raise self._error("wrong kind of value", section, found=found, expected=expected)
-            kind = self.kinds[section]
-            known = kind if isinstance(kind, Mapping) else dict.fromkeys(content)
-            for key in content:
-                if key not in known:
-                    expected = f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known))
-                    raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
+    def _refuse_unknown(self, section: str, content: Any) -> None:
+        if section not in self.kinds:
+            problem = f"unknown section or key{did_you_mean(section, self.kinds)}"
+            raise self._error(problem, section, expected=f"one of the sections {', '.join(self.kinds)}")
+        if not isinstance(content, dict):
+            told = {"found": shown(content), "expected": f"a section [{section}]"}
+            raise self._error("wrong kind of value", section, **told)
+        kind = self.kinds[section]
+        known = kind if isinstance(kind, Mapping) else content
+        for key in content:
+            if key not in known:
+                expected = f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known))
+                raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
         """Return the values of a section; what is not of its kind is told with its line."""
@@ -159,8 +144,8 @@ class Document:
         except MisfitError as error:
             key = re.split(r"[.\[]", error.path.removeprefix(f"{section}."))[0]
             key = key if self.row(section, key) else ""
-            problem, found = error.problem or "wrong kind of value", shown(error.value)
-            raise self._error(problem, section, key, error.path, found=found, expected=error.expected) from None
+            problem, told = error.problem or "wrong kind of value", {"found": shown(error.value)}
+            raise self._error(problem, section, key, error.path, **told, expected=error.expected) from None
         return values
 
     def required(self, section: str, key: str) -> Any:
@@ -185,29 +170,14 @@ class Declaration:
 
     file: Path  # path of the file as the user gave it
     table: Path  # path of the table
+    robot: str | Path  # what load_robot wants: a reference to a known robot, or a path
     settings: Settings  # all the rest, SI
-    # line of each key of ``[gears]``, for a message once the robot's joints are known
-    gear_rows: Mapping[str, int | None]
-    folder: Path  # against which its paths are resolved
-    # path of the calibration that a robot of Universal Robots brings along; ``None`` without one
-    kinematics: Path | None = None
-
-    @property
-    def robot(self) -> str | Path:
-        """What :func:`thermal_robot.robot.load_robot` wants: a reference to a known robot, or a path."""
-        urdf = self.settings.urdf
-        return urdf if urdf.startswith(("example-robot-data:", "builtin:")) else self.folder / urdf
+    gear_rows: Mapping[str, int | None]  # line of each key of ``[gears]``, for a message once the joints are known
+    kinematics: Path | None = None  # path of the calibration that a robot of Universal Robots brings along
 
 
 def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
-    """Read campaign.toml.
-
-    Parameters
-    ----------
-    path
-        The file, or the directory that holds it.
-    folder
-        Against which its paths are resolved; its own where absent.
+    """Read campaign.toml, or that of a directory; its paths are resolved against ``folder``, by default its own.
 
     Raises
     ------
@@ -220,38 +190,34 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     document = Document(file)
     for key in ("angle_unit", "length_unit"):
         document.required("measurements", key)
-    robot = document.sections.get("robot", {})
-    ends = {key: robot.get(key) for key in ("root_frame", "gravity")}
-    named = {key: document.required("robot", key) for key in ("urdf", "tool_frame")}
-    settings = Settings.stated(document.sections, **named, **ends)
+    stated = document.sections.get("robot", {})
+    ends = {key: document.required("robot", key) for key in ("urdf", "tool_frame")}
+    ends |= {key: stated.get(key) for key in ("root_frame", "gravity")}
+    settings = Settings.stated(document.sections, **ends)
     folder = file.parent if folder is None else folder
     table = folder / document.required("measurements", "file")
+    robot = settings.urdf if settings.urdf.startswith((EXAMPLE_ROBOT_DATA, BUILTIN)) else folder / settings.urdf
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
-    kinematics = robot.get("kinematics")
-    return Declaration(file, table, settings, rows, folder, folder / kinematics if kinematics else None)
+    kinematics = folder / stated["kinematics"] if stated.get("kinematics") else None
+    return Declaration(file, table, robot, settings, rows, kinematics)
 
 
 def _absent(path: Path) -> CampaignError:
-    """Say that there is no campaign, and which there are beside it."""
-    problem = f"this folder has no {FILE_NAME}" if is_folder(path) else "there is no such file"
-    found = _campaigns(path if is_folder(path) else path.parent)
+    """Say that there is no campaign, and which there are beside it: files that have its section, folders its file."""
+    problem, folder = f"this folder has no {FILE_NAME}", path
+    if not is_folder(path):
+        problem, folder = "there is no such file", path.parent
+    try:
+        inside = sorted(folder.iterdir())
+        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
+        found = [f.name for f in (*files, *(f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()))]
+    except (OSError, ValueError):  # nothing can be proposed where nothing can be read
+        found = []
     beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
     return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
 
 
-def _campaigns(folder: Path) -> list[str]:
-    """Return the names of campaigns in a folder: files that have their section, folders that have their file."""
-    try:
-        inside = sorted(folder.iterdir())
-        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
-        folders = [f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()]
-    except (OSError, ValueError):  # nothing can be proposed where nothing can be read
-        return []
-    return [f.name for f in (*files, *folders)]
-
-
-_LARGEST_YAML = 64 << 20
-"""Bytes: ten thousand samples of a calibration as text; it takes a minute to read them."""
+_LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them
 WITH_YAML = 'pip install "thermal-robot[yaml]"'
 
 

@@ -14,8 +14,7 @@ from thermal_robot.errors import CampaignError, require
 if TYPE_CHECKING:
     import pandas as pd
 
-SAME_PLACE = 1e-9
-"""m: by which the tool frame differs between readings of one URDF at most."""
+SAME_PLACE = 1e-9  # m: by which the tool frame differs between readings of one URDF at most
 
 
 def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ...]) -> Campaign:

@@ -10,22 +10,18 @@ ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose", "path")
-NOISE = "noise"
-"""Column of the instrument's one sigma of each row."""
+NOISE = "noise"  # Column of the instrument's one sigma of each row
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
-MISSED = "miss.direction"
-"""Columns that predictions and corrected commands have beside their own."""
+MISSED = "miss.direction"  # Columns that predictions and corrected commands have beside their own
 TILT = ("tilt.x", "tilt.y")
-CLOCK = ("time", "order")
-"""Columns that tell when a row was measured; where both are there, the first."""
+CLOCK = ("time", "order")  # Columns that tell when a row was measured; where both are there, the first
 PLAIN_COVARIATES = (*CLOCK, "temperature", "payload", "speed", *TILT)
 PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
 PER_LINK = ("temperature",)
 MEASURED = (*POSITION, *ORIENTATION)
 SIMULATED = (*SIMULATED_POSITION, *SIMULATED_ORIENTATION)
-RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES, NOISE)
-"""Names that mean the same in every campaign."""
+RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES, NOISE)  # Names that mean the same in every campaign
 
 _LIKE = 0.5
 """Likeness (0..1, by :mod:`difflib`) from which a name is offered for another: half of the letters stand in order. It

@@ -1,4 +1,4 @@
-"""What is accepted but doubtful: a plain sentence each, for the user to judge; rows that measured nothing of their own.
+"""Plausibility checks of a campaign: a plain sentence each, for the user to judge; marks and copied rows.
 
 Marks of a lost beam, old readings and copies of other rows. Instruments write −9999, 999, 0 0 0 or their last reading
 where they see no target. Such a figure stands in several rows to the last digit, and it does not follow the robot:
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from thermal_robot.campaign.campaign import Campaign, FloatArray
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK, axes_of, listed
 from thermal_robot.campaign.names import POSITION as XYZ
 from thermal_robot.campaign.table import told_rows
@@ -24,54 +25,32 @@ from thermal_robot.kinematics import align, tool_poses
 
 Mask = NDArray[np.bool_]
 
-FEWEST_ROWS = 10
-"""Rows from which figures that all end alike were rounded, and are no accident."""
+FEWEST_ROWS = 10  # rows from which figures that all end alike were rounded, and are no accident
+# residuals over the others' median that tell a mark: three figures that are equal by chance are rare, one is not
 ASTRAY_PLACE, ASTRAY_FIGURE = 3.0, 10.0
-"""Times the others' median distance from the regression beyond which rows with one place, or one figure of a place,
-hold a mark: three figures that are equal by chance are rare, one of a rounded table is not."""
-SAME_COMMAND = 1e-3
-"""rad or m within which commands of one pose count as the same: a controller that reports where it stopped repeats a
-pose to better than that, and a pose of its own is farther away."""
-ROUNDING = 1e-6
-"""Share of a coordinate's spread that counts as no distance: the last digits of exact figures."""
-ROUNDS = 30
-"""Of reweighted least squares, after which the least absolute deviations have settled to a per cent."""
-STEADIEST = 1e-6
-"""m per axis: no arm repeats to better, so that equal figures that are finer were copied and not measured."""
-RARE = 0.05
-"""Expected number of repeats that agree by chance above which equal rows are repeats that the figures cannot tell."""
+SAME_COMMAND = 1e-3  # rad or m: controllers repeat a pose to better, and a pose of its own is farther away
+ROUNDING = 1e-6  # share of a coordinate's spread that counts as no distance: the last digits of exact figures
+ROUNDS = 30  # of reweighted least squares, after which the least absolute deviations have settled to a per cent
+STEADIEST = 1e-6  # m per axis: no arm repeats to better, so that equal figures that are finer were copied
+RARE = 0.05  # expected number of repeats that agree by chance, above which equal rows may be repeats
 
 
 def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
-    """Find the figures that stand for a place that was not seen.
-
-    Returns
-    -------
-    rows
-        (N,) those that hold one.
-    sentences
-        One for each figure, with its rows.
-    """
+    """Return the (N,) rows that hold a figure for a place that was not seen, and a sentence for each such figure."""
+    places = [] if campaign.position is None else [(XYZ, campaign.position)]
+    if campaign.targets is not None:
+        axes = map(axes_of, campaign.targets.numbers)
+        places = list(zip(axes, campaign.targets.points.swapaxes(0, 1), strict=True))
     rows, sentences = np.zeros(campaign.samples, dtype=bool), []
-    for names, points in _places(campaign):
+    for names, points in places if campaign.samples >= FEWEST_ROWS else []:
         for found, sentence in _of_points(campaign, names, points):
             rows |= found
             sentences.append(sentence)
     return rows, sentences
 
 
-def _places(campaign: Campaign) -> Iterator[tuple[tuple[str, ...], FloatArray]]:
-    """Yield the columns of each target, and its places (N, 3), m; NaN where it was not seen."""
-    if campaign.samples < FEWEST_ROWS or campaign.position is None:
-        return
-    if campaign.targets is None:
-        yield XYZ, campaign.position
-    else:
-        for k, number in enumerate(campaign.targets.numbers):
-            yield axes_of(number), campaign.targets.points[:, k]
-
-
-def _of_points(campaign: Campaign, names: tuple[str, ...], points: FloatArray) -> Iterator[tuple[Mask, str]]:
+def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Iterator[tuple[Mask, str]]:
+    """Yield the rows of each mark and a sentence, of the places (N, 3) in some columns, m; NaN where none was seen."""
     q, scale = campaign.q, campaign.units.length_scale
     seen = np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
@@ -93,7 +72,7 @@ def _of_points(campaign: Campaign, names: tuple[str, ...], points: FloatArray) -
                 yield rows, f"{name} is {told_by}: a mark of a missing value?"
 
 
-def _equal(q: FloatArray, values: FloatArray, seen: Mask) -> list[Mask]:
+def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
     """Return the rows of each value that stands with several commands, the most frequent first."""
     _, group, counts = np.unique(values[seen], axis=0, return_inverse=True, return_counts=True)
     groups = np.full(len(seen), -1)
@@ -102,19 +81,19 @@ def _equal(q: FloatArray, values: FloatArray, seen: Mask) -> list[Mask]:
     return [rows for rows in several if _moved(q, rows)]
 
 
-def _moved(q: FloatArray, rows: Mask) -> bool:
+def _moved(q: Array, rows: Mask) -> bool:
     """Tell whether rows have different commands."""
     return bool(rows.sum() > 1 and np.ptp(q[rows], axis=0).max() > SAME_COMMAND)
 
 
-def _astray(away: FloatArray, rows: Mask, seen: Mask, times: float) -> bool:
+def _astray(away: Array, rows: Mask, seen: Mask, times: float) -> bool:
     """Tell whether rows are farther from the regression than the others, and a minority."""
     others = seen & ~rows
     return bool(rows.sum() < others.sum() and np.median(away[rows]) > times * np.median(away[others]))
 
 
-def _away(campaign: Campaign, points: FloatArray, seen: Mask) -> FloatArray:
-    """(N, 3) distance of each coordinate from its regression on the nominal poses (least absolute deviations)."""
+def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
+    """Residual (N, 3) of the least-absolute-deviation regression of each coordinate on the nominal poses."""
     poses = tool_poses(campaign.robot, campaign.q)
     known = [np.ones((len(poses), 1)), poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)]
     different = len(np.unique(np.round(campaign.q[seen] / SAME_COMMAND), axis=0))
@@ -135,7 +114,7 @@ def _away(campaign: Campaign, points: FloatArray, seen: Mask) -> FloatArray:
 
 
 def copies(campaign: Campaign) -> Mask:
-    """(N,) the rows that say what an earlier one says in every column, and are no repeats.
+    """Duplicated rows, (N,): those that say what an earlier one says in every column, and are no repeats.
 
     A repeat may well measure the same digits, but not at the same time. Where none is recorded, equal rows are repeats
     if the figures are so coarse that some would agree by chance.
@@ -171,7 +150,7 @@ def _originals(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def _by_chance(campaign: Campaign) -> float:
-    """Return how many pairs of repeats are expected to agree in all figures: those may be coarser than they scatter."""
+    """Return how many pairs of repeats are expected to agree in all figures, which may be coarser than they scatter."""
     _, pose, counts = np.unique(campaign.q, axis=0, return_inverse=True, return_counts=True)
     position, pose = np.asarray(campaign.position), pose.reshape(-1)
     middle = np.array([np.bincount(pose, axis) for axis in position.T]).T / counts[:, None]
@@ -183,8 +162,8 @@ def _by_chance(campaign: Campaign) -> float:
     return float(alike * (counts * (counts - 1) / 2).sum())
 
 
-def step_of(values: FloatArray) -> float:
-    """Return the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
+def step_of(values: Array) -> float:
+    """Resolution: the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
     for power in range(3, -7, -1):
         parts = values * 10.0**-power
         if np.abs(parts - np.round(parts)).max() < 1e-6 * max(1.0, float(np.abs(parts).max()) * 1e-6):
@@ -196,82 +175,58 @@ def _figure(value: float) -> str:
     return f"{value + 0.0:.10g}".replace("-", "−")
 
 
-LIMIT_TOLERANCE = 1e-6
-"""rad or m by which a command may pass a limit: the last digit of a file is not a violation."""
-MOST_TURNS = 2
-"""Turns that no command in rad exceeds: wrists and cables allow at most two to either side, and 13 degrees, read as
-rad, are more."""
-LEAST_ANGLE = 2 * math.pi
-"""Degrees that some joint of a real campaign exceeds; commands in rad, read as degrees, stay within one turn's 2π."""
-FEWEST_COMMANDS = 3
-"""Rows from which small commands are a habit and not an accident."""
-FARTHEST_TARGET = 3.0
-"""Reaches of the arm within which a target sits on it: a long tool is shorter, a length read in a unit a thousand times
-too large is longer by far. The next three bounds are as coarse for the same reason."""
-WORST_INSTRUMENT = 0.01
-"""Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
-LONGEST_ARM, SHORTEST_ARM, THOUSAND = 100.0, 0.01, 1000.0
-"""m: what no arm exceeds, nor falls short of: mobile cranes reach 90 m, arms under a microscope some centimetres; by
-what lengths are wrong that were converted to m twice."""
-LONG_ARM, APART, TINY = 10.0, 0.4, 1e-9
-"""m: an arm that is longer is looked at: excavators reach 15; natural logarithm within which measured and predicted
-extents tell the unit of the URDF: cm and inches are 0.93 apart, a target beside the tool changes them by less; and m,
-an extent that is none."""
+LIMIT_TOLERANCE = 1e-6  # rad or m by which a command may pass a limit: the last digit of a file is not a violation
+MOST_TURNS = (
+    2  # turns of a command at most: wrists and cables allow two to either side; 13 degrees read as rad are more
+)
+LEAST_ANGLE = 2 * math.pi  # degrees that a real campaign exceeds; commands in rad read as degrees stay within one turn
+FEWEST_COMMANDS = 3  # rows from which small commands are a habit and not an accident
+# lengths are compared with the reach by coarse bounds, as one that is read in a wrong unit is a thousand times off
+FARTHEST_TARGET = 3.0  # reaches within which a target sits on the arm: a long tool is shorter
+WORST_INSTRUMENT = (
+    0.01  # reaches, one sigma of an instrument at most: 1 cm for an arm of 1 m, worse than a tape measure
+)
+LARGEST_EXTENT = 4.0  # reaches with the target: the ball that it can reach is two across; two more for commands outside
+SMALLEST_EXTENT = 1 / 200  # reaches over which positions extend at least, once enough joints move: 5 mm for 1 m
+MOVES = 0.5  # rad or m of a joint's range that carry the target visibly
+MOVING_JOINTS = 3  # joints that may move and leave the target in place: those of a wrist about a target on its axes
+LONGEST_ARM, SHORTEST_ARM = 100.0, 0.01  # m: mobile cranes reach 90 m, arms under a microscope some centimetres
+THOUSAND = 1000.0  # by what lengths are too short that were converted to m twice
+LONG_ARM = 10.0  # m: an arm that is longer is looked at; excavators reach 15
+APART = 0.4  # ln of extents within which they tell a unit: cm and inches are 0.93 apart, a target changes them by less
+TINY = 1e-9  # m, an extent that is none
 URDF_UNITS = {"mm": "a thousand", "cm": "a hundred", "inch": "39"}
 """Units in which URDFs were exported, and how many times too long their links then are."""
-LONG_TOOL, WORST_ARM, PAIRED = 0.5, 0.05, 200
-"""m: as far as a target whose place is to be fitted may sit from the tool frame: a welding gun, a long pointer; share
-of the reach by which no arm errs; and rows, spread evenly, whose distances from each other are looked at."""
-LARGEST_EXTENT = 4.0
-"""Reaches (with the target) over which measured positions extend at most: the ball that the target can reach is two
-across; the other two allow for commands outside it."""
-SMALLEST_EXTENT = 1 / 200
-"""Share of the reach over which measured positions extend at least, once enough joints move: 5 mm for an arm of 1 m."""
-MOVES = 0.5
-"""rad or m of a joint's range that carry the target visibly."""
-MOVING_JOINTS = 3
-"""Joints that may move and leave the target in place: those of a wrist about a target on its axes."""
-
-WARMEST, HOTTEST = 55.0, 150.0
-"""°C that the median temperature of a robot does not exceed, whose motors run at 50: a hall of 20 °C has 68 °F; and
-that no robot reaches, whose grease ends at 120: 20 °C are 293 K."""
-HEAVIEST, HEAVIEST_ALONE = 3.0, 1000.0
-"""Payload over the arm's own mass, which no arm carries: the strongest carry as much as they weigh, and grams are a
-thousand; and in kg where the URDF has no masses: the largest robots carry as much."""
-COARSEST_TURN, FINEST = 0.1, 1e-7
-"""rad that no instrument's one-sigma exceeds, 6 degrees; and m, a tenth of a micrometre, that none that measures robots
-reaches: a laser tracker has some ten micrometres."""
-ROUNDED_TO = 5e-4
-"""m: positions that are read to no better are told of where no noise is stated: every arm repeats to better."""
-GRID = 5e-5
-"""m: what rounded commands move the tool, rms, from which that is told: half the repeatability of good arms."""
-SLIDES = 10.0
-"""Times its farther limit: a slide that is commanded beyond is read in a wrong unit, the next one being a thousand."""
-ANOTHER_ROBOT = 0.02
-"""Of the reach: a simulator of the same robot, however its lengths were measured, is nearer to the URDF than that."""
+LONG_TOOL = 0.5  # m from the tool frame at most of a target whose place is fitted: a welding gun, a long pointer
+WORST_ARM = 0.05  # reaches by which no arm errs
+PAIRED = 200  # rows, spread evenly, whose distances from each other are looked at
+WARMEST = 55.0  # °C, median of a robot at most, whose motors run at 50: a hall of 20 °C has 68 °F
+HOTTEST = 150.0  # °C that no robot reaches, whose grease ends at 120: 20 °C are 293 K
+HEAVIEST = 3.0  # payload over the arm's mass at most: the strongest carry what they weigh, and grams are a thousand
+HEAVIEST_ALONE = 1000.0  # kg, payload at most where the URDF has no masses: the largest robots carry as much
+COARSEST_TURN = 0.1  # rad that no instrument's one-sigma exceeds, 6 degrees
+FINEST = 1e-7  # m that no instrument that measures robots reaches: a laser tracker has some ten micrometres
+ROUNDED_TO = 5e-4  # m: positions read to no better are told of where no noise is stated; every arm repeats to better
+GRID = 5e-5  # m rms by which rounded commands move the tool, from which that is told: half of what good arms repeat to
+SLIDES = 10.0  # limits of a slide: what is commanded beyond is in a wrong unit, the next one being a thousand
+ANOTHER_ROBOT = 0.02  # reaches: a simulator of the same robot, however measured, is nearer to the URDF
 
 
 def doubts(campaign: Campaign) -> list[str]:
-    """Return the sentences, none for an ordinary campaign."""
+    """Return the sentences of all plausibility checks, none for an ordinary campaign."""
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
+    checks = (_limits, _time, _speed, _pose_labels, _temperature, _payload, _noise, _slides)
     return [
         *_beside(campaign),
         *lost,
         *doubled(campaign),
         *_angle_unit(campaign),
         *([*_length_unit(seen)] or _apart(seen)),
-        *_limits(campaign),
-        *_time(campaign),
-        *_speed(campaign),
-        *_pose_labels(campaign),
-        *_temperature(campaign),
-        *_payload(campaign),
-        *_noise(campaign),
-        *_slides(campaign),
+        *(sentence for check in checks for sentence in check(campaign)),
         *_rounded(seen),
-        *_grid(campaign, _reach(campaign)),
-        *_simulator(campaign, _reach(campaign)),
+        *_grid(campaign),
+        *_simulator(campaign),
     ]
 
 
@@ -280,32 +235,30 @@ def _beside(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
-        follow = (
-            f"joint {led[0]!r} of the chain mimics" if len(led) == 1 else f"joints {listed(led)} of the chain mimic"
-        )
-        yield f"{follow} {joint!r}, which is outside the chain: its column is read"
+        word, verb = ("joint", "mimics") if len(led) == 1 else ("joints", "mimic")
+        yield f"{word} {listed(led)} of the chain {verb} {joint!r}, which is outside the chain: its column is read"
 
 
 def _angle_unit(campaign: Campaign) -> Iterator[str]:
     robot, units = campaign.robot, campaign.units
-    turning = np.array([kind != "prismatic" for kind in robot.joint_types])
-    values = np.abs(campaign.q[:, turning])
+    turning = np.flatnonzero([kind != "prismatic" for kind in robot.joint_types])
+    values = campaign.q[:, turning]
     if not values.size:
         return
-    if units.angle == "rad" and values.max() > 2 * math.pi * MOST_TURNS:
-        row, joint = np.unravel_index(int(values.argmax()), values.shape)
-        name = np.array(robot.joint_names)[turning][joint]
+    most = float(np.abs(values).max())
+    if units.angle == "rad" and most > 2 * math.pi * MOST_TURNS:
+        row, joint = np.unravel_index(int(np.abs(values).argmax()), values.shape)
         yield (
-            f"joint {str(name)!r} is commanded to {campaign.q[:, turning][row, joint]:.6g} rad in row "
+            f"joint {robot.joint_names[turning[joint]]!r} is commanded to {values[row, joint]:.6g} rad in row "
             f'{campaign.rows[row]}, more than two turns: is angle_unit = "deg" meant?'
         )
-    small = values.max() <= math.radians(LEAST_ANGLE)
-    if units.angle == "deg" and campaign.samples >= FEWEST_COMMANDS and small and np.ptp(values) > 0:
-        yield f'no joint leaves ±{values.max() / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
+    small = most <= math.radians(LEAST_ANGLE)
+    if units.angle == "deg" and campaign.samples >= FEWEST_COMMANDS and small and np.ptp(np.abs(values)) > 0:
+        yield f'no joint leaves ±{most / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
 
 
 def _reach(campaign: Campaign) -> float:
-    """Return how far the arm reaches at most, m; infinite where a slide has no limit."""
+    """Maximum reach of the arm, m: the sum of its lengths; infinite where a slide has no limit."""
     robot = campaign.robot
     travel = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[np.array(robot.joint_types) == "prismatic"]
     return sum(segment.length for segment in robot.segments) + float(travel.sum())
@@ -349,15 +302,13 @@ def in_another_unit(factor: float) -> str:
 
 def _length_unit(campaign: Campaign) -> Iterator[str]:
     """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
-    robot, unit = campaign.robot, campaign.units.length
-    reach = _reach(campaign)
-    factor = another_unit(campaign)
+    robot, reach, factor = campaign.robot, _reach(campaign), another_unit(campaign)
     if factor is not None:
         yield f"{in_another_unit(factor)}, {reach:.3g} m together"
         return
     if not np.isfinite(reach):
         return
-    ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
+    ask = f'the arm reaches {reach:.3g} m: is length_unit = "{campaign.units.length}" right?'
     target = float(np.linalg.norm(campaign.target))
     if target > FARTHEST_TARGET * reach:
         yield f"the target lies {target:.3g} m away from {robot.tool_frame!r} and {ask}"
@@ -373,7 +324,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
 
 
 def _apart(campaign: Campaign) -> Iterator[str]:
-    """Compare two measured points with what commands and target allow: whatever the base, their distance stays."""
+    """Compare distances of measured points with what commands and target allow: no rigid base changes them."""
     reach = _reach(campaign)
     simulated = campaign.simulated_position is not None
     if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):
@@ -401,19 +352,18 @@ def _apart(campaign: Campaign) -> Iterator[str]:
 
 def _limits(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
-    bounds = zip(robot.joint_names, robot.joint_types, np.isinf(robot.lower) | np.isinf(robot.upper), strict=True)
-    free = [name for name, kind, unbound in bounds if kind != "continuous" and unbound]
+    joints = list(zip(robot.joint_names, robot.joint_types, campaign.q.T, robot.lower, robot.upper, strict=True))
+    free = [name for name, kind, _, *bounds in joints if kind != "continuous" and np.isinf(bounds).any()]
     if free:
         yield f"the URDF gives no limits for {listed(free)}: no command is checked against any there"
-    for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-        q, lower, upper = campaign.q[:, j], float(robot.lower[j]), float(robot.upper[j])
+    for name, kind, q, lower, upper in joints:
         outside = (q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE)
         if outside.any():
             first = int(np.argmax(outside))
             scale, unit = campaign.units.joint_scale(kind), campaign.units.joint_unit(kind)
             limit = upper if q[first] > upper else lower
             yield (
-                f"joint {name!r} is outside its limits in {_rows(int(outside.sum()))}, first in row "
+                f"joint {name!r} is outside its limits in {_rows(outside)}, first in row "
                 f"{campaign.rows[first]}: {q[first] / scale:.6g} {unit}, limit {limit / scale:.6g} {unit}"
             )
 
@@ -434,28 +384,20 @@ def _speed(campaign: Campaign) -> Iterator[str]:
     outside = (speed < 0) | (speed > 1)
     if outside.any():
         first = int(np.argmax(outside))
-        yield (
-            f"column 'speed' is outside 0..1 in {_rows(int(outside.sum()))}, "
-            f"first in row {campaign.rows[first]}: {speed[first]:.6g}; "
-            "it is a fraction of the maximum, not per cent"
-        )
+        where = f"{_rows(outside)}, first in row {campaign.rows[first]}: {speed[first]:.6g}"
+        yield f"column 'speed' is outside 0..1 in {where}; it is a fraction of the maximum, not per cent"
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:
-    labels = campaign.pose_labels
-    if labels is None:
-        return
-    different = [
-        str(label)
-        for label in np.unique(labels[labels != ""])
-        if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND
-    ]
+    labels = np.empty(0, dtype=str) if campaign.pose_labels is None else campaign.pose_labels
+    known = [str(label) for label in np.unique(labels[labels != ""])]
+    different = [label for label in known if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND]
     if different:
         yield f"rows with the same pose label have different joint commands: {listed(different, 5)}"
 
 
-def _rows(count: int) -> str:
-    return f"{count} row{'s' if count != 1 else ''}"
+def _rows(chosen: Mask) -> str:
+    return f"{int(chosen.sum())} row{'s' if chosen.sum() != 1 else ''}"
 
 
 def _temperature(campaign: Campaign) -> Iterator[str]:
@@ -463,17 +405,13 @@ def _temperature(campaign: Campaign) -> Iterator[str]:
     told = [(f"column {n!r} has a median of", float(np.median(campaign.covariates[n]))) for n in names]
     for what, value in (*told, ("the reference temperature is", campaign.reference_temperature)):
         if value > WARMEST:
-            unit = "kelvin" if value > HOTTEST else "degrees Fahrenheit"
-            yield f"{what} {value:.4g} °C: are these {unit}?"
+            yield f"{what} {value:.4g} °C: are these {'kelvin' if value > HOTTEST else 'degrees Fahrenheit'}?"
 
 
 def _payload(campaign: Campaign) -> Iterator[str]:
-    payload = campaign.covariates.get("payload")
-    if payload is None:
-        return
-    heaviest, arm = float(payload.max()), campaign.robot.mass
-    if heaviest > (HEAVIEST * arm if campaign.robot.has_masses else HEAVIEST_ALONE):
-        beside = f", and the arm weighs {arm:.3g} kg" if campaign.robot.has_masses else ""
+    heaviest, robot = float(campaign.covariates.get("payload", np.zeros(1)).max()), campaign.robot
+    if heaviest > (HEAVIEST * robot.mass if robot.has_masses else HEAVIEST_ALONE):
+        beside = f", and the arm weighs {robot.mass:.3g} kg" if robot.has_masses else ""
         yield f"the payload is up to {heaviest:.4g} kg{beside}: are these grams?"
 
 
@@ -490,9 +428,8 @@ def _noise(campaign: Campaign) -> Iterator[str]:
 
 def _slides(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
-    for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-        limit = max(abs(float(robot.lower[j])), abs(float(robot.upper[j])))
-        farthest = float(np.abs(campaign.q[:, j]).max())
+    limits, commanded = np.maximum(np.abs(robot.lower), np.abs(robot.upper)), np.abs(campaign.q).max(axis=0)
+    for name, kind, limit, farthest in zip(robot.joint_names, robot.joint_types, limits, commanded, strict=True):
         if kind == "prismatic" and math.isfinite(limit) and farthest > SLIDES * limit:
             yield (
                 f"joint {name!r} slides, is commanded to {farthest:.4g} m and its limit is {limit:.4g} m: "
@@ -504,18 +441,16 @@ def _rounded(campaign: Campaign) -> Iterator[str]:
     if campaign.position is None or campaign.samples < FEWEST_ROWS or not np.ptp(campaign.position) > 0.0:
         return
     step = step_of(campaign.position / campaign.units.length_scale) * campaign.units.length_scale
-    noise = campaign.noise_position
-    if step and (step / math.sqrt(12.0) > noise if noise else step > ROUNDED_TO):
+    alone, noise = step / math.sqrt(12.0), campaign.noise_position
+    if step and (alone > noise if noise else step > ROUNDED_TO):
         stated = f", and the noise is stated as {1e3 * noise:.3g} mm" if noise else ""
-        yield (
-            f"the measured positions are rounded to {1e3 * step:.3g} mm, "
-            f"which alone is a noise of {1e3 * step / math.sqrt(12.0):.2g} mm{stated}"
-        )
+        rounded = f"the measured positions are rounded to {1e3 * step:.3g} mm"
+        yield f"{rounded}, which alone is a noise of {1e3 * alone:.2g} mm{stated}"
 
 
-def _grid(campaign: Campaign, reach: float) -> Iterator[str]:
-    robot, units = campaign.robot, campaign.units
-    turning = [j for j, kind in enumerate(robot.joint_types) if kind != "prismatic"]
+def _grid(campaign: Campaign) -> Iterator[str]:
+    units, reach = campaign.units, _reach(campaign)
+    turning = [j for j, kind in enumerate(campaign.robot.joint_types) if kind != "prismatic"]
     values = campaign.q[:, turning] / units.angle_scale
     if not turning or campaign.samples < FEWEST_ROWS or not math.isfinite(reach):
         return
@@ -531,8 +466,8 @@ def _grid(campaign: Campaign, reach: float) -> Iterator[str]:
         )
 
 
-def _simulator(campaign: Campaign, reach: float) -> Iterator[str]:
-    predicted = campaign.simulated_position
+def _simulator(campaign: Campaign) -> Iterator[str]:
+    predicted, reach = campaign.simulated_position, _reach(campaign)
     if predicted is None or campaign.samples < FEWEST_ROWS or not math.isfinite(reach):
         return
     poses = tool_poses(campaign.robot, campaign.q)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
-from thermal_robot.campaign.campaign import Campaign, FloatArray
+from thermal_robot.campaign import settings as kinds
+from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.checked import (
     LARGEST_COMMAND,
     SMALLEST,
@@ -21,66 +22,32 @@ from thermal_robot.campaign.checked import (
     check_joints,
     check_quaternions,
     first_beyond,
+    first_true,
 )
 from thermal_robot.campaign.document import FILE_NAME, read_declaration
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, named, recognise
-from thermal_robot.campaign.settings import (
-    ANGLE_UNIT,
-    GEARS,
-    HOW_MOVED,
-    LENGTH_UNIT,
-    MOVES,
-    PRIORS,
-    SIGMA,
-    STANDARD_TEMPERATURE,
-    TEMPERATURE,
-    VECTOR,
-    WORD,
-    Settings,
-    as_vector,
-)
+from thermal_robot.campaign.settings import MOVES, SAME_CONFIGURATION, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
-from thermal_robot.campaign.targets import FEWEST, Posed, Targets, posed, telling, told_by
+from thermal_robot.campaign.targets import FEWEST, Posed, posed, telling, told_by
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import SI, Units, covariate_scale
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import Kind, MisfitError, boolean, optional, shown, text, word
+from thermal_robot.schema import boolean, optional, text, word
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
-MINIMUM_POSES = 3
-"""Distinct configurations without which a rigid frame can turn about the line through two points."""
-SAME_CONFIGURATION = 9
-"""Decimals of a command, rad or m, to which it is compared: a nanoradian is far below what any controller resolves and
-far above what the conversion of units rounds."""
+MINIMUM_POSES = 3  # Distinct configurations without which a rigid frame can turn about the line through two points
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
-    """Validate a table and return the campaign.
+    """Validate a table and return the campaign; what cannot be used is refused with row and column.
 
-    Parameters
-    ----------
-    table
-        As read.
-    settings
-        Units and everything else that is not in the table.
-    robot
-        The chain that the joint columns command.
-    name
-        Name of the campaign.
-    measured
-        Whether the rows were measured; otherwise they are to be predicted and measured columns are ignored.
-
-    Raises
-    ------
-    CampaignError
-        Whatever cannot be used, with row and column.
+    Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
     """
     units = settings.units
     table = named(table, robot, units)
@@ -91,30 +58,29 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         table, told, left_out = of_targets(table, columns, settings)
         settings = replace(settings, tool_known=False)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
+    q = _commands(table, robot, units)
+    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if measured and not told else None}
+    for key, group in (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION)):
+        poses[key] = _quaternions(table, group) if group in columns.groups else None
+    simulated = names.SIMULATED_POSITION in columns.groups
+    poses["simulated_position"] = _vectors(table, names.SIMULATED_POSITION, units) if simulated else None
+    poses |= {"position": told.position, "orientation": told.orientation} if told else {}
     campaign = Campaign(
-        name=name,
-        robot=robot,
-        q=_commands(table, robot, units),
-        position=told.position if told else _vectors(table, names.POSITION, units) if measured else None,
-        orientation=(
-            told.orientation if told else _quaternions(table, names.ORIENTATION) if columns.has_orientation else None
-        ),
+        name,
+        robot,
+        q,
+        **poses,
         covariates=covariates,
         extra=columns.extra,
         labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
-        simulated_position=_vectors(table, names.SIMULATED_POSITION, units) if columns.has_simulated_position else None,
-        simulated_orientation=(
-            _quaternions(table, names.SIMULATED_ORIENTATION) if columns.has_simulated_orientation else None
-        ),
         **settings.of_rows(),
-        **_noise(table, columns, settings, told.targets if told else None),
-        priors=dict(settings.priors),
+        priors=settings.priors,
+        urdf=settings.urdf,
+        **_noise(table, columns, settings, told),
         rows=table.rows,
         missing=missing,
-        urdf=settings.urdf,
     )
-    if measured:
-        left_out += _too_few(table.file, campaign)
+    left_out += _too_few(table.file, campaign) if measured else []
     warnings = (*table.warnings, *columns.warnings, *left_out, *gaps, *doubts(campaign))
     return replace(arrived(campaign), warnings=warnings)
 
@@ -124,15 +90,15 @@ def arrived(campaign: Campaign) -> Campaign:
     recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
     if recorded or campaign.moves != "direct":
         return campaign
-    names, sessions = campaign.robot.joint_names, campaign.labels.get("session")
-    found = arrivals(campaign.q, names, campaign.covariates, sessions)
+    joints, sessions = campaign.robot.joint_names, campaign.labels.get("session")
+    found = arrivals(campaign.q, joints, campaign.covariates, sessions)
     return replace(campaign, covariates={**campaign.covariates, **found}, derived=tuple(found))
 
 
-def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:
+def _commands(table: Table, robot: Robot, units: Units) -> Array:
     """(N, n) rad or m."""
     joints = zip(robot.joint_names, robot.joint_types, strict=True)
-    commands: FloatArray = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
+    commands = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
     index = first_beyond(commands, LARGEST_COMMAND)
     if index is not None:
         joint = robot.joint_names[int(np.argmax(np.abs(commands[index])))]
@@ -143,12 +109,13 @@ def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:
 
 def _covariates(
     table: Table, columns: Columns, robot: Robot, units: Units
-) -> tuple[dict[str, FloatArray], dict[str, NDArray[np.bool_]], list[str]]:
+) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_]], list[str]]:
     """Return the covariates in SI without gaps, where they had gaps, and how those were filled, in words."""
-    covariates: dict[str, FloatArray] = {}
+    covariates: dict[str, Array] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
     warnings: list[str] = []
-    clock = _clock(table, columns)
+    clocks = (table.numbers(name, gaps=True) for name in CLOCK if name in columns.covariates)
+    clock = next((values for values in clocks if not np.isnan(values).any()), None)
     for column in (*columns.covariates, *columns.extra):
         values = table.numbers(column, gaps=True)
         check_covariate(table.file, column, values, table.rows)
@@ -156,76 +123,61 @@ def _covariates(
         if gaps.any():
             values, how = fill(column, values, None if column in CLOCK else clock)
             missing[column] = gaps
-            count = int(gaps.sum())
-            warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
+            warnings.append(f"column {column!r} is empty in {int(gaps.sum())} of {len(gaps)} rows: {how}")
         covariates[column] = values * covariate_scale(column, robot, units)
     return covariates, missing, warnings
 
 
-def _clock(table: Table, columns: Columns) -> FloatArray | None:
-    """(N,) when each row was measured, of the first column without a gap that tells; ``None`` where none does."""
-    for name in CLOCK:
-        if name in columns.covariates and not np.isnan(values := table.numbers(name, gaps=True)).any():
-            return values
-    return None
-
-
-def _vectors(table: Table, group: Sequence[str], units: Units) -> FloatArray:
+def _vectors(table: Table, group: Sequence[str], units: Units) -> Array:
     """(N, 3) m."""
-    vectors: FloatArray = np.column_stack([table.numbers(column) for column in group]) * units.length_scale
-    return vectors
+    return np.column_stack([table.numbers(column) for column in group]) * units.length_scale
 
 
-def _noise(table: Table, columns: Columns, settings: Settings, targets: Targets | None) -> dict[str, Any]:
+def _quaternions(table: Table, group: Sequence[str]) -> Array:
+    """(N, 4) unit quaternions wxyz."""
+    quaternions = np.column_stack([table.numbers(column) for column in group])
+    check_quaternions(table.file, group[0], quaternions, table.rows)
+    return np.asarray(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
+
+
+def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:
     """Return what a campaign says of its noise, and its targets: of several, their noise tells that of their pose."""
-    place, turn = settings.noise_position, settings.noise_orientation
+    place, turn, targets = settings.noise_position, settings.noise_orientation, told.targets if told else None
     if targets is not None:
         place, turn = (None, None) if place is None else told_by(place, targets)
     each = _noise_of_rows(table, settings) if columns.has_noise else None
-    known = {"noise_of_rows": each, "targets": targets}
-    return {"noise_position": place if each is None else None, "noise_orientation": turn, **known}
+    known = {"noise_of_rows": each, "targets": targets, "noise_orientation": turn}
+    return {"noise_position": place if each is None else None, **known}
 
 
-def _noise_of_rows(table: Table, settings: Settings) -> FloatArray:
+def _noise_of_rows(table: Table, settings: Settings) -> Array:
     """(N,) m: one sigma of each row; an empty cell is that of all rows, where it is stated."""
-    sigmas: FloatArray = table.numbers(names.NOISE, gaps=True) * settings.units.length_scale
-    sigmas = np.where(np.isnan(sigmas) & (settings.noise_position is not None), settings.noise_position or 0.0, sigmas)
-    refused = ~(sigmas >= SMALLEST)
-    if refused.any():
-        index = int(np.argmax(refused))
+    cells = table.numbers(names.NOISE, gaps=True)
+    sigmas = cells * settings.units.length_scale
+    if settings.noise_position is not None:
+        sigmas = np.where(np.isnan(sigmas), settings.noise_position, sigmas)
+    index = first_true(~(sigmas >= SMALLEST))
+    if index is not None:
         empty = bool(np.isnan(sigmas[index]))
-        raise table.error(
-            "a value is missing" if empty else "no standard deviation",
-            names.NOISE,
-            index,
-            found="an empty cell" if empty else f"{table.numbers(names.NOISE, gaps=True)[index]:.15g}",
-            expected="one sigma above 0" + (", or [noise] position for the rows without one" if empty else ""),
-        )
+        found = "an empty cell" if empty else f"{cells[index]:.15g}"
+        expected = "one sigma above 0" + (", or [noise] position for the rows without one" if empty else "")
+        problem = "a value is missing" if empty else "no standard deviation"
+        raise table.error(problem, names.NOISE, index, found=found, expected=expected)
     return sigmas
-
-
-def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:
-    """(N, 4) unit quaternions wxyz."""
-    quaternions: FloatArray = np.column_stack([table.numbers(column) for column in group])
-    check_quaternions(table.file, group[0], quaternions, table.rows)
-    unit: FloatArray = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
-    return unit
 
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
     """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
-    pose = campaign.measures == "pose"
-    equations = 6 if pose else 3
-    base = 0 if campaign.base_known else 6
-    tool = 0 if campaign.tool_known else equations  # the target's orientation is fitted where it is measured
-    needed = -(-(base + tool) // equations)
-    if base:
-        needed = max(needed, MINIMUM_POSES)
+    equations = 6 if campaign.measures == "pose" else 3
+    # of the tool: the target's orientation is fitted where it is measured
+    unknowns = {"base": 0 if campaign.base_known else 6, "tool": 0 if campaign.tool_known else equations}
+    needed = max(-(-sum(unknowns.values()) // equations), MINIMUM_POSES if unknowns["base"] else 0)
     distinct = len(np.unique(np.round(campaign.q, SAME_CONFIGURATION), axis=0))
     if distinct >= needed:
         return []
-    unknown = " and ".join(word for word, count in (("base", base), ("tool", tool)) if count)
-    problem = f"too few measurements to find the unknown {unknown} frame{'s' if base and tool else ''}"
+    unknown = [word for word, count in unknowns.items() if count]
+    frames, more = " and ".join(unknown), "s" if len(unknown) > 1 else ""
+    problem = f"too few measurements to find the unknown {frames} frame{more}"
     found = f"{campaign.samples} rows with {distinct} different joint configurations"
     expected = f"at least {needed} different configurations"
     if distinct == campaign.samples:
@@ -235,8 +187,7 @@ def _too_few(file: str, campaign: Campaign) -> list[str]:
 
 ASTRAY = 10.0
 """Times the usual deviation from which on targets of a row are said not to keep their places: noise comes to five."""
-LOOSE = 2.0
-"""Times the stated noise from which on targets are said to move against each other."""
+LOOSE = 2.0  # Times the stated noise from which on targets are said to move against each other
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
@@ -245,44 +196,30 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
     Refused are targets beside a simulator's, a place of which one or two figures lack, targets on a line in all rows,
     and one that is never seen beside the others.
     """
-    _refuse_simulated(table, columns)
-    points = np.stack([_points(table, number) for number in columns.targets], axis=1) * settings.units.length_scale
+    several = columns.targets
+    if names.SIMULATED_POSITION in columns.groups:
+        problem, expected = "sim.x, sim.y, sim.z predict one target", "one target, as x y z; or no columns sim.*"
+        found, column = f"{len(several)} targets", f"x.{several[0]}"
+        raise CampaignError(table.file, problem, column=column, found=found, expected=expected)
+    points = np.stack([_points(table, number) for number in several], axis=1) * settings.units.length_scale
     kept = telling(points)
     if not kept.any():
-        raise CampaignError(
-            table.file,
-            "no row tells a pose",
-            column="x." + str(columns.targets[0]),
-            found="fewer targets in each, or targets on a line",
-            expected=f"{FEWEST} targets or more that are not on a line; or one target, as x y z",
-        )
-    told = posed(columns.targets, points[kept])
-    if told is None:
-        raise CampaignError(
-            table.file,
-            "a target is never seen together with three others: its place cannot be found",
-            column=names.axes_of(_unlinked(points[kept], columns.targets))[0],
-            expected="rows that show it beside them",
-        )
+        expected = f"{FEWEST} targets or more that are not on a line; or one target, as x y z"
+        found = "fewer targets in each, or targets on a line"
+        raise CampaignError(table.file, "no row tells a pose", column=f"x.{several[0]}", found=found, expected=expected)
+    seen = posed(several, points[kept])
+    if seen is None:
+        rarest = several[int(np.argmin(np.isfinite(points[kept, :, 0]).sum(axis=0)))]
+        problem = "a target is never seen together with three others: its place cannot be found"
+        raise CampaignError(table.file, problem, column=f"x.{rarest}", expected="rows that show it beside them")
     warnings = []
     if settings.tool_known:
         warnings.append('where several targets sit on the tool is fitted: tool = "known" counts as "unknown"')
     if not kept.all():
-        several = f"fewer than {FEWEST} targets, or targets on a line"
-        warnings.append(f"{table.told(~kept)} left out: {several} tell no pose")
+        few = f"fewer than {FEWEST} targets, or targets on a line"
+        warnings.append(f"{table.told(~kept)} left out: {few} tell no pose")
     taken = table.take(kept)
-    return taken, told, [*warnings, *_doubts(taken, told, settings)]
-
-
-def _refuse_simulated(table: Table, columns: Columns) -> None:
-    if columns.has_simulated_position:
-        raise CampaignError(
-            table.file,
-            "sim.x, sim.y, sim.z predict one target",
-            column=names.axes_of(columns.targets[0])[0],
-            found=f"{len(columns.targets)} targets",
-            expected="one target, as x y z; or no columns sim.*",
-        )
+    return taken, seen, [*warnings, *_doubts(taken, seen, settings)]
 
 
 def _points(table: Table, number: int) -> Array:
@@ -290,44 +227,33 @@ def _points(table: Table, number: int) -> Array:
     axes = names.axes_of(number)
     found = np.column_stack([table.numbers(column, gaps=True) for column in axes])
     gaps = np.isnan(found)
-    half = gaps.any(axis=1) & ~gaps.all(axis=1)
-    if half.any():
-        row = int(np.argmax(half))
+    row = first_true(np.asarray(gaps.any(axis=1) & ~gaps.all(axis=1)))
+    if row is not None:
         expected = f"a number, or {axes[0]}, {axes[1]} and {axes[2]} empty where the target was not seen"
         column = axes[int(np.argmax(gaps[row]))]
         raise table.error("a value is missing", column, row, found="an empty cell", expected=expected)
     return found
 
 
-def _unlinked(points: Array, numbers: tuple[int, ...]) -> int:
-    """Return the target that is seen in the fewest of the rows."""
-    return numbers[int(np.argmin(np.isfinite(points[:, :, 0]).sum(axis=0)))]
-
-
 def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
     sigma, unit, scale = told.targets.sigma, settings.units.length, settings.units.length_scale
-    found = []
-    astray = told.deviation > ASTRAY * max(sigma, settings.noise_position or 0.0)
+    noise, found = settings.noise_position, []
+    astray = told.deviation > ASTRAY * max(sigma, noise or 0.0)
     if astray.any():
-        most = float(told.deviation.max()) / scale
         found.append(
-            f"the targets do not keep their places on the tool in {table.told(astray)}, by up to {most:.3g} "
-            f"{unit}: is one of them exchanged for another, or has one moved?"
+            f"the targets do not keep their places on the tool in {table.told(astray)}, by up to "
+            f"{float(told.deviation.max()) / scale:.3g} {unit}: is one of them exchanged for another, or has one moved?"
         )
-    if settings.noise_position and sigma > LOOSE * settings.noise_position:
+    if noise and sigma > LOOSE * noise:
         found.append(
             f"the targets move against each other by {sigma / scale:.3g} {unit} per axis, which is more than the "
-            f"stated noise of {settings.noise_position / scale:.3g} {unit}"
+            f"stated noise of {noise / scale:.3g} {unit}"
         )
     return found
 
 
-_ZERO = ("approach", "velocity", "acceleration")
-_HELD = ("payload", "speed")
-
-
 def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array, str]:
-    """Return a covariate (N,) without NaN, and in plain words how its gaps were filled.
+    """Impute the gaps of a covariate (N,), and say in plain words how.
 
     A direction, velocity or acceleration that nobody noted is 0, which says "unknown" or "at rest". A payload or speed
     stays until it is changed. Everything else varies smoothly: linear in between, held at both ends. ``clock`` (N,)
@@ -335,12 +261,12 @@ def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array,
     """
     gaps = np.isnan(values)
     quantity, _ = split_name(column)
-    if quantity in _ZERO:
+    if quantity in ("approach", "velocity", "acceleration"):
         return np.where(gaps, 0.0, values), "taken as 0"
     at = np.arange(float(len(values))) if clock is None else clock
     sequence = np.argsort(at, kind="stable")
     known = sequence[~gaps[sequence]]
-    if quantity in _HELD:
+    if quantity in ("payload", "speed"):
         before = np.cumsum(~gaps[sequence]) - 1
         filled = np.empty(len(values))
         filled[sequence] = values[known[np.maximum(before, 0)]]
@@ -384,14 +310,12 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
         raise CampaignError("read_campaign()", "the path is empty", expected=f"that of a {FILE_NAME}, or of its folder")
     declaration = read_declaration(Path(path), None if folder is None else Path(folder))
     settings = declaration.settings
+    root, gravity = settings.root_frame, settings.gravity
     try:
-        robot = load_robot(
-            declaration.robot, settings.tool_frame, root_frame=settings.root_frame, gravity=settings.gravity
-        )
+        robot = load_robot(declaration.robot, settings.tool_frame, root_frame=root, gravity=gravity)
     except RobotError as error:
-        raise RobotError(
-            f"{declaration.file}, [robot]: {error}", name=error.name, candidates=error.candidates
-        ) from error
+        told = f"{declaration.file}, [robot]: {error}"
+        raise RobotError(told, name=error.name, candidates=error.candidates) from error
     if declaration.kinematics:
         robot = with_kinematics(robot, declaration.kinematics)
     check_joints(str(declaration.file), "gears", settings.gears, robot.joint_names, declaration.gear_rows)
@@ -449,8 +373,7 @@ def read_samples(
     return build_campaign(table_from_frame(path), settings, robot, name="table", measured=False)
 
 
-FILE = "<table>"
-"""What messages call the data frame."""
+FILE = "<table>"  # What messages call the data frame
 _NOISE = "a finite number above 0, or None"
 
 
@@ -524,44 +447,31 @@ def campaign_from_table(
 
     require("campaign_from_table(), robot", robot, (Robot,), "a robot, as load_robot gives it")
     require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
-    frame = word(("known", "unknown"), WORD)
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
-    stated = {
-        "robot": {
-            "moves": _given("moves", moves, HOW_MOVED),
-            "reference_temperature": _given("reference_temperature", reference_temperature, TEMPERATURE),
-        },
-        "measurements": {
-            "angle_unit": _given("angle_unit", angle_unit, ANGLE_UNIT),
-            "length_unit": _given("length_unit", length_unit, LENGTH_UNIT),
-        },
-        "frames": {
-            "base": _given("base", base, frame),
-            "tool": _given("tool", tool, frame),
-            "target": _given("target", target, VECTOR, "three numbers"),
-        },
-        "noise": {
-            "position": _given("noise_position", noise_position, optional(SIGMA), _NOISE),
-            "orientation": _given("noise_orientation", noise_orientation, optional(SIGMA), _NOISE),
-        },
-        "payload": {"com": _given("payload_com", payload_com, VECTOR, "three numbers")},
-        "priors": _given("priors", {} if priors is None else priors, PRIORS),
-        "gears": _given("gears", {} if gears is None else gears, GEARS),
+    frame = word(("known", "unknown"), kinds.WORD)
+    arguments: dict[
+        str, tuple[Any, ...]
+    ] = {  # section and key of campaign.toml, name, value, kind, and what is expected where the kind says less
+        "robot.moves": ("moves", moves, kinds.HOW_MOVED),
+        "robot.reference_temperature": ("reference_temperature", reference_temperature, kinds.TEMPERATURE),
+        "measurements.angle_unit": ("angle_unit", angle_unit, kinds.ANGLE_UNIT),
+        "measurements.length_unit": ("length_unit", length_unit, kinds.LENGTH_UNIT),
+        "frames.base": ("base", base, frame),
+        "frames.tool": ("tool", tool, frame),
+        "frames.target": ("target", target, kinds.VECTOR, "three numbers"),
+        "noise.position": ("noise_position", noise_position, optional(kinds.SIGMA), _NOISE),
+        "noise.orientation": ("noise_orientation", noise_orientation, optional(kinds.SIGMA), _NOISE),
+        "payload.com": ("payload_com", payload_com, kinds.VECTOR, "three numbers"),
     }
+    stated: dict[str, dict[str, Any]] = {}
+    for place, argument in arguments.items():
+        section, key = place.split(".")
+        stated.setdefault(section, {})[key] = given(FILE, *argument)
+    stated["priors"] = given(FILE, "priors", {} if priors is None else priors, kinds.PRIORS)
+    stated["gears"] = given(FILE, "gears", {} if gears is None else gears, kinds.GEARS)
     ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
     settings = Settings.stated(stated, urdf="", **ends)
     check_joints(FILE, "gears", settings.gears, robot.joint_names)
-    name, measured = _given("name", name, text(empty=True)), _given("measured", measured, boolean)
+    name, measured = given(FILE, "name", name, text(empty=True)), given(FILE, "measured", measured, boolean)
     return build_campaign(table_from_frame(table, FILE), settings, robot, name=name, measured=measured)
-
-
-def _given(argument: str, value: Any, kind: Kind, expected: str = "") -> Any:
-    """Return an argument of a kind; what is no such value is told by the argument's name."""
-    try:
-        return kind(value, argument)
-    except MisfitError as error:
-        problem = error.problem or "wrong kind of value"
-        found = shown(value if expected else error.value)
-        column = argument if expected else error.path
-        raise CampaignError(FILE, problem, column=column, found=found, expected=expected or error.expected) from None

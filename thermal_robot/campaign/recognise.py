@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
@@ -46,8 +47,7 @@ _STEMS = (*_COMMANDED, "q", "joint", "j", "a", "axis", "rax", "theta", *_REPORTE
 """What numbered joints are called, the best first: what was commanded counts for more than what the encoders said."""
 
 
-@dataclass(frozen=True)
-class Heading:
+class Heading(NamedTuple):
     """What a header says: the column as the file calls it, and the unit that it names, ``None`` for none."""
 
     column: str
@@ -100,20 +100,10 @@ def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, st
 
 
 def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
-    """Return what is found in a table under another name or with a unit, by the campaign's names.
+    """Return what is found in a table under another name or with a unit, by the campaign's names for a robot.
 
-    Parameters
-    ----------
-    columns
-        Names of the table's columns.
-    robot
-        Whose joints and links they may name.
-
-    Returns
-    -------
-    dict
-        Columns that have the campaign's own name are not in it; nor is what two columns could be, or whose unit is of
-        another kind.
+    Columns that have the campaign's own name are not in it; nor is what two columns could be, or whose unit is of
+    another kind.
     """
     there = [str(name).strip() for name in columns]
     conditions = names.conditions(robot.joint_names, robot.urdf_links)
@@ -122,17 +112,16 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
     small = {name.lower(): name for name in defined}
     said: dict[str, list[Heading]] = {}
     plain = {column: bare(column) for column in there if column not in defined and not names.target_of(column)}
-    for column, heading in plain.items():
-        low = heading.column.lower()
-        meant = heading.column if heading.column in defined else small.get(low, low if names.target_of(low) else "")
+    for column, (own, unit) in plain.items():
+        low = own.lower()
+        meant = own if own in defined else small.get(low, low if names.target_of(low) else "")
         # what need not be there is asked about where its name alone is written otherwise
-        sure = meant in needed or names.target_of(meant) or heading.unit is not None
-        if meant and sure and size(heading.unit, wanted(meant, robot)) is not None:
-            said.setdefault(meant, []).append(replace(heading, column=column))
+        sure = meant in needed or names.target_of(meant) or unit is not None
+        if meant and sure and size(unit, wanted(meant, robot)) is not None:
+            said.setdefault(meant, []).append(Heading(column, unit))
     found = {name: several[0] for name, several in said.items() if name not in there and len(several) == 1}
-    by_name = joint_columns([*there, *(h.column for h in plain.values())], robot.joint_names)
-    original = {heading.column: replace(heading, column=column) for column, heading in plain.items()}
-    for joint, column in by_name.items():
+    original = {own: Heading(column, unit) for column, (own, unit) in plain.items()}
+    for joint, column in joint_columns([*there, *original], robot.joint_names).items():
         if column != joint:
             found.setdefault(joint, original.get(column, Heading(column, None)))
     if not any(joint in there or joint in found for joint in robot.joint_names):
@@ -143,35 +132,26 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
 def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Heading]:
     """Return the columns of joints that are known by their numbers, from 0 or from 1; nothing where none are."""
     stems: dict[str, dict[int, Heading]] = {}
-    for column, heading in plain.items():
-        if known := _NUMBERED.fullmatch(heading.column):
+    for column, (own, unit) in plain.items():
+        if known := _NUMBERED.fullmatch(own):
             stem = known["stem"].lower().replace(" ", "_")
-            stems.setdefault(stem, {})[int(known["number"])] = replace(heading, column=column)
+            stems.setdefault(stem, {})[int(known["number"])] = Heading(column, unit)
+    count = len(joints)
     whole = {
         stem: [each[number] for number in sorted(each)]
         for stem, each in stems.items()
-        if sorted(each) in (list(range(len(joints))), list(range(1, len(joints) + 1)))
+        if sorted(each) in (list(range(count)), list(range(1, count + 1)))
     }
     taken = next((stem for stem in _STEMS if stem in whole), None)
     if taken is None:
         return {}
-    found = dict(zip(joints, whole[taken], strict=True))
     read = next((stem for stem in _REPORTED if stem in whole and stem != taken), None)
-    more = () if read is None else zip((f"encoder.{joint}" for joint in joints), whole[read], strict=True)
-    return {**found, **dict(more)}
+    encoders = [f"encoder.{joint}" for joint in joints] if read else []
+    return dict(zip((*joints, *encoders), (*whole[taken], *whole.get(read or "", ())), strict=True))
 
 
 def named(table: Table, robot: Robot, units: Units) -> Table:
-    """Return a table in the campaign's names and in the units of the file, with what was found out as warnings.
-
-    Parameters
-    ----------
-    table
-        As read.
-    robot
-        Whose joints and links the columns name.
-    units
-        That are declared of the columns.
+    """Return a table in the campaign's names and in the declared units, with what was found out as warnings.
 
     Raises
     ------
@@ -179,17 +159,16 @@ def named(table: Table, robot: Robot, units: Units) -> Table:
         Text where a number should be that is to be converted.
     """
     known = headings(table.columns, robot)
-    if not known:
-        return table
     called = {heading.column: name for name, heading in known.items()}
     columns: dict[str, Cells] = {}
     other: dict[tuple[str, str], list[str]] = {}
     for column, cells in table.columns.items():
         name = called.get(column, column)
         unit = wanted(name, robot, units)
-        scale = 1.0 if name == column else size(known[name].unit, unit)
-        columns[name] = cells if scale in (1.0, None) else table.numbers(column, gaps=True) * scale
-        if columns[name] is not cells:
+        scale = size(known[name].unit, unit) if column in called else None
+        columns[name] = cells
+        if scale not in (1.0, None):
+            columns[name] = table.numbers(column, gaps=True) * scale
             other.setdefault((known[name].unit or "", unit), []).append(column)
     told = [
         f"read in {own}, as headers say, not in {unit} as is declared: {listed(of)}"
@@ -218,26 +197,14 @@ class Columns:
     covariates: tuple[str, ...]  # those that the format defines, except empty ones
     extra: tuple[str, ...]  # numeric columns that the format does not define
     labels: tuple[str, ...]  # ``session``, ``pose`` and ``path`` where present
-    # has_orientation, has_simulated_position, has_simulated_orientation: whether these groups are there, each whole
-    has_orientation: bool
-    has_simulated_position: bool
-    has_simulated_orientation: bool
+    groups: tuple[tuple[str, ...], ...]  # of orientation, simulated position and orientation those that are there
     has_noise: bool  # whether the noise of each row is there
     targets: tuple[int, ...]  # numbers of several targets of one pose, in their order; empty where there is one
     warnings: tuple[str, ...]  # columns left out, and names that look like typing errors
 
 
 def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
-    """Sort a table's columns.
-
-    Parameters
-    ----------
-    table
-        As read.
-    robot
-        Whose joints and links the columns name.
-    measured
-        Whether positions are required; without, measured columns are ignored.
+    """Sort a table's columns for a robot; ``measured`` requires positions, without it measured columns are ignored.
 
     Raises
     ------
@@ -245,43 +212,30 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
         A joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
     """
     _refuse_two_meanings(table, robot)
-    _require_joints(table, robot)
-    targets, lost = _targets(table, robot) if measured else ((), [])
+    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
+    beside = [name for name in robot.joint_names if name not in robot.chain.names]
+    more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
+    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
+    targets, warnings = _targets(table, robot) if measured else ((), [])
     if measured and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
-    has_orientation = measured and not targets and _whole_group(table, names.ORIENTATION)
-    has_simulated_position = _whole_group(table, names.SIMULATED_POSITION)
-    has_simulated_orientation = _whole_group(table, names.SIMULATED_ORIENTATION)
-    if has_simulated_orientation and not has_simulated_position:
+    turned = [names.ORIENTATION] if measured and not targets else []
+    asked = (*turned, names.SIMULATED_POSITION, names.SIMULATED_ORIENTATION)
+    groups = tuple(group for group in asked if _whole_group(table, group))
+    if names.SIMULATED_ORIENTATION in groups and names.SIMULATED_POSITION not in groups:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
-
     has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
-    if has_noise or not measured:
-        taken.add(names.NOISE)
-    covariates: list[str] = []
-    extra: list[str] = []
-    warnings: list[str] = [*lost]
+    taken |= {names.NOISE} if has_noise or not measured else set()
+    parts: dict[str, list[str]] = {_COVARIATE: [], _EXTRA: [], _IGNORED: []}
     for column in table.columns:
-        if column in taken or names.target_of(column):
-            continue
-        part, doubts = _judge(table, column, robot)
-        warnings += doubts
-        if part == _COVARIATE:
-            covariates.append(column)
-        elif part == _EXTRA:
-            extra.append(column)
-    return Columns(
-        tuple(covariates),
-        tuple(extra),
-        tuple(label for label in names.LABELS if label in table.columns),
-        has_orientation,
-        has_simulated_position,
-        has_simulated_orientation,
-        has_noise,
-        targets,
-        tuple(warnings),
-    )
+        if column not in taken and not names.target_of(column):
+            part, doubt = _judge(table, column, robot)
+            parts[part].append(column)
+            warnings += [doubt] if doubt else []
+    labels = tuple(label for label in names.LABELS if label in table.columns)
+    sorted_out = tuple(parts[_COVARIATE]), tuple(parts[_EXTRA])
+    return Columns(*sorted_out, labels, groups, has_noise, targets, tuple(warnings))
 
 
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
@@ -302,7 +256,7 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
         raise table.error(
             "a target without a number stands beside those with one" if beside else "too few targets to tell a pose",
             (beside or names.axes_of(numbers[0]))[0],
-            found=f"{len(numbers)} with a number" if beside else f"{len(numbers)}",
+            found=f"{len(numbers)}{' with a number' if beside else ''}",
             expected=f"at least {FEWEST} as x.1 y.1 z.1, x.2 …; or one, as x y z",
         )
     lost = [f"target {number} is seen in no row and counts as absent" for number in empty]
@@ -312,68 +266,51 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
     return tuple(numbers), lost
 
 
-def _judge(table: Table, column: str, robot: Robot) -> tuple[str, list[str]]:
+def _judge(table: Table, column: str, robot: Robot) -> tuple[str, str]:
     """Say which part a column has that is neither a joint nor a pose nor a label, and what is doubtful about it."""
     quantity, place = split_name(column)
     if table.is_empty(column):
-        return _IGNORED, [f"column {column!r} is empty and counts as absent"]
+        return _IGNORED, f"column {column!r} is empty and counts as absent"
     if column in names.PLAIN_COVARIATES:
-        return _COVARIATE, []
-    if place and quantity in names.PER_JOINT:
-        if place in robot.joint_names:
-            return _COVARIATE, []
-        return _IGNORED, [_ignored(column, "the chain has no joint", place, robot.joint_names)]
+        return _COVARIATE, ""
     link = names.tilted(column) or (place if quantity in names.PER_LINK else "")
-    if link:
-        if link not in robot.urdf_links:
-            return _IGNORED, [_ignored(column, "the robot has no link", link, robot.urdf_links)]
-        if link not in {segment.parent_link for segment in robot.segments}:
-            return _COVARIATE, [f"column {column!r}: no length of the chain belongs to that link"]
-        return _COVARIATE, []
+    joint = place if quantity in names.PER_JOINT else ""
+    of, known = ("the chain has no joint", robot.joint_names) if joint else ("the robot has no link", robot.urdf_links)
+    if (joint or link) and (joint or link) not in known:
+        return _IGNORED, f"column {column!r} is ignored: {of} {joint or link!r}{did_you_mean(joint or link, known)}"
+    if link and link not in {segment.parent_link for segment in robot.segments}:
+        return _COVARIATE, f"column {column!r}: no length of the chain belongs to that link"
+    if joint or link:
+        return _COVARIATE, ""
     text = table.first_text(column)
     if text is not None:
         found = table.columns[column][text]
-        return _IGNORED, [f"column {column!r} is not numeric (row {table.rows[text]}: {found!r}) and is ignored"]
-    return _EXTRA, _doubts_of_extra(column, robot)
+        return _IGNORED, f"column {column!r} is not numeric (row {table.rows[text]}: {found!r}) and is ignored"
+    return _EXTRA, _doubt_of_extra(column, robot)
 
 
-def _doubts_of_extra(column: str, robot: Robot) -> list[str]:
-    """Say what is doubtful about a numeric column that the format does not define."""
+def _doubt_of_extra(column: str, robot: Robot) -> str:
+    """Say what is doubtful about a numeric column that the format does not define; empty where nothing is."""
     if column in robot.urdf_joints:
         follows = any(segment.name == column and segment.movable for segment in robot.segments)
         which = "that mimics another" if follows else "outside the chain"
-        return [f"column {column!r} is a joint {which}: it is kept as an extra covariate only"]
+        return f"column {column!r} is a joint {which}: it is kept as an extra covariate only"
     if column in names.PER_JOINT:
         meant = f"did you mean '{column}.<joint>'?"
-        return [f"column {column!r} names no joint and is kept as an extra covariate; {meant}"]
+        return f"column {column!r} names no joint and is kept as an extra covariate; {meant}"
     known = [*names.RESERVED, *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names)]
     meant = did_you_mean(column, known, cutoff=TYPING_ERROR)
-    return [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"] if meant else []
-
-
-def _ignored(column: str, reason: str, place: str, candidates: Iterable[str]) -> str:
-    return f"column {column!r} is ignored: {reason} {place!r}{did_you_mean(place, candidates)}"
+    return f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}" if meant else ""
 
 
 def _refuse_two_meanings(table: Table, robot: Robot) -> None:
     for column in table.columns:
         quantity, place = split_name(column)
-        reserved = (
-            column in names.RESERVED
-            or names.target_of(column)
-            or (quantity in names.PER_JOINT and place in robot.joint_names)
-        )
-        if column in robot.joint_names and reserved:
+        of_a_joint = quantity in names.PER_JOINT and place in robot.joint_names
+        if column in robot.joint_names and (column in names.RESERVED or names.target_of(column) or of_a_joint):
             problem = "this name is both a joint of the chain and a column that the format defines"
             remedy = "a joint of another name; rename it in the URDF and in the table"
             raise table.error(problem, column, expected=remedy)
-
-
-def _require_joints(table: Table, robot: Robot) -> None:
-    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
-    beside = [name for name in robot.joint_names if name not in robot.chain.names]
-    more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
-    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
 
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:

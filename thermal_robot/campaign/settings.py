@@ -7,49 +7,65 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any, TypeAlias
 
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
+from thermal_robot.errors import CampaignError
 from thermal_robot.robot import STRONGEST_GRAVITY
-from thermal_robot.schema import Kind, boolean, fitted, listed, mapping, number, optional, record, text, word
+from thermal_robot.schema import (
+    Kind,
+    MisfitError,
+    boolean,
+    fitted,
+    listed,
+    mapping,
+    number,
+    optional,
+    record,
+    shown,
+    text,
+    word,
+)
 
 Vector: TypeAlias = tuple[float, float, float]
 
 MOVES = ("direct", "unknown")
 """Whether the robot goes straight from pose to pose in the order of the rows, which tells whence each joint came."""
-
-STANDARD_TEMPERATURE = 20.0
-"""°C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise."""
-
-MOST_PIPED = 500_000_000
-"""Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+STANDARD_TEMPERATURE = 20.0  # °C; ISO 1, at which lengths are specified unless somebody says otherwise
+MOST_PIPED = 500_000_000  # bytes from standard input: a million rows of forty columns; an endless pipe must end here
 STILL = 1e-4
 """rad or m within which a joint stands still: the encoder of one that is held jitters by a microradian, seldom by
 fifty, and nothing that follows a joint's position shows over less."""
-ABSOLUTE_ZERO = -273.15
-"""°C."""
+SAME_CONFIGURATION = 9  # decimals, rad or m, to which commands are compared: finer than controllers, coarser than units
+ABSOLUTE_ZERO = -273.15  # °C
 
-UNIT, WORD = "unknown unit", "unknown word"
-ANGLE_UNIT, LENGTH_UNIT = word(ANGLE_UNITS, UNIT), word(LENGTH_UNITS, UNIT)
+WORD = "unknown word"
+ANGLE_UNIT, LENGTH_UNIT = word(ANGLE_UNITS, "unknown unit"), word(LENGTH_UNITS, "unknown unit")
 HOW_MOVED = word(MOVES, WORD)
 TEMPERATURE = number(least=ABSOLUTE_ZERO, expected="a number of °C", problem="no temperature is lower than −273.15 °C")
 VECTOR = listed(number(), 3, "three numbers")
-GRAVITY = listed(
-    number(
-        least=-STRONGEST_GRAVITY,
-        most=STRONGEST_GRAVITY,
-        expected=f"a number of m/s² from {-STRONGEST_GRAVITY:g} to {STRONGEST_GRAVITY:g}",
-    ),
-    3,
-    "three numbers",
-)
+_G = STRONGEST_GRAVITY
+GRAVITY = listed(number(least=-_G, most=_G, expected=f"a number of m/s² from {-_G:g} to {_G:g}"), 3, "three numbers")
 SIGMA = number(
-    least=0.0,
-    expected="a number above 0, or 0 for not given",
-    problem="a standard deviation cannot be negative",
+    least=0.0, expected="a number above 0, or 0 for not given", problem="a standard deviation cannot be negative"
 )
-PRIORS = mapping(
-    number(above=0.0, expected="a number above 0", problem="the expected size of an effect must be positive")
-)
-GEARS = mapping(number(above=0.0, expected="a number above 0", problem="a transmission ratio must be positive"))
+_ABOVE = "a number above 0"
+PRIORS = mapping(number(above=0.0, expected=_ABOVE, problem="the expected size of an effect must be positive"))
+GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio must be positive"))
 """What the values of a campaign may be, whoever states them: campaign.toml, a call, a model file."""
+
+
+def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> Any:
+    """Return an argument of a call as its kind wants it; refuse another by the argument's name.
+
+    Raises
+    ------
+    CampaignError
+        Naming the call and the argument, what was found and what is ``expected``, by default as the kind says it.
+    """
+    try:
+        return kind(value, name)
+    except MisfitError as error:
+        what, place = (value, name) if expected else (error.value, error.path)
+        problem, expected = error.problem or "wrong kind of value", expected or error.expected
+        raise CampaignError(call, problem, column=place, found=shown(what), expected=expected) from None
 
 
 @dataclass(frozen=True)
@@ -65,26 +81,12 @@ class Settings:
         Ends of the chain; ``root_frame`` ``None`` for the URDF's root.
     gravity
         m/s², in the root frame; ``None`` for the robot's default.
-    moves
-        One of :data:`MOVES`.
-    reference_temperature
-        °C at which the URDF's lengths hold.
+    moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned
+        As in a :class:`~thermal_robot.Campaign`.
     units
         Units of the table's columns; everything else here is SI.
-    base_known, tool_known
-        Whether the measurements are in the root frame, and whether the target is where ``target`` says.
-    target
-        The measured point in the tool frame, m.
     noise_position, noise_orientation
         One sigma per axis of the instrument, m and rad; ``None`` when not given.
-    payload_com
-        Centre of mass of the payload in the tool frame, m.
-    priors
-        Expected size (one sigma) of an effect's parameters, by the effect's name, in their unit.
-    gears
-        Transmission ratio by joint name.
-    turned
-        Quantities whose columns are read with the other sign.
     """
 
     urdf: str
@@ -106,61 +108,46 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
-        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        own = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "turned" or self.turned}
         own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
-        plain = {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
-        return plain if self.turned else {key: value for key, value in plain.items() if key != "turned"}
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
 
     def of_rows(self) -> dict[str, Any]:
         """Return the fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
-        once = ("moves", "reference_temperature", "gears", "units")
-        return {key: getattr(self, key) for key in ("base_known", "tool_known", "target", "payload_com", *once)}
+        frames = ("base_known", "tool_known", "target", "payload_com")
+        return {key: getattr(self, key) for key in (*frames, "moves", "reference_temperature", "gears", "units")}
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
         """Return the settings of values by section and key, as campaign.toml has them, lengths in its unit.
 
-        Parameters
-        ----------
-        sections
-            Both units at least.
-        ends
-            The robot's reference, the ends of the chain and gravity.
+        ``sections`` state both units at least; ``ends`` are the robot's reference, the ends of the chain and gravity.
         """
-        robot, frames, noise = (sections.get(section, {}) for section in ("robot", "frames", "noise"))
+        robot, frames, noise, payload = (sections.get(key, {}) for key in ("robot", "frames", "noise", "payload"))
         units = Units(sections["measurements"]["angle_unit"], sections["measurements"]["length_unit"])
-        place, turn = noise.get("position"), noise.get("orientation")
+        scale, zero = units.length_scale, (0.0, 0.0, 0.0)
         return cls(
             **ends,
             **{key: robot[key] for key in ("moves", "reference_temperature") if key in robot},
             units=units,
             base_known=frames.get("base") == "known",
             tool_known=frames.get("tool") == "known",
-            target=as_vector(units.length_scale * value for value in frames.get("target", (0.0, 0.0, 0.0))),
-            noise_position=place * units.length_scale if place else None,
-            noise_orientation=turn or None,
-            payload_com=as_vector(
-                units.length_scale * value for value in sections.get("payload", {}).get("com", (0.0, 0.0, 0.0))
-            ),
+            target=as_vector(scale * value for value in frames.get("target", zero)),
+            noise_position=(noise.get("position") or 0.0) * scale or None,
+            noise_orientation=noise.get("orientation") or None,
+            payload_com=as_vector(scale * value for value in payload.get("com", zero)),
             priors=sections.get("priors", {}),
             gears=sections.get("gears", {}),
         )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
-        """Build settings from what :meth:`to_dict` returned.
-
-        Parameters
-        ----------
-        data
-            The dict, possibly after a journey through JSON.
-        file
-            Name of the file it came from, for the error message.
+        """Build settings from what :meth:`to_dict` returned, possibly after a journey through JSON.
 
         Raises
         ------
         CampaignError
-            A key that is missing or unknown, or a value of the wrong kind.
+            A key that is missing or unknown, or a value of the wrong kind; it names ``file``.
         """
         settings: Settings = fitted(settings_kind, data, file)
         return settings

@@ -5,7 +5,6 @@ It knows nothing of robots or of what columns mean.
 
 from __future__ import annotations
 
-import codecs
 import csv
 import re
 from collections import Counter
@@ -17,16 +16,17 @@ from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.checked import first_beyond, settled
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.checked import first_true, settled
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
+from thermal_robot.schema import LARGEST
 
 if TYPE_CHECKING:
     import pandas as pd
 
-
-Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
+Cells: TypeAlias = "Sequence[str] | Array"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
 
 _FEW = 5  # rows that a sentence names
@@ -74,32 +74,32 @@ class Table:
         """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
         return told_rows(self.rows[chosen])
 
-    def numbers(self, column: str, *, gaps: bool = False) -> NDArray[np.float64]:
-        """Return a column as (N,) numbers in the file's unit.
-
-        Parameters
-        ----------
-        column
-            Its name.
-        gaps
-            Accept empty cells, as NaN.
+    def numbers(self, column: str, *, gaps: bool = False) -> Array:
+        """Return a column as (N,) numbers in the file's unit; ``gaps`` accepts empty cells, as NaN.
 
         Raises
         ------
         CampaignError
             Text, a number that is infinite or larger than any, or an empty cell where none may be.
         """
-        cells = self.columns[column]
-        values = cells if isinstance(cells, np.ndarray) else self._parse(column, cells)
-        index = first_beyond(np.nan_to_num(values, nan=0.0, posinf=np.inf, neginf=-np.inf) if gaps else values)
+        cells, held = self.columns[column], self._values(column)
+        index = _first_text(held)
         if index is not None:
-            value = values[index]
-            unfilled = len(values) > 1 and bool(np.isnan(values).all())
-            empty = "the column is still to be filled in" if unfilled else "a value is missing"
-            finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
-            problem = empty if np.isnan(value) else finite
-            raise self.error(problem, column, index, found=self._as_found(cells[index]), expected="a number")
-        return settled(values)
+            mixed = self.decimal_comma and "." in str(cells[index])
+            expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
+            problem = "text where a number should be"
+            raise self.error(problem, column, index, found=repr(cells[index]), expected=expected)
+        values = np.array(held, dtype=np.float64)
+        wrong = first_true(~(np.abs(values) <= LARGEST) & ~(gaps & np.isnan(values)))
+        if wrong is None:
+            return settled(values)
+        value, cell = values[wrong], cells[wrong]
+        unfilled = len(values) > 1 and bool(np.isnan(values).all())
+        empty = "the column is still to be filled in" if unfilled else "a value is missing"
+        finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
+        blank = cell == "" or (np.isnan(value) and not isinstance(cell, str))
+        found = "an empty cell" if blank else repr(cell if isinstance(cell, str) else float(cell))
+        raise self.error(empty if np.isnan(value) else finite, column, wrong, found=found, expected="a number")
 
     def text(self, column: str) -> list[str]:
         """Return a column as N strings; numbers as short as they can be, empty cells as ``""``."""
@@ -124,69 +124,48 @@ class Table:
         """
         import pandas as pd
 
-        if not (numbers or self.decimal_comma):
-            return pd.DataFrame(dict(self.columns))
         plain = {name for name in self.columns if self.first_text(name) is None}
+        plain = plain if numbers or self.decimal_comma else set()
         return pd.DataFrame(
             {n: self.numbers(n, gaps=True) if n in plain else cells for n, cells in self.columns.items()}
         )
 
     def first_text(self, column: str) -> int | None:
         """Return the index of the first cell that is not a number, ``None`` for a numeric column."""
-        cells = self.columns[column]
-        if isinstance(cells, np.ndarray):
-            return None
-        values = self._numbers_or_none(cells)
-        return values.index(None) if None in values else None
+        return _first_text(self._values(column))
 
     def is_empty(self, column: str) -> bool:
         """Return whether no cell of the column holds anything."""
         cells = self.columns[column]
-        if isinstance(cells, np.ndarray):
-            return bool(np.isnan(cells).all())
-        return all(cell.lower() in _EMPTY for cell in cells)
+        return bool(np.isnan(cells).all()) if isinstance(cells, np.ndarray) else not any(self.text(column))
 
-    def _parse(self, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
-        values = self._numbers_or_none(cells)
-        if None in values:
-            index = values.index(None)
-            mixed = self.decimal_comma and "." in cells[index]
-            expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
-            found = repr(cells[index])
-            raise self.error("text where a number should be", column, index, found=found, expected=expected)
-        return np.array(values, dtype=np.float64)
-
-    def _numbers_or_none(self, cells: Sequence[str]) -> list[float | None]:
+    def _values(self, column: str) -> Any:
         """Return the number in each cell, NaN for an empty one, ``None`` for text."""
+        cells = self.columns[column]
+        if isinstance(cells, np.ndarray):
+            return cells
         if not self.decimal_comma and "_" not in "".join(cells):
             try:
                 return [float(cell) for cell in cells]  # nearly every column of nearly every file
             except ValueError:
                 pass
-        return [self._number(cell) for cell in cells]
+        return [_number(cell, self.decimal_comma) for cell in cells]
 
-    def _number(self, cell: str) -> float | None:
-        """Return the number in a cell, NaN for an empty one, ``None`` for text."""
-        if self.decimal_comma and "," in cell:
-            if "." in cell:  # 1.234,5: a thousands separator, which cannot be told from a decimal point
-                return None
-            cell = cell.replace(",", ".")
-        elif self.decimal_comma and "." in cell:
-            return None
-        try:
-            value = float(cell)
-        except ValueError:
-            if cell.lower() in _EMPTY:
-                return float("nan")
-            # A spreadsheet's or a document's minus sign is still a minus sign.
-            return self._number(cell.replace("−", "-")) if "−" in cell else None
-        return None if "_" in cell else value  # Python reads 1_000 as a number; no instrument writes it
 
-    @staticmethod
-    def _as_found(cell: Any) -> str:
-        if isinstance(cell, str):
-            return repr(cell) if cell else "an empty cell"
-        return "an empty cell" if np.isnan(cell) else repr(float(cell))
+def _first_text(values: Any) -> int | None:
+    return None if isinstance(values, np.ndarray) or None not in values else int(values.index(None))
+
+
+def _number(cell: str, comma: bool) -> float | None:
+    """Return the number in a cell, NaN for an empty one, ``None`` for text."""
+    if comma and "." in cell:  # 1.234,5: a thousands separator, which cannot be told from a decimal point
+        return None
+    try:
+        # a spreadsheet's or a document's minus sign is still a minus sign
+        value = float((cell.replace(",", ".") if comma else cell).replace("−", "-"))
+    except ValueError:
+        return float("nan") if cell.lower() in _EMPTY else None
+    return None if "_" in cell else value  # Python reads 1_000 as a number; no instrument writes it
 
 
 def told_rows(numbers: NDArray[np.int64]) -> str:
@@ -197,24 +176,18 @@ def told_rows(numbers: NDArray[np.int64]) -> str:
 
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
 _MARKED = re.compile(r" *# *(?=[^\s,;#])")  # a column of numbers that is called # is no mark
-_BLOCK = 1 << 20  # bytes, or characters: what is read of a file at once
 _MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
-LARGEST_TABLE = 256 << 20
-"""Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB."""
-MOST_CELLS = 20_000_000
-"""The same, for a file whose cells are short or packed."""
-MOST_COLUMNS = 1000
-"""Logs of two arms with every quantity that a controller knows have a few hundred."""
-PARQUET = (".parquet", ".pq")
-"""Endings of the names of Parquet files."""
+LARGEST_TABLE = 256 << 20  # Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB
+MOST_CELLS = 20_000_000  # The same, for a file whose cells are short or packed
+MOST_COLUMNS = 1000  # Logs of two arms with every quantity that a controller knows have a few hundred
+PARQUET = (".parquet", ".pq")  # Endings of the names of Parquet files
 WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
 """Endings of the names of workbooks, and what pandas reads them with."""
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
-
-SPACE = " "
-"""A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye."""
+_ONE_ROW = "one row per measurement"
+SPACE = " "  # A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye
 
 
 @dataclass(frozen=True)
@@ -229,8 +202,7 @@ class Layout:
     comment: str = ""  # lines that begin so are left out; empty where there are none
 
 
-PLAIN = Layout()
-"""A header and rows, nothing else."""
+PLAIN = Layout()  # A header and rows, nothing else
 
 
 def read_table(path: Path, layout: Layout = PLAIN) -> Table:
@@ -262,66 +234,67 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
         return _read_parquet(path)
     if path.suffix.lower() in WORKBOOKS:
         return _read_workbook(path, layout)
-    encoding, warnings = _encoding(path)
-    with path.open(encoding=encoding, errors="replace", newline="") as stream:
+    try:
+        encoding = _encoding(path)
+        try:
+            return _read_text(path, layout, encoding)
+        except UnicodeDecodeError:
+            # spreadsheets still write the Windows code page; only letters outside ASCII differ
+            odd = f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents"
+            return replace(_read_text(path, layout, "cp1252"), warnings=(odd,))
+    except OSError as error:
+        raise CampaignError(file, f"cannot be read: {error.strerror}") from error
+
+
+def _encoding(path: Path) -> str:
+    """Return how a text may be encoded by its first bytes; refuse what is no text by them."""
+    with path.open("rb") as stream:
+        head = stream.read(4)
+    if head == b"PK\x03\x04":
+        expected = "a name that ends in .xlsx or .ods, or a table saved as CSV or Parquet"
+        raise CampaignError(str(path), "is a workbook or an archive", expected=expected)
+    if head == b"PAR1":
+        raise CampaignError(str(path), "is a Parquet file by its contents", expected="a name that ends in .parquet")
+    return "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
+
+
+def _read_text(path: Path, layout: Layout, encoding: str) -> Table:
+    with path.open(encoding=encoding, errors="strict" if encoding == "utf-8-sig" else "replace", newline="") as stream:
         separator = layout.separator or _separator(_lines(stream, layout))
         stream.seek(0)
-        lines = _lines(stream, layout, even=separator == SPACE)
-        header, cells, numbers = _records(file, csv.reader(lines, delimiter=separator, strict=True), layout.header)
-    return _table(file, header, cells, numbers, layout.header, separator != ",", warnings)
+        lines = csv.reader(_lines(stream, layout, even=separator == SPACE), delimiter=separator, strict=True)
+        return _table(str(path), lines, layout.header, comma=separator != ",")
 
 
-def _table(
-    file: str,
-    header: list[str],
-    cells: list[list[str]],
-    numbers: list[int],
-    named: bool = True,
-    comma: bool = True,
-    warnings: tuple[str, ...] = (),
-) -> Table:
-    """Return what was read of a file; ``numbers`` are the rows of the header and of all others."""
+def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = True) -> Table:
+    """Return the table that lines of fields make."""
+    header, cells, numbers = _records(file, lines, named)
     if len(numbers) < 2:
-        raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
+        raise CampaignError(file, "has a header but no rows", expected=_ONE_ROW)
     # A separator at the end of every line makes a column of nothing.
     kept = [i for i, name in enumerate(header) if name or any(cells[i])]
     _check_header(file, [header[i] for i in kept], number=numbers[0])
     columns = {header[i]: cells[i] for i in kept}
-    comma = comma and _has_decimal_comma(columns)
-    rows = np.array(numbers[1:], dtype=np.int64)
-    return Table(file, columns, rows, numbers[0] if named else None, comma, warnings)
+    texts = (cell for name, column in columns.items() if name not in LABELS for cell in column)
+    comma = comma and any("," in cell and _DECIMAL_COMMA.fullmatch(cell) for cell in texts)
+    return Table(file, columns, np.array(numbers[1:], dtype=np.int64), numbers[0] if named else None, comma)
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
-    """Return a pandas data frame as a table.
+    """Return a pandas data frame as a table; refuse one without rows, or with a column twice.
 
-    Parameters
-    ----------
-    frame
-        The data.
-    file
-        What to call it in messages.
-    first_row
-        Number of the first row; without it rows are known by an integer index of the frame, so that
-        ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
-
-    Raises
-    ------
-    CampaignError
-        No rows, a duplicate column.
+    Rows are numbered from ``first_row``; without it they are known by an integer index of the frame, so that
+    ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
     """
     import pandas as pd
 
     header = [_as_text(name) for name in frame.columns]
     _check_header(file, header, number=None if first_row is None else 1)
     if len(frame) == 0:
-        raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
-    if first_row is not None:
-        rows = np.arange(first_row, first_row + len(frame))
-    elif pd.api.types.is_signed_integer_dtype(frame.index.dtype) and frame.index.is_unique and not frame.index.hasnans:
-        rows = frame.index.to_numpy(dtype=np.int64)
-    else:
-        rows = np.arange(len(frame))
+        raise CampaignError(file, "has a header but no rows", expected=_ONE_ROW)
+    index = frame.index
+    own = pd.api.types.is_signed_integer_dtype(index.dtype) and index.is_unique and not index.hasnans
+    rows = index.to_numpy(dtype=np.int64) if own and first_row is None else np.arange(len(frame)) + (first_row or 0)
     columns: dict[str, Cells] = {}
     for i, name in enumerate(header):
         series = frame.iloc[:, i]
@@ -343,76 +316,47 @@ def _as_text(cell: object) -> str:
 def _read_parquet(path: Path) -> Table:
     import pandas as pd
 
+    file = str(path)
     try:
         from pyarrow.parquet import read_metadata
 
         held = read_metadata(path)
-        _require_size(str(path), held.num_rows, held.num_columns)
+        _require_size(file, held.num_rows, held.num_columns)
         frame = pd.read_parquet(path)
     except ImportError as error:
-        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
+        raise CampaignError(file, NO_PARQUET, expected=WITH_PARQUET) from error
     except CampaignError:
         raise
     except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
-        reason = " ".join(str(error).split())
-        raise CampaignError(str(path), f"cannot be read as a Parquet file ({reason})") from error
+        raise CampaignError(file, f"cannot be read as a Parquet file ({' '.join(str(error).split())})") from error
     # An index with a name is a column that pandas set aside.
     if twice := [name for name in frame.index.names if name in frame.columns]:
-        raise CampaignError(str(path), "duplicate column", column=str(twice[0]), found="it as the index, too")
-    frame = frame.reset_index(drop=frame.index.names == [None])
-    return table_from_frame(frame, str(path), first_row=2)
+        raise CampaignError(file, "duplicate column", column=str(twice[0]), found="it as the index, too")
+    return table_from_frame(frame.reset_index(drop=frame.index.names == [None]), file, first_row=2)
 
 
 def _read_workbook(path: Path, layout: Layout) -> Table:
     """Return the first sheet of a workbook; its rows are counted as the spreadsheet does."""
     import pandas as pd
 
+    file = str(path)
     try:
         sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
     except ImportError as error:
         problem = f"workbooks need {WORKBOOKS[path.suffix.lower()]}, which is not installed"
-        raise CampaignError(str(path), problem, expected=WITH_EXCEL) from error
+        raise CampaignError(file, problem, expected=WITH_EXCEL) from error
     except Exception as error:  # each reader raises its own
-        raise CampaignError(str(path), f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
+        raise CampaignError(file, f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
     first, frame = next(iter(sheets.items()))
-    _require_size(str(path), *frame.shape)
-    lines = ([_as_text(cell) for cell in row] for row in frame.astype(object).where(frame.notna(), "").to_numpy())
-    kept = ([] if k < layout.skip or (layout.comment and row[0].startswith(layout.comment)) else row
-            for k, row in enumerate(lines))  # fmt: skip
-    header, cells, numbers = _records(str(path), kept, layout.header)
-    more = f"{path} has {len(sheets)} sheets: the first, {first!r}, was read"
-    return _table(str(path), header, cells, numbers, layout.header, warnings=(more,) if len(sheets) > 1 else ())
-
-
-def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return how a file's text is encoded, and what was odd about it."""
-    file = str(path)
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(4)
-            if head == b"PK\x03\x04":
-                raise CampaignError(
-                    file,
-                    "is a workbook or an archive",
-                    expected="a name that ends in .xlsx or .ods, or a table saved as CSV or Parquet",
-                )
-            if head == b"PAR1":
-                raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
-            if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-                return "utf-16", ()
-            decoder = codecs.getincrementaldecoder("utf-8")()
-            block = head
-            while block:
-                decoder.decode(block)
-                block = stream.read(_BLOCK)
-            decoder.decode(b"", final=True)
-            return "utf-8-sig", ()
-    except OSError as error:
-        raise CampaignError(file, f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError:
-        # Spreadsheets still write the Windows code page; only letters outside ASCII differ.
-        odd = f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents"
-        return "cp1252", (odd,)
+    _require_size(file, *frame.shape)
+    rows = frame.astype(object).where(frame.notna(), "").to_numpy()
+    lines = ([_as_text(cell) for cell in row] for row in rows)
+    kept = (
+        [] if k < layout.skip or (layout.comment and line[0].startswith(layout.comment)) else line
+        for k, line in enumerate(lines)
+    )
+    more = f"{file} has {len(sheets)} sheets: the first, {first!r}, was read"
+    return replace(_table(file, kept, layout.header), warnings=(more,) if len(sheets) > 1 else ())
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
@@ -420,7 +364,7 @@ def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[st
 
     Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
     """
-    marked: str | None = None
+    marked: list[str] = []
     leading = not layout.comment
     for number, line in enumerate(stream):
         if number < layout.skip or (layout.comment and line.lstrip().startswith(layout.comment)):
@@ -428,17 +372,14 @@ def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[st
         elif even:
             line = f"{SPACE.join(line.split())}\n"
         if leading and (found := _MARKED.match(line)):
-            if marked is not None:
-                yield "\n"
-            marked = line[found.end() :] if layout.header else "\n"
+            yield from ["\n"] * len(marked)
+            marked = [line[found.end() :] if layout.header else "\n"]
             continue
-        if marked is not None:
-            yield marked
-            marked = None
+        yield from marked
+        marked = []
         leading = leading and not line.strip()
         yield line
-    if marked is not None:
-        yield marked
+    yield from marked
 
 
 def _separator(lines: Iterator[str]) -> str:
@@ -451,9 +392,7 @@ def _separator(lines: Iterator[str]) -> str:
     return next((each for each in (";", "\t") if each in header), SPACE if blanks else ",")
 
 
-def _records(
-    file: str, reader: Iterable[list[str]], named: bool = True
-) -> tuple[list[str], list[list[str]], list[int]]:
+def _records(file: str, lines: Iterable[list[str]], named: bool) -> tuple[list[str], list[list[str]], list[int]]:
     """Return the header, the cells by column, and the numbers of the lines where header and rows start.
 
     Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
@@ -463,46 +402,38 @@ def _records(
     numbers: list[int] = []
     before = 0
     try:
-        for fields in reader:
+        for fields in lines:
             # a field may hold the end of a line, which csv counts; a workbook has a row for each
-            start, before = before + 1, getattr(reader, "line_num", before + 1)
+            start, before = before + 1, getattr(lines, "line_num", before + 1)
             if not any(field.strip() for field in fields):
                 if start - (numbers[-1] if numbers else 0) > _MOST_BLANK_LINES:
                     raise CampaignError(file, f"more than {_MOST_BLANK_LINES} lines in succession are blank", row=start)
                 continue
-            if not header and not named:
-                header, cells, numbers = [str(k + 1) for k in range(len(fields))], [[] for _ in fields], [0]
-            if header and len(fields) != len(header):
-                raise CampaignError(
-                    file,
-                    "wrong number of fields",
-                    row=start,
-                    found=str(len(fields)),
-                    expected=f"{len(header)} as in the {'header' if named else 'first row'}",
-                )
+            if not header:
+                header = [name.strip() for name in fields] if named else [str(k + 1) for k in range(len(fields))]
+                cells, numbers = [[] for _ in header], [start if named else 0]
+                if named:
+                    continue
+            if len(fields) != len(header):
+                expected = f"{len(header)} as in the {'header' if named else 'first row'}"
+                problem = "wrong number of fields"
+                raise CampaignError(file, problem, row=start, found=str(len(fields)), expected=expected)
             numbers.append(start)
-            if header:
-                for column, field in zip(cells, fields, strict=True):
-                    column.append(field.strip())
-                _require_size(file, len(numbers), len(header))
-            else:
-                header = [name.strip() for name in fields]
-                cells = [[] for _ in header]
+            for column, field in zip(cells, fields, strict=True):
+                column.append(field.strip())
+            _require_size(file, len(numbers), len(header))
     except csv.Error as error:
         raise CampaignError(file, f"cannot be read as CSV ({error})", row=before + 1) from error
     if not header:
-        raise CampaignError(file, "is empty", expected="a header and one row per measurement")
+        raise CampaignError(file, "is empty", expected=f"a header and {_ONE_ROW}")
     return header, cells, numbers
 
 
 def _require_size(file: str, rows: int, columns: int) -> None:
     if rows * columns > MOST_CELLS:
-        raise CampaignError(
-            file,
-            "has more cells than can be read",
-            found=f"{columns} columns of {rows} rows and more",
-            expected=f"at most {MOST_CELLS} cells: leave out rows or columns",
-        )
+        found = f"{columns} columns of {rows} rows and more"
+        expected = f"at most {MOST_CELLS} cells: leave out rows or columns"
+        raise CampaignError(file, "has more cells than can be read", found=found, expected=expected)
 
 
 def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
@@ -511,24 +442,9 @@ def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
         raise CampaignError(file, "too many columns", row=number, found=str(len(header)), expected=expected)
     for name, count in Counter(header).items():
         if not name:
-            raise CampaignError(
-                file, "a column has no name", row=number, found=f"column {header.index('') + 1} without one"
-            )
+            found = f"column {header.index('') + 1} without one"
+            raise CampaignError(file, "a column has no name", row=number, found=found)
         if count > 1:
-            raise CampaignError(
-                file,
-                f"duplicate column{without_names(header, file)}",
-                row=number,
-                column=name,
-                found=f"it {count} times",
-                expected="every column once",
-            )
-
-
-def _has_decimal_comma(columns: Mapping[str, Sequence[str]]) -> bool:
-    return any(
-        "," in cell and _DECIMAL_COMMA.fullmatch(cell)
-        for name, cells in columns.items()
-        if name not in LABELS
-        for cell in cells
-    )
+            problem = f"duplicate column{without_names(header, file)}"
+            told = {"found": f"it {count} times", "expected": "every column once"}
+            raise CampaignError(file, problem, row=number, column=name, **told)

@@ -1,10 +1,10 @@
-"""Several targets of one pose: where they sit on the tool, and the pose of their common frame in each row.
+"""Generalised Procrustes analysis of several targets: their places on the tool, and the pose of each row.
 
 In row i target k is seen at y_ik = t_i + R_i s_k + noise, with its unknown place s_k on the tool the same in all rows.
-The places are those to which all rows together are nearest once each is moved rigidly (generalised Procrustes analysis:
-Gower, *Psychometrika* 40, 1975); what is free in them is a rigid motion of all, which the unknown tool frame takes up.
-The common frame has its origin in their mean and the axes of their principal moments. Of a row, (R_i, t_i) then tells
-all that its targets say of the robot: the rest is how they move against each other.
+The places are those to which all rows together are nearest once each is moved rigidly (Gower, *Psychometrika* 40,
+1975); what is free in them is a rigid motion of all, which the unknown tool frame takes up. The common frame has its
+origin in their mean and the axes of their principal moments. Of a row, (R_i, t_i) then tells all that its targets say
+of the robot: the rest is how they move against each other.
 
 To first order the twist (t, ω) of that frame, in its own axes, has the covariance σ² (Σ_k J_kᵀ J_k)⁻¹ over the targets
 that are seen, with J_k = [1, −[s_k]×]. Where all are seen its six figures are independent; where some are not, what
@@ -22,28 +22,21 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.kinematics import align, rotation_to_quaternion
 
 Mask = NDArray[np.bool_]
 
-FEWEST = 3
-"""Targets without which a pose can turn about the line through two."""
-LINE = 0.01
-"""Width over length of what is seen below which it is a line: the turn about it would be known a hundred times worse
-than the others."""
-ROUNDS = 100
-"""Rounds of the analysis at most; a few are enough where the noise is small beside the distances."""
-SETTLED = 1e-12
-"""Share of the targets' extent by which their places still move when they are found: rounding moves them by 1e-15."""
-TAIL = 3.0
-"""Times the median distance from which on a target counts less for its place (Cauchy): one row in a few is gross."""
-TINY = 1e-30
-"""m, where exact figures leave no distance."""
+FEWEST = 3  # targets without which a pose can turn about the line through two
+LINE = 0.01  # width over length of a line: the turn about it would be known a hundred times worse than the others
+ROUNDS = 100  # of the analysis at most; a few are enough where the noise is small beside the distances
+SETTLED = 1e-12  # share of the extent by which places still move when they are found: rounding moves them by 1e-15
+TAIL = 3.0  # median distances from which on a target counts less for its place (Cauchy): one row in a few is gross
+TINY = 1e-30  # m, where exact figures leave no distance
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What was seen of K targets in N rows."""
+    """Coordinates of K targets in N rows, with their noise."""
 
     numbers: tuple[int, ...]  # K numbers, as of ``x.1``
     points: Array  # (N, K, 3) measured places, measurement frame, m; NaN where one was not seen
@@ -60,7 +53,7 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """Targets, and what they tell of each row."""
+    """Targets, and the pose of their common frame in each row."""
 
     targets: Targets  # of the rows that tell a pose
     # position, orientation: (N, 3) m and (N, 4) unit quaternions wxyz of their common frame
@@ -71,24 +64,14 @@ class Posed:
 
 def telling(points: Array) -> Mask:
     """(N,) the rows in which three or more of the targets (N, K, 3) are seen that do not lie on a line."""
-    seen = _seen(points)
-    return np.asarray((seen.sum(axis=1) >= FEWEST) & _wide(np.nan_to_num(points), seen))
+    return _wide(points, _seen(points))
 
 
 def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
-    """Find the places of the targets, and the pose of their common frame in each row.
+    """Generalised Procrustes analysis: the places of the targets, and the pose of their common frame in each row.
 
-    Parameters
-    ----------
-    numbers
-        K numbers.
-    points
-        (N, K, 3) measured places, m, of rows that are :func:`telling`; NaN where a target was not seen.
-
-    Returns
-    -------
-    Posed
-        ``None`` where a target is never seen beside three others whose places are known.
+    ``points`` are (N, K, 3) measured places, m, of K ``numbers`` in rows that are :func:`telling`; NaN where a target
+    was not seen. ``None`` is returned where one is never seen beside three others whose places are known.
     """
     seen = _seen(points)
     found = _places(np.nan_to_num(points), seen)
@@ -96,8 +79,9 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
         return None
     middle = found - found.mean(axis=0)
     places = middle @ _axes(middle).T
-    turn, shift = _moved(places, np.nan_to_num(points), seen)
-    left = np.where(seen[:, :, None], np.nan_to_num(points) - shift[:, None] - places @ turn.transpose(0, 2, 1), 0.0)
+    motion = align(places, np.nan_to_num(points), seen.astype(float))
+    turn, shift = motion[:, :3, :3], motion[:, :3, 3]
+    left = np.nan_to_num(points - shift[:, None] - places @ turn.transpose(0, 2, 1))
     freedom = 3 * seen.sum(axis=1) - 6
     deviation = np.sqrt((left**2).sum(axis=(1, 2)) / freedom)
     sigma = float(np.median(deviation * np.sqrt(freedom / chdtri(freedom, 0.5))))
@@ -120,29 +104,29 @@ def _seen(points: Array) -> Mask:
 
 
 def _wide(points: Array, seen: Mask) -> Mask:
-    """(N,) whether what is seen of (N, K, 3) points is wider than a line."""
-    count = np.maximum(seen.sum(axis=1), 1)[:, None]
-    apart = np.where(seen[:, :, None], points - ((seen[:, :, None] * points).sum(axis=1) / count)[:, None], 0.0)
-    extent = np.linalg.svd(apart, compute_uv=False)
-    return np.asarray(extent[:, 1] > LINE * extent[:, 0]) if extent.shape[1] > 1 else np.zeros(len(points), dtype=bool)
+    """(N,) whether what is seen of (N, K, 3) points is three or more of them, and wider than a line."""
+    points, count = np.where(seen[:, :, None], points, 0.0), seen.sum(axis=1)
+    middle = points.sum(axis=1) / np.maximum(count, 1)[:, None]
+    extent = np.linalg.svd(np.where(seen[:, :, None], points - middle[:, None], 0.0), compute_uv=False)
+    wide = extent[:, 1] > LINE * extent[:, 0] if extent.shape[1] > 1 else False
+    return np.asarray((count >= FEWEST) & wide)
 
 
 def _places(points: Array, seen: Mask) -> Array:
-    """(K, 3) places of the targets in the axes of the row that shows most of them; NaN of one that cannot be linked."""
+    """Robust Procrustes mean, (K, 3), in the axes of the row that shows most targets; NaN of one that is not linked."""
     first = int(np.argmax(seen.sum(axis=1)))
     places = np.where(seen[first][:, None], points[first], np.nan)
     extent = float(np.linalg.norm(np.ptp(points[first][seen[first]], axis=0)))
     for _ in range(ROUNDS):
-        known = np.isfinite(places).all(axis=1)
-        use = seen & known
-        rows = (use.sum(axis=1) >= FEWEST) & _wide(points, use)
-        turn, shift = _moved(np.nan_to_num(places), points[rows], use[rows])
-        local = (points[rows] - shift[:, None]) @ turn
-        distance = np.linalg.norm(local - np.nan_to_num(places), axis=2)
-        scale = TAIL * float(np.median(distance[use[rows]])) + TINY
+        known, before = np.isfinite(places).all(axis=1), places
+        rows = _wide(points, seen & known)
+        use, own = (seen & known)[rows], np.nan_to_num(places)
+        motion = align(own, points[rows], use.astype(float))
+        local = (points[rows] - motion[:, None, :3, 3]) @ motion[:, :3, :3]
+        distance = np.linalg.norm(local - own, axis=2)
+        scale = TAIL * float(np.median(distance[use])) + TINY
         weight = seen[rows] * np.where(known, 1.0 / (1.0 + (distance / scale) ** 2), 1.0)
         total = weight.sum(axis=0)[:, None]
-        before = places
         places = np.where(total > 0.0, (weight[:, :, None] * local).sum(axis=0) / np.maximum(total, TINY), np.nan)
         linked = bool((np.isfinite(places) == np.isfinite(before)).all())
         if linked and np.nanmax(np.abs(places - before)) < SETTLED * extent:
@@ -150,24 +134,8 @@ def _places(points: Array, seen: Mask) -> Array:
     return np.asarray(places)
 
 
-def _moved(places: Array, points: Array, seen: Mask) -> tuple[Array, Array]:
-    """(N, 3, 3) and (N, 3): the motions that bring the places (K, 3) onto the points seen, least squares.
-
-    Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
-    """
-    share = seen / seen.sum(axis=1)[:, None]
-    to_mean = np.einsum("nk,nka->na", share, points)
-    from_mean = share @ places
-    apart = places - from_mean[:, None]
-    u, _, vt = np.linalg.svd(np.einsum("nk,nka,nkb->nab", share, points - to_mean[:, None], apart))
-    sign = np.ones((len(points), 3))
-    sign[:, 2] = np.linalg.det(u) * np.linalg.det(vt)
-    turn = (u * sign[:, None]) @ vt
-    return turn, to_mean - np.einsum("nab,nb->na", turn, from_mean)
-
-
 def _spread(places: Array, seen: Mask) -> Array:
-    """(N, 6) of :class:`Targets`; of the place the root mean square over its axes, as the frame turns with the tool."""
+    """Propagated standard deviation, (N, 6) of :class:`Targets`; of the place the root mean square over its axes."""
     jacobian = np.zeros((len(places), 3, 6))
     jacobian[:, :, :3] = np.eye(3)
     # the k-th axis of the turn moves a target by e_k × s
@@ -179,13 +147,12 @@ def _spread(places: Array, seen: Mask) -> Array:
 
 
 def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
-    """Return one sigma of positions, m, and where several targets tell it of turns, rad: root mean squares over rows.
+    """Root mean square standard deviation of positions, m, and where several targets tell it of turns, rad.
 
     ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
     alike = bool(sigmas.min() == sigmas.max())
-    whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
-    return told_by(whole, targets)
+    return told_by(float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean())), targets)
 
 
 def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
@@ -199,7 +166,7 @@ def of_a_point(sigma: float, targets: Targets | None) -> float:
 
 
 def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
-    """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
+    """Relative standard deviation (N, m) of each figure of a row to that of all rows; ``None`` where it is 1.
 
     ``sigmas`` (N,) are of a point in each row, m, ``None`` where one holds for all; ``whole`` of positions, of all
     rows, m. Where orientations were measured, ``turned``, m is 6; their noise is the same in all rows unless targets
@@ -208,9 +175,7 @@ def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets 
     factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
     if targets is not None:
         found = targets.spread / np.repeat(targets.typical, 3) * factor[:, None]
-        found = found if turned else found[:, :3]
-    elif bool((factor == 1.0).all()):
-        return None
     else:
-        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * (3 if turned else 0))
+        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * 3)
+    found = found if turned else found[:, :3]
     return None if bool((found == 1.0).all()) else found

@@ -1,4 +1,4 @@
-"""What a joint remembers of its moves: how far it has gone since it last turned round, and what elements hold it."""
+"""Hysteresis of joints: distance since the last reversal, and the strains of Prandtl–Ishlinskii stop operators."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.settings import STILL
-
-Rows = NDArray[np.int64]
 
 SLIPS = tuple(2.0 ** (k / 4) for k in range(-28, 9))
 """rad or m: how far a joint goes before an element slips; from 8 mm, a twentieth of a short stroke, to more than half a
@@ -35,30 +33,21 @@ def moves(q: Array) -> NDArray[np.bool_]:
 def since_turns(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Return (N,) by joint: the signed distance from its last turning point, rad or m; negative on the way down.
+    """Signed distance from the last reversal, (N,) by joint, rad or m; negative on the way down.
 
     At the first row of a session no turn is known: the distance is that from there. Beside it stands, by the name
     :func:`strained`, what elements of each of :data:`SLIPS` are strained by, rad or m: springs that follow the joint
     until they slip, the stop operators of Prandtl and Ishlinskii (Kuhnen, *Modeling, identification and compensation of
     complex hysteretic nonlinearities*, 2003). At the first row of a session they are slack.
 
-    Parameters
-    ----------
-    q
-        (N, n) commanded positions, rad or m: the robot goes straight from one to the next.
-    names
-        Of the n joints.
-    covariates
-        By name; ``time`` or ``order`` says which row comes after which. Without either the answer is empty.
-    sessions
-        (N,) label of the uninterrupted run that a row belongs to; ``None`` where there is one.
+    ``q`` are (N, n) commanded positions of n joints, rad or m: the robot goes straight on to the next. ``time`` or
+    ``order`` among the covariates says which row comes after which; without either the answer is empty. ``sessions``
+    are (N,) labels of the uninterrupted run that a row belongs to; ``None`` where there is one.
     """
-    since = np.zeros_like(q)
-    strain = np.zeros((*q.shape, len(SLIPS)))
+    since, strain = np.zeros_like(q), np.zeros((*q.shape, len(SLIPS)))
     runs = list(_runs(covariates, sessions, len(q)))
     for rows in runs:
-        for j in range(q.shape[1]):
-            since[rows, j] = _since_turn(q[rows, j])
+        since[rows] = np.apply_along_axis(_since_turn, 0, q[rows])
         strain[rows] = _strains(q[rows])
     if not runs:
         return {}
@@ -69,22 +58,16 @@ def since_turns(
 def arrivals(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Return (N,) by ``approach.<joint>``: the side from which each joint came, as the order of rows tells it.
+    """Directions of approach, (N,) by ``approach.<joint>``, as the order of rows tells them.
 
     +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
     keeps the side that it had. 0 at the first row of a session, where nothing is known. It holds for a robot that goes
-    straight from pose to pose.
-
-    Parameters
-    ----------
-    q, names, covariates, sessions
-        As for :func:`since_turns`; without a column that tells the order the answer is empty.
+    straight from pose to pose. The arguments are those of :func:`since_turns`.
     """
     side = np.zeros_like(q)
     runs = list(_runs(covariates, sessions, len(q)))
     for rows in runs:
-        for j in range(q.shape[1]):
-            side[rows, j] = np.sign(_since_turn(q[rows, j]))
+        side[rows] = np.sign(np.apply_along_axis(_since_turn, 0, q[rows]))
     return {f"approach.{name}": side[:, j] for j, name in enumerate(names)} if runs else {}
 
 
@@ -93,7 +76,9 @@ def clock_of(covariates: Mapping[str, Array]) -> Array | None:
     return next((covariates[name] for name in CLOCK if name in covariates), None)
 
 
-def _runs(covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int) -> Iterator[Rows]:
+def _runs(
+    covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int
+) -> Iterator[NDArray[np.int64]]:
     """Yield the rows of each uninterrupted run in their order; none where nothing tells the order."""
     clock = clock_of(covariates)
     if clock is None or not samples or not np.ptp(clock) > 0.0:
@@ -109,23 +94,23 @@ def strained(joint: str, slip: float) -> str:
 
 
 def _strains(path: Array) -> Array:
-    """(N, n, K) strains of elements of joints that pass positions (N, n) in this order."""
+    """Prandtl–Ishlinskii stop operators: strains (N, n, K) of joints that pass positions (N, n) in this order."""
     most = np.array(SLIPS)
-    moved = np.diff(path, axis=0)
     found = np.zeros((*path.shape, len(most)))
-    for row, move in enumerate(moved):
+    for row, move in enumerate(np.diff(path, axis=0)):
         np.clip(found[row] + move[:, None], -most, most, out=found[row + 1])
     return found
 
 
 def _since_turn(path: Array) -> Array:
-    """(N,) the same of one joint that passes positions (N,) in this order."""
+    """(N,) signed distance of one joint from its last turn, which passes positions (N,) in this order."""
     moved = np.diff(path)
+    if not len(moved):
+        return np.zeros(len(path))
+    steps = np.arange(len(moved))
     way = np.where(np.abs(moved) > STILL, np.sign(moved), 0.0)
     # a joint that rests keeps the direction that it had
-    moves = np.arange(len(way))
-    way = way[np.maximum.accumulate(np.where(way != 0.0, moves, 0))] if len(way) else way
-    turned = np.zeros(len(way), dtype=bool)
-    turned[1:] = way[1:] * way[:-1] < 0.0
-    start = np.maximum.accumulate(np.where(turned, moves, 0)) if len(way) else moves
-    return np.concatenate([np.zeros(1), np.where(way != 0.0, path[1:] - path[start], 0.0)])
+    way = way[np.maximum.accumulate(np.where(way != 0.0, steps, 0))]
+    turned = np.concatenate([[False], way[1:] * way[:-1] < 0.0])
+    start = np.maximum.accumulate(np.where(turned, steps, 0))
+    return np.concatenate([[0.0], np.where(way != 0.0, path[1:] - path[start], 0.0)])

@@ -9,17 +9,8 @@ from thermal_robot.campaign.names import NOISE, PER_JOINT, PER_LINK, POSITION, S
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
-"""Radians in one of the unit."""
-LENGTH_UNITS: dict[str, float] = {
-    "m": 1.0,
-    "mm": 1e-3,
-    "um": 1e-6,
-    "cm": 1e-2,
-    "inch": 0.0254,
-    "in": 0.0254,
-    "ft": 0.3048,
-}
+ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}  # Radians in one of the unit
+LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
 """Metres in one of the unit; inch and foot are the international ones of 1959, exact."""
 
 _OF_ITS_OWN = {"time": "s", "temperature": "°C", "payload": "kg"}
@@ -49,14 +40,10 @@ class Units:
     length: str = "m"
 
     def __post_init__(self) -> None:
-        for key, word, allowed in (
-            ("angle_unit", self.angle, ANGLE_UNITS),
-            ("length_unit", self.length, LENGTH_UNITS),
-        ):
-            if not isinstance(word, str) or word not in allowed:
-                raise CampaignError(
-                    "<units>", "unknown unit", column=key, found=repr(word), expected=" or ".join(allowed)
-                )
+        for key, word, known in (("angle_unit", self.angle, ANGLE_UNITS), ("length_unit", self.length, LENGTH_UNITS)):
+            if not isinstance(word, str) or word not in known:
+                expected = " or ".join(known)
+                raise CampaignError("<units>", "unknown unit", column=key, found=repr(word), expected=expected)
 
     @property
     def angle_scale(self) -> float:
@@ -77,30 +64,18 @@ class Units:
         return self.length if joint_type == "prismatic" else self.angle
 
 
-SI = Units()
-"""What everything is in once it has been read."""
+SI = Units()  # What everything is in once it has been read
 
 
 def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
-    """Say in which unit a column of the table is.
+    """Say in which unit a column of a robot's table is: in those of the file, else in SI, as a campaign's values are.
 
-    Parameters
-    ----------
-    column
-        Its name: a joint of the chain, ``x``, ``sim.x``, or a covariate such as ``velocity.<joint>``.
-    robot
-        The chain: joints that turn are in rad, prismatic ones in m.
-    units
-        Of the file; SI where absent, the unit of the values of a :class:`~thermal_robot.campaign.Campaign`.
-
-    Returns
-    -------
-    str
-        Empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
-        quaternion) and for a column that the format does not define.
+    It is empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
+    quaternion) and for a column that the format does not define.
     """
-    if column in robot.joint_names:
-        return units.joint_unit(_joint_type(column, robot))
+    kinds = dict(zip(robot.joint_names, robot.joint_types, strict=True))
+    if column in kinds:
+        return units.joint_unit(kinds[column])
     if column in (*POSITION, *SIMULATED_POSITION, NOISE):
         return units.length
     if tilted(column) is not None:
@@ -108,12 +83,11 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
     quantity, place = split_name(column)
     if quantity not in PER_JOINT:
         return _OF_ITS_OWN.get(quantity if quantity in PER_LINK else column, "")
-    if place not in robot.joint_names:
+    if place not in kinds:
         return ""
-    kind = _joint_type(place, robot)
     if quantity == "torque":
-        return "N" if kind == "prismatic" else "N·m"
-    return _OF_A_JOINT.get(quantity, "").format(units.joint_unit(kind))
+        return "N" if kinds[place] == "prismatic" else "N·m"
+    return _OF_A_JOINT.get(quantity, "").format(units.joint_unit(kinds[place]))
 
 
 def covariate_scale(column: str, robot: Robot, units: Units) -> float:
@@ -122,9 +96,5 @@ def covariate_scale(column: str, robot: Robot, units: Units) -> float:
         return units.angle_scale
     quantity, place = split_name(column)
     if quantity in _OF_A_JOINT and place in robot.joint_names:
-        return units.joint_scale(_joint_type(place, robot))
+        return units.joint_scale(robot.joint_types[robot.joint_names.index(place)])
     return 1.0
-
-
-def _joint_type(joint: str, robot: Robot) -> str:
-    return robot.joint_types[robot.joint_names.index(joint)]

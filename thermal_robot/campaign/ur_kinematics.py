@@ -53,19 +53,9 @@ def elements(robot: Robot, file: str) -> dict[str, int]:
 
 
 def with_kinematics(robot: Robot, file: str | Path) -> Robot:
-    """Return the robot with the joint origins of a kinematics.yaml.
+    """Return a robot of ur_description, whole from base to flange, with the joint origins of a kinematics.yaml.
 
-    Parameters
-    ----------
-    robot
-        Of ur_description, whole from its base to its flange.
-    file
-        The calibration.
-
-    Raises
-    ------
-    CampaignError
-        A file that is none, of another model, or a robot of other frames.
+    Refused are a file that is none, one of another model, and a robot of other frames.
     """
     documents = read_yaml(Path(file))
     held = documents[0].get("kinematics") if documents and isinstance(documents[0], Mapping) else None

@@ -1,10 +1,11 @@
-"""From a campaign to files, to pandas and to notebooks: campaign.toml, table and robot; the table of predictions."""
+"""From a campaign to files: campaign.toml, table and robot; the table of predictions."""
 
 from __future__ import annotations
 
 import csv
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,13 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal_robot.campaign import names
-from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.describe import described_html
+from thermal_robot.campaign.campaign import Campaign, table_columns
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
 from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.targets import of_a_point
-from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, covariate_scale
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
 from thermal_robot.robot import Robot
@@ -27,10 +27,16 @@ from thermal_robot.robot import Robot
 if TYPE_CHECKING:
     import pandas as pd
 
+TABLE_NAME, PLAN_NAME, ROBOT_NAME = "measurements.csv", "plan.csv", "robot.urdf"
 
-TABLE_NAME = "measurements.csv"
-PLAN_NAME = "plan.csv"
-ROBOT_NAME = "robot.urdf"
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Say of what cannot be written that it cannot."""
+    try:
+        yield
+    except OSError as error:
+        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
 
 def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Sequence[str] = ()) -> Path:
@@ -78,29 +84,14 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
 def write_planned(
     commands: Campaign, directory: str | Path, *, comments: Sequence[str] = (), derived: Sequence[str] = ()
 ) -> Path:
-    """Write the folder of a campaign that is still to be measured.
+    """Write the folder of a campaign that is still to be measured; return the path of its campaign.toml.
 
     Beside campaign.toml and the robot stand plan.csv, all that is planned, and measurements.csv, the same with empty
     cells where something is to be recorded: the target's place and the temperatures.
 
-    Parameters
-    ----------
-    commands
-        A campaign without measured positions; one with orientations asks for these, too.
-    directory, comments
-        As for :func:`write_campaign`.
-    derived
-        Columns that follow from the order of the rows, and are left out.
-
-    Returns
-    -------
-    Path
-        Of the campaign.toml.
-
-    Raises
-    ------
-    CampaignError
-        A directory that cannot be written; one that holds a campaign.toml: somebody may have filled in its table.
+    ``commands`` has no measured positions; with orientations it asks for these, too. ``derived`` columns
+    follow from the order of the rows, and are left out. A directory that holds a campaign.toml is refused: somebody may
+    have filled in its table.
     """
     folder = Path(directory)
     if (folder / FILE_NAME).exists():
@@ -117,25 +108,16 @@ def write_commands(
 ) -> None:
     """Write the table of what is to be commanded, with empty cells for what will be measured.
 
-    Parameters
-    ----------
-    commands
-        A campaign without measured positions.
-    path
-        File to write.
-    derived
-        Columns that are left out.
-    recorded
-        Whether the cells of temperatures stay empty, too: they are recorded, not commanded.
+    ``derived`` are columns that are left out; where temperatures are ``recorded`` their cells stay empty, too.
     """
     blank = [""] * commands.samples
-    measured = names.POSITION if commands.orientation is None else names.MEASURED
     table: dict[str, Sequence[str]] = {}
-    for name, values in table_columns(replace(commands, orientation=None)):
+    for name, values in table_columns(replace(commands, orientation=None)).items():
         empty = recorded and names.split_name(name)[0] == "temperature"
         if name not in derived:
             table[name] = blank if empty else [f"{value:.9g}" for value in values]
-    _write_csv(Path(path), {**table, **_labelled(commands), **dict.fromkeys(measured, blank)})
+    measured = names.POSITION if commands.orientation is None else names.MEASURED
+    _write_csv(Path(path), {**table, **_labels(commands), **dict.fromkeys(measured, blank)})
 
 
 def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
@@ -143,13 +125,12 @@ def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
     import tomli_w
 
     file = folder / FILE_NAME
+    remarks = "".join(f"# {' '.join(comment.split())}\n" for comment in comments)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(folder / ROBOT_NAME, campaign.robot.urdf)
-        remarks = "".join(f"# {' '.join(comment.split())}\n" for comment in comments)
-        write_text(file, remarks + tomli_w.dumps(_document(campaign)))
-    except OSError as error:
-        raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
+        with _writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            write_text(folder / ROBOT_NAME, campaign.robot.urdf)
+            write_text(file, remarks + tomli_w.dumps(_document(campaign)))
     except ValueError as error:  # NUL in a name
         raise CampaignError(str(folder), f"cannot be written: {error}") from error
     return file
@@ -159,9 +140,20 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
     """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
     numbers = {
         name: ["" if np.isnan(value) else repr(float(value)) for value in values]
-        for name, values in table_columns(campaign)
+        for name, values in table_columns(campaign).items()
     }
-    _write_csv(Path(path), {**numbers, **_labelled(campaign)})
+    _write_csv(Path(path), {**numbers, **_labels(campaign)})
+
+
+def _labels(campaign: Campaign) -> dict[str, list[str]]:
+    return {name: labels.tolist() for name, labels in campaign.labels.items()}
+
+
+def _write_csv(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
+    with _writing(path), whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
 
 
 def with_prediction(
@@ -173,22 +165,11 @@ def with_prediction(
     outside: Sequence[Sequence[str]],
     units: Units,
 ) -> pd.DataFrame:
-    """Return samples with what is predicted of them.
+    """Return N samples of a robot with what is predicted of them; measured columns of theirs go, all others stay.
 
-    Parameters
-    ----------
-    samples
-        N rows; their other columns are kept as they stand, but for those of measurements.
-    robot
-        Whose table it is.
-    position, std
-        (N, 3) m: of the target, and one standard deviation per axis.
-    orientation
-        (N, 4) unit quaternions wxyz, or ``None``.
-    outside
-        Per row: names of the columns in which it leaves what was measured.
-    units
-        Lengths are given in their length unit.
+    ``position`` and ``std`` are (N, 3) m, of the target and one standard deviation per axis, and are given in the
+    length unit; ``orientation`` (N, 4) unit quaternions wxyz; ``outside`` names per row the columns in which it leaves
+    what was measured.
     """
     place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
     turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
@@ -204,34 +185,18 @@ def with_commands(
     direction: ArrayLike,
     units: Units,
 ) -> pd.DataFrame:
-    """Return samples with corrected commands in the place of their joint positions.
+    """Return N samples of a robot with corrected commands, (N, n) rad or m, in the place of their joint positions.
 
-    Parameters
-    ----------
-    samples
-        N rows; their other columns are kept as they stand, but for those of measurements.
-    robot
-        Whose joints they are.
-    q
-        (N, n) rad or m: what to command.
-    std
-        (N, 3) m: one standard deviation per axis of where the target will be.
-    outside
-        Per row: names of the columns in which it leaves what was measured.
-    direction
-        (N,) rad by which the target's direction is missed.
-    units
-        Of the table's joints and lengths.
+    ``std`` (N, 3) m and ``outside`` are as of :func:`with_prediction`; ``direction`` (N,) rad is by how much the
+    target's direction is missed. All is given in the units of the table.
     """
-    commanded = dict(zip(robot.joint_names, np.asarray(q).T, strict=True))
     found = headings(samples.columns, robot)
-    called = {heading.column: (joint, heading.unit) for joint, heading in found.items()}
-    scales = {j: units.joint_scale(kind) for j, kind in zip(robot.joint_names, robot.joint_types, strict=True)}
-    own = {}
-    for name in map(str, samples.columns):
-        joint, unit = called.get(name.strip(), (name.strip(), None))
-        if joint in commanded:
-            own[name] = commanded[joint] / ((LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else scales[joint])
+    own, there = {}, {str(name).strip(): str(name) for name in samples.columns}
+    for joint, kind, commanded in zip(robot.joint_names, robot.joint_types, np.asarray(q).T, strict=True):
+        column, unit = found.get(joint, Heading(joint, None))
+        scale = (LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else units.joint_scale(kind)
+        if column in there:
+            own[there[column]] = commanded / scale
     missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
     return _beside(samples.assign(**own), found, {**_known(std, outside, units), **missed})
 
@@ -245,12 +210,9 @@ def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> di
 def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[str, Any]) -> pd.DataFrame:
     """Return samples with further columns; theirs of these names, and measured ones, whatever they are called, go."""
     called = {heading.column: name for name, heading in found.items()}
-
-    def goes(column: str) -> bool:
-        name = called.get(column, column)
-        return name in names.MEASURED or names.target_of(name) is not None or column in columns
-
-    return samples[[name for name in samples.columns if not goes(str(name).strip())]].assign(**columns)
+    meant = [called.get(str(name).strip(), str(name).strip()) for name in samples.columns]
+    goes = [name in names.MEASURED or names.target_of(name) is not None or name in columns for name in meant]
+    return samples.loc[:, ~np.array(goes, dtype=bool)].assign(**columns)
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
@@ -262,64 +224,25 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
         A file that cannot be written, or Parquet without pyarrow.
     """
     try:
-        with whole(path) as place:
+        with _writing(Path(path)), whole(path) as place:
             if Path(path).suffix.lower() in PARQUET:
                 predictions.to_parquet(place, index=False)
             else:
                 predictions.to_csv(place, index=False, lineterminator="\n")
     except ImportError as error:
         raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
-    except OSError as error:
-        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
-
-
-def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
-    """Yield the numeric columns by name, in the units of the file."""
-    robot, units = campaign.robot, campaign.units
-    for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-        yield joint, campaign.q[:, j] / units.joint_scale(kind)
-    several = campaign.targets
-    if several is not None:
-        for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
-            yield from zip(names.axes_of(number), points / units.length_scale, strict=True)
-    for group, values, scale in (
-        (names.POSITION, None if several else campaign.position, units.length_scale),
-        (names.ORIENTATION, None if several else campaign.orientation, 1.0),
-        (names.SIMULATED_POSITION, campaign.simulated_position, units.length_scale),
-        (names.SIMULATED_ORIENTATION, campaign.simulated_orientation, 1.0),
-    ):
-        if values is not None:
-            yield from zip(group, values.T / scale, strict=True)
-    if campaign.noise_of_rows is not None:
-        yield names.NOISE, campaign.noise_of_rows / units.length_scale
-    for name, values in campaign.covariates.items():
-        yield name, values / covariate_scale(name, robot, units)
-
-
-def _labelled(campaign: Campaign) -> dict[str, list[str]]:
-    return {name: [str(label) for label in labels] for name, labels in campaign.labels.items()}
-
-
-def _write_csv(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
-    try:
-        with whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*columns.values(), strict=True))
-    except OSError as error:
-        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
 
 def _document(campaign: Campaign) -> dict[str, Any]:
     """Return campaign.toml as a dict, lengths in the campaign's unit."""
-    settings = campaign.settings
+    settings, several = campaign.settings, campaign.targets
     scale = settings.units.length_scale
     noise: dict[str, float] = {}
-    several = campaign.targets
     if settings.noise_position is not None and campaign.noise_of_rows is None:
         noise["position"] = of_a_point(settings.noise_position, several) / scale
     if settings.noise_orientation is not None and several is None:
         noise["orientation"] = settings.noise_orientation
+    units = {"angle_unit": settings.units.angle, "length_unit": settings.units.length}
     document: dict[str, Any] = {
         "robot": {
             "urdf": ROBOT_NAME,
@@ -329,11 +252,7 @@ def _document(campaign: Campaign) -> dict[str, Any]:
             "moves": settings.moves,
             "reference_temperature": settings.reference_temperature,
         },
-        "measurements": {
-            "file": TABLE_NAME,
-            "angle_unit": settings.units.angle,
-            "length_unit": settings.units.length,
-        },
+        "measurements": {"file": TABLE_NAME, **units},
         "frames": {
             "base": "known" if settings.base_known else "unknown",
             "tool": "known" if settings.tool_known else "unknown",
@@ -345,21 +264,3 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "gears": dict(settings.gears),
     }
     return {section: content for section, content in document.items() if content}
-
-
-def frame(campaign: Campaign) -> pd.DataFrame:
-    """Return the table as :func:`~thermal_robot.campaign.write.write_table` would write it.
-
-    Its ``attrs`` hold the units, so that :func:`~thermal_robot.campaign_from_table` need not be told them.
-    """
-    import pandas as pd
-
-    labels = {name: labels.astype(object) for name, labels in campaign.labels.items()}
-    shown = pd.DataFrame({**dict(table_columns(campaign)), **labels}, index=pd.Index(campaign.rows, name="row"))
-    shown.attrs = {"angle_unit": campaign.units.angle, "length_unit": campaign.units.length}
-    return shown
-
-
-def html(campaign: Campaign) -> str:
-    """Return robot, frames, joints, conditions and warnings as tables."""
-    return described_html(campaign)

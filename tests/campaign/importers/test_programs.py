@@ -17,20 +17,18 @@ TURNS = np.array([[10.0, 20.0, -30.0], [0, 90, 0], [-170, 5, 3], [1, 2, 3]])
 NAMES = ("P1", "P2", "corner", "P10")
 
 
-def kuka_dat(kind: str, names=NAMES) -> str:
-    rows = []
-    for name, axes, place, turn in zip(names, AXES, PLACES, TURNS, strict=True):
-        fields = zip(("A1", "A2", "A3", "A4", "A5", "A6") if kind == "E6AXIS" else ("X", "Y", "Z", "A", "B", "C"),
-                     axes if kind == "E6AXIS" else [*place, *turn], strict=True)  # fmt: skip
-        rest = "" if kind == "E6AXIS" else ",S 2,T 35"
-        told = ",".join(f"{key} {value:.6g}" for key, value in fields)
-        rows.append(f"DECL {kind} X{name}={{{told}{rest},E1 0.0,E2 0.0}}\n"
-                    f'DECL FDAT F{name}={{TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE,POINT2[] " "}}')  # fmt: skip
+def kuka_dat(kind: str) -> str:
+    keys = [f"A{k}" for k in range(1, 7)] if kind == "E6AXIS" else list("XYZABC")
+    figures, rest = (AXES, "") if kind == "E6AXIS" else (np.hstack([PLACES, TURNS]), ",S 2,T 35")
+    rows = [
+        f"DECL {kind} X{name}={{{','.join(f'{key} {value:.6g}' for key, value in zip(keys, row, strict=True))}{rest},"
+        f'E1 0.0,E2 0.0}}\nDECL FDAT F{name}={{TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE,POINT2[] " "}}'
+        for name, row in zip(NAMES, figures, strict=True)
+    ]
     head = "&ACCESS RVP\nDEFDAT  CALIB PUBLIC\nEXT  BAS (BAS_COMMAND  :IN,REAL  :IN )\n"
-    noise = (
-        "TOOL_DATA[1]={X 1.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0}\nLOAD_DATA[1]={M 5.0,CM {X 0.0,Y 0.0,Z 9.0,A 0,B 0,C 0}}\n"
-    )
-    return head + noise + "\n".join(rows) + "\n;DECL E6AXIS XOLD={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nENDDAT\n"
+    head += "TOOL_DATA[1]={X 1.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0}\n"
+    head += "LOAD_DATA[1]={M 5.0,CM {X 0.0,Y 0.0,Z 9.0,A 0,B 0,C 0}}\n"
+    return head + "\n".join(rows) + "\n;DECL E6AXIS XOLD={A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nENDDAT\n"
 
 
 def bracket(values) -> str:
@@ -47,9 +45,9 @@ def rapid(kind: str, moves: str = "") -> str:
     )
     rows = []
     for name, axes, place, turn in zip(NAMES, AXES, PLACES, QUATERNIONS, strict=True):
-        values = f"[{bracket(axes)},{EXTERNAL}]" if kind == "jointtarget" else (
-            f"[{bracket(place)},{bracket(turn)},[0,-1,0,4],{EXTERNAL}]")  # fmt: skip
-        rows.append(f"  LOCAL CONST {kind} {name}:= {values};  ! a comment; of any kind := [[1,2,3,4,5,6],{EXTERNAL}]")
+        told = bracket(axes) if kind == "jointtarget" else f"{bracket(place)},{bracket(turn)},[0,-1,0,4]"
+        remark = f"! a comment; of any kind := [[1,2,3,4,5,6],{EXTERNAL}]"
+        rows.append(f"  LOCAL CONST {kind} {name}:= [{told},{EXTERNAL}];  {remark}")
     return head + "\n".join(rows) + f"\nPROC main()\n{moves}ENDPROC\nENDMODULE\n"
 
 

@@ -1,10 +1,13 @@
-"""What an import writes, and what it never overwrites."""
+"""What an import writes, and what it never overwrites; the registry of formats, and the page that tells of it."""
+
+import inspect
+from pathlib import Path
 
 import pytest
 from campaign.importers.written import COMMANDS, put
 
 from thermal_robot.campaign.importers.plan import planned
-from thermal_robot.campaign.importers.run import import_files
+from thermal_robot.campaign.importers.run import FORMATS, import_files
 from thermal_robot.errors import CampaignError
 
 
@@ -47,3 +50,18 @@ def test_a_campaign_that_was_not_imported_is_not_replaced(tmp_path):
     with pytest.raises(CampaignError, match="there is a campaign already"):
         import_files("table", [folder / "measurements.csv"], again, plan)
     assert file.read_text(encoding="utf-8") == own
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_format_says_what_it_reads_and_cites_its_source(name):
+    format = FORMATS[name]
+    assert format.does
+    assert format.files
+    assert 1 <= format.least <= format.most <= 2
+    told = inspect.getmodule(getattr(format.read, "func", format.read)).__doc__
+    assert name == "table" or "Source" in told or "ros_csv" in told
+
+
+def test_the_page_has_every_format():
+    page = (Path(__file__).parents[3] / "docs" / "importers.md").read_text(encoding="utf-8")
+    assert [name for name in FORMATS if f"| `{name}` |" not in page] == []

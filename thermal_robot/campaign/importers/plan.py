@@ -7,18 +7,18 @@ instants; orientations quaternions, angles, vectors or matrices.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.checked import no_orientation
+from thermal_robot.campaign.checked import first_true, no_orientation
 from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document
 from thermal_robot.campaign.names import did_you_mean, listed
@@ -30,25 +30,12 @@ from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import (
-    NOT_NEGATIVE,
-    POSITIVE,
-    Kind,
-    MisfitError,
-    below,
-    boolean,
-    number,
-    record,
-    text,
-    whole,
-    word,
-)
+from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, MisfitError, below, boolean, number, record, text, word
 from thermal_robot.schema import listed as list_of
+from thermal_robot.schema import whole as whole_number
 from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
-JOINTS = "joints"
-"""Key of the list that names the columns of all joints, in the order of the chain."""
-_NUMBER = number()
+JOINTS = "joints"  # Key of the list that names the columns of all joints, in the order of the chain
 
 
 @dataclass(frozen=True)
@@ -56,40 +43,37 @@ class Column:
     """Where the values of one column come from: the sum of some columns, times ``scale``, plus ``offset``."""
 
     sources: tuple[str | int, ...] = ()  # names of columns, or numbers from 1; several are added
-    # scale, offset: in the unit that the campaign's column has
-    scale: float = 1.0
+    scale: float = 1.0  # and offset: in the unit that the campaign's column has
     offset: float = 0.0
     time: str = ""  # pattern of an instant, as of :meth:`datetime.datetime.strptime`; empty for numbers
     since_first: bool = False  # whether the smallest value is taken off, as of a clock that began elsewhere
     value: float | str | None = None  # the same number or text in every row, instead of a source
-    counted: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
+    count: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
 
-    def numbers(self, table: Table) -> NDArray[np.float64]:
+    def numbers(self, table: Table) -> Array:
         """Return (N,) numbers, NaN where a cell is empty; refuse text and an instant of another pattern."""
-        if self.counted:
-            return np.arange(float(len(table.rows)))
-        if self.value is not None:
-            return np.full(len(table.rows), float(self.value))
-        values = np.zeros(len(table.rows))
+        rows = len(table.rows)
+        if self.count or self.value is not None:
+            return np.arange(float(rows)) if self.count else np.full(rows, float(self.value or 0.0))
+        values = np.zeros(rows)
         for source in self.sources:
             name = found(table, source)
             values += self._instants(table, name) if self.time else table.numbers(name, gaps=True)
         values = values * self.scale + self.offset
-        if self.since_first or self.time:
-            values = values - np.nanmin(values)
-        return values
+        return values - np.nanmin(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
         """Return the unit that its header names; none of a sum, or where another scale than a sign is stated."""
         plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
         return bare(found(table, self.sources[0])).unit if plain else None
 
-    def complete(self, table: Table, name: str = "") -> NDArray[np.float64]:
+    def complete(self, table: Table, name: str = "") -> Array:
         """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column, for a message."""
         values = self.numbers(table)
-        if np.isnan(values).any():
+        index = first_true(np.isnan(values))
+        if index is not None:
             problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
-            index, column = int(np.argmax(np.isnan(values))), " + ".join(map(str, self.sources))
+            column = " + ".join(map(str, self.sources))
             raise table.error(problem, column, index, found="an empty cell", expected="a number")
         return values
 
@@ -97,21 +81,19 @@ class Column:
         """Return N texts; those of several columns with a blank between."""
         if self.value is not None:
             return [str(self.value)] * len(table.rows)
-        parts = [table.text(found(table, source)) for source in self.sources]
-        return [" ".join(row) for row in zip(*parts, strict=True)]
+        return [" ".join(row) for row in zip(*(table.text(found(table, each)) for each in self.sources), strict=True)]
 
-    def _instants(self, table: Table, name: str) -> NDArray[np.float64]:
+    def _instants(self, table: Table, name: str) -> Array:
         """(N,) s since some instant."""
         seconds = np.full(len(table.rows), np.nan)
         for k, cell in enumerate(table.text(name)):
-            if not cell:
-                continue
             try:
-                instant = datetime.strptime(cell, self.time)
+                instant = datetime.strptime(cell, self.time) if cell else None
             except ValueError:
                 told = {"found": repr(cell), "expected": repr(self.time)}
                 raise table.error("no instant of this pattern", name, k, **told) from None
-            seconds[k] = (instant if instant.tzinfo else instant.replace(tzinfo=timezone.utc)).timestamp()
+            if instant:
+                seconds[k] = (instant if instant.tzinfo else instant.replace(tzinfo=timezone.utc)).timestamp()
         return seconds
 
 
@@ -126,30 +108,24 @@ def found(table: Table, source: str | int) -> str:
     if len(known) == 1:
         return known[0]
     meant = did_you_mean(str(source), names) if isinstance(source, str) else ""
-    problem = f"there is no such column{meant}{table.headless}"
     there = f"the columns {listed(names)}" if table.header else f"{len(names)} columns without names"
-    raise table.error(problem, str(source), found=there, expected="a name or a number of one of them")
+    problem, expected = f"there is no such column{meant}{table.headless}", "a name or a number of one of them"
+    raise table.error(problem, str(source), found=there, expected=expected)
 
 
-def _source(value: Any, path: str) -> str | int:
-    """Take the name of a column, or its number."""
-    kind: Kind = whole(1) if isinstance(value, int) else text("the name of a column, or its number from 1")
-    taken: str | int = kind(value, path)
-    return taken
+def _either(of_text: Kind, other: Kind, kind: type) -> Kind:
+    """Take a value of a type by one kind, any other value by another."""
+    return lambda value, path: (of_text if isinstance(value, kind) else other)(value, path)
 
 
-def _figure_or_text(value: Any, path: str) -> float | str:
-    taken: float | str = text("a number or text")(value, path) if isinstance(value, str) else _NUMBER(value, path)
-    return taken
-
-
+_SOURCE = _either(whole_number(1), text("the name of a column, or its number from 1"), int)
 _FIELDS: dict[str, Kind] = {
-    "column": _source,
-    "sum": list_of(_source),
-    "value": _figure_or_text,
+    "column": _SOURCE,
+    "sum": list_of(_SOURCE),
+    "value": _either(text("a number or text"), number(), str),
     "count": boolean,
-    "scale": _NUMBER,
-    "offset": _NUMBER,
+    "scale": number(),
+    "offset": number(),
     "time": text("a pattern such as %Y%m%d%H%M%S"),
     "since_first": boolean,
 }
@@ -159,21 +135,20 @@ _ORIGINS = ("column", "sum", "value", "count")
 def column_kind(value: Any, path: str) -> Column:
     """Take where a column comes from: a name, a number, or an inline table."""
     if not isinstance(value, Mapping):
-        return Column((_source(value, path),))
+        return Column((_SOURCE(value, path),))
     given = record(_FIELDS, may_lack=_FIELDS)(value, path)
     if len([key for key in _ORIGINS if key in given]) != 1:
         raise MisfitError(path, value, f"one of the keys {', '.join(_ORIGINS)}")
-    sources = (given["column"],) if "column" in given else given.get("sum", ())
-    rest = {key: given[key] for key in ("scale", "offset", "time", "since_first", "value") if key in given}
-    return Column(sources, counted=given.get("count", False), **rest)
+    sources = (given.pop("column"),) if "column" in given else given.pop("sum", ())
+    return Column(sources, **given)
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
     """Take where the columns come from: by their name in a campaign, and ``joints`` as a list of sources."""
     if not isinstance(value, Mapping):
         raise MisfitError(path, value, "columns by name")
-    kinds: dict[str, Kind] = dict.fromkeys(value, column_kind) | {JOINTS: list_of(column_kind)}
-    return {name: kinds[name](given, below(path, name)) for name, given in value.items()}
+    joints = list_of(column_kind)
+    return {name: (joints if name == JOINTS else column_kind)(v, below(path, name)) for name, v in value.items()}
 
 
 QUATERNION, EULER, VECTOR, MATRIX = "quaternion", "euler", "rotation_vector", "matrix"
@@ -183,8 +158,7 @@ _SEQUENCES = tuple(
     "".join(axes) for letters in ("XYZ", "xyz") for axes in itertools.product(letters, repeat=3)
     if axes[0] != axes[1] != axes[2]
 )  # fmt: skip
-_TURNED = 0.01
-"""By how much the product of a matrix with its transpose may differ from 1: figures with two decimals do."""
+_TURNED = 0.01  # By how much the product of a matrix with its transpose may differ from 1: figures with two decimals do
 
 
 @dataclass(frozen=True)
@@ -193,14 +167,14 @@ class Orientation:
 
     kind: str  # one of those above
     columns: tuple[Column, ...]  # where the figures come from; of a matrix row by row
-    scalar_last: bool = False  # whether a quaternion is x y z w instead of w x y z
+    order: str = "wxyz"  # of a quaternion
     # axes of Euler angles, in the order of the columns: capitals turn about the moving axes, small letters about the
     # fixed ones
     sequence: str = "XYZ"
     unit: str = "rad"  # of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``, where no header names one
     inverse: bool = False  # whether they turn vectors of the measurement frame into the target's
 
-    def quaternions(self, table: Table) -> NDArray[np.float64]:
+    def quaternions(self, table: Table) -> Array:
         """Return (N, 4) unit quaternions wxyz, which turn vectors of the target's frame into the measurement frame.
 
         Refused are a missing figure, a quaternion whose length is not 1, a matrix that is no rotation.
@@ -212,7 +186,7 @@ class Orientation:
             figures *= [ANGLE_UNITS.get(c.header_unit(table) or "", ANGLE_UNITS[self.unit]) for c in self.columns]
         if self.kind == QUATERNION:
             self._refuse(table, no_orientation(figures), "a quaternion whose length is not 1", figures)
-            turned = Rotation.from_quat(figures, scalar_first=not self.scalar_last)
+            turned = Rotation.from_quat(figures, scalar_first=self.order == "wxyz")
         elif self.kind == EULER:
             turned = Rotation.from_euler(self.sequence, figures)
         elif self.kind == VECTOR:
@@ -221,12 +195,11 @@ class Orientation:
             matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
             away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _TURNED
             away |= np.linalg.det(matrices) < 0
-            self._refuse(table, int(np.argmax(away)) if away.any() else None, "a matrix that is no rotation", figures)
+            self._refuse(table, first_true(away), "a matrix that is no rotation", figures)
             turned = Rotation.from_matrix(matrices)
-        quaternions: NDArray[np.float64] = (turned.inv() if self.inverse else turned).as_quat(scalar_first=True)
-        return quaternions
+        return np.asarray((turned.inv() if self.inverse else turned).as_quat(scalar_first=True))
 
-    def _refuse(self, table: Table, index: int | None, problem: str, figures: NDArray[np.float64]) -> None:
+    def _refuse(self, table: Table, index: int | None, problem: str, figures: Array) -> None:
         if index is not None:
             column = str((self.columns[0].sources or ("orientation",))[0])
             told = ", ".join(f"{figure:g}" for figure in figures[index])
@@ -250,28 +223,24 @@ _KEYS = {
 
 def orientation_kind(value: Any, path: str) -> dict[str, Orientation]:
     """Take how orientations are written; the one entry of the section is called ``stated``."""
-    if isinstance(value, Mapping) and isinstance(value.get("stated"), Orientation):
-        return dict(value)
     given = record(_KEYS, may_lack=("order", "sequence", "unit", "inverse"))(value, path)
-    counts = _COUNTS[given["kind"]]
+    kind, counts = given["kind"], _COUNTS[given["kind"]]
     if len(given["columns"]) not in counts:
-        expected = f"a list of {' or '.join(map(str, counts))} columns for a {given['kind']}"
+        expected = f"a list of {' or '.join(map(str, counts))} columns for a {kind}"
         raise MisfitError(f"{path}.columns", value["columns"], expected)
     for key, kinds in (("sequence", (EULER,)), ("unit", (EULER, VECTOR)), ("order", (QUATERNION,))):
-        if (given["kind"] in kinds) != (key in given):
-            problem = "is missing" if given["kind"] in kinds else f"a {given['kind']} has none"
-            raise MisfitError(f"{path}.{key}", given.get(key), "a value" if given["kind"] in kinds else "none", problem)
-    plain = {key: given[key] for key in ("kind", "columns", "sequence", "unit", "inverse") if key in given}
-    return {"stated": Orientation(scalar_last=given.get("order") == "xyzw", **plain)}
+        if (kind in kinds) != (key in given):
+            problem, expected = ("is missing", "a value") if kind in kinds else (f"a {kind} has none", "none")
+            raise MisfitError(f"{path}.{key}", given.get(key), expected, problem)
+    return {"stated": Orientation(**given)}
 
 
-JOINING = ("key", "targets")
-"""What ``[table]`` says of names, and not of how a file is laid out."""
+JOINING = ("key", "targets")  # What ``[table]`` says of names, and not of how a file is laid out
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
 _NAME = text("a name")
 _LAID_OUT: Mapping[str, Kind] = {
     "separator": word(_SEPARATORS),
-    "skip": whole(0),
+    "skip": whole_number(0),
     "header": boolean,
     "comment": text("the first letters of a comment"),
 }
@@ -283,14 +252,10 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "columns": columns_kind,
     "orientation": orientation_kind,
     "recording": {
-        "joints": _NAME,
-        "pose": _NAME,
-        "sensor": _NAME,
-        "feature": whole(1),
+        **dict.fromkeys(("joints", "pose", "sensor"), _NAME),
+        "feature": whole_number(1),
         "offset": number(),
-        "tolerance": POSITIVE,
-        "standstill": POSITIVE,
-        "velocity": POSITIVE,
+        **dict.fromkeys(("tolerance", "standstill", "velocity"), POSITIVE),
         "settling": NOT_NEGATIVE,
     },
 }
@@ -310,13 +275,9 @@ class Plan:
         return self.sections.get(section, {}).get(key, default)
 
     def over(self, other: Plan) -> Plan:
-        """Return this plan with what it does not state taken from another; an orientation is stated as a whole."""
-        merged = {
-            section: dict(self.sections.get(section) or other.sections.get(section, {}))
-            if section == "orientation"
-            else {**other.sections.get(section, {}), **self.sections.get(section, {})}
-            for section in {**other.sections, **self.sections}
-        }
+        """Return this plan with what it does not state taken from another."""
+        both = {*other.sections, *self.sections}
+        merged = {each: {**other.sections.get(each, {}), **self.sections.get(each, {})} for each in both}
         return Plan(self.file or other.file, merged)
 
     def layout(self, section: str = "table") -> Layout:
@@ -376,13 +337,11 @@ class Source:
 class Format:
     """A format that can be imported."""
 
-    # does, files: what it reads, and which files, for the help
-    does: str
+    does: str  # what it reads, and files: which files, for the help
     files: str
     # makes a table of them, and says as a mapping would what its columns are
     read: Callable[[Sequence[Path], Plan], Source]
-    # least, most: how many files it has
-    least: int = 1
+    least: int = 1  # and most: how many files it has
     most: int = 2
 
     def source(self, files: Sequence[Path], plan: Plan) -> Source:
@@ -394,58 +353,46 @@ class Format:
 def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
     """Refuse another number of files than a format has, naming what is expected."""
     if not least <= len(files) <= most:
-        raise CampaignError(
-            "FILES", "another number of files than this format has", found=str(len(files)), expected=expected
-        )
+        problem = "another number of files than this format has"
+        raise CampaignError("FILES", problem, found=str(len(files)), expected=expected)
 
 
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
     """Return the campaign of a table, and in sentences how many rows it has and what was left out.
 
-    Parameters
-    ----------
-    source
-        The table, with what its format says of it.
-    plan
-        All that is said of it, the user's mapping first.
-    robot
-        Whose joints the columns command.
-    name
-        Of the campaign.
-
-    Raises
-    ------
-    CampaignError
-        Whatever cannot be used, with row and column of the table.
+    ``plan`` is all that is said of the table, the user's mapping first. What cannot be used is refused with row and
+    column of the table.
     """
     table = source.table
     columns = _columns(table, plan, robot)
     plan = plan.over(planned({"measurements": _units(table, columns, robot)}))
     settings = plan.settings(robot)
     columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
-    measured = np.zeros(len(table.rows), dtype=bool)
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
+    measured = np.zeros(len(table.rows), dtype=bool)
     for axis in places:
         measured |= ~np.isnan(columns[axis].numbers(table))
-    whole = set(names.POSITION) <= set(columns) or any(map(names.target_of, places))
-    if not measured.any() and whole:
-        raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
-    notes = [f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
-    if not measured.all() and whole:
+    notes = [*source.notes, f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
+    if not measured.all() and (set(names.POSITION) <= set(columns) or any(map(names.target_of, places))):
+        if not measured.any():
+            raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
         notes.append(f"{table.told(~measured)} left out, without a measured position")
         table = table.take(measured)
     cells = _cells(table, columns, robot)
+    used = list(columns.values())
     orientation = plan.get("orientation", "stated")
     if orientation is not None:
         cells.update(zip(names.ORIENTATION, orientation.quaternions(table).T, strict=True))
-    spare = _spare(table, columns.values(), () if orientation is None else orientation.columns)
+        used += orientation.columns
+    taken = {found(table, source) for column in used for source in column.sources}
+    spare = [name for name in table.columns if name not in taken]
     if spare:
         notes.append(f"columns left out: {listed(spare)}")
     ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings)
     campaign = build_campaign(ready, settings, robot, name=name)
     # what follows from the order of the rows is not recorded: it will follow again
     kept = {name: values for name, values in campaign.covariates.items() if name not in campaign.derived}
-    return replace(campaign, covariates=kept, derived=()), (*source.notes, *notes)
+    return replace(campaign, covariates=kept, derived=()), tuple(notes)
 
 
 def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
@@ -453,17 +400,14 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     stated = dict(plan.sections.get("columns", {}))
     joints = stated.pop(JOINTS, ())
     if joints and len(joints) != robot.n:
-        raise CampaignError(
-            plan.file or table.file,
-            "another number of joints than the chain has",
-            column=f"columns.{JOINTS}",
-            found=str(len(joints)),
-            expected=f"{robot.n}: {listed(robot.joint_names)}",
-        )
+        found, expected = str(len(joints)), f"{robot.n}: {listed(robot.joint_names)}"
+        problem, column = "another number of joints than the chain has", f"columns.{JOINTS}"
+        raise CampaignError(plan.file or table.file, problem, column=column, found=found, expected=expected)
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    own = {name: name for name in table.columns if _defined(name, robot)}
+    known = {*names.RESERVED, *robot.joint_names, *names.conditions(robot.joint_names, robot.urdf_links)}
+    own = {name: name for name in table.columns if name in known or names.target_of(name) is not None}
     own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
     found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
     in_order = dict(zip(robot.joint_names, joints, strict=bool(joints)))
@@ -472,35 +416,24 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
 
 def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
     """Return the units of angles and lengths that headers name, of the first column that has one."""
-    said = {name: columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns}
+    said = [columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns]
     kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
-    return {key: unit for key, kind in kinds.items() for unit in reversed(said.values()) if unit in kind}
+    return {key: unit for key, kind in kinds.items() for unit in reversed(said) if unit in kind}
 
 
 def _in_units(column: Column, table: Table, unit: str) -> Column:
     """Return a column whose header's unit is converted to that of the campaign's."""
-    scale = size(column.header_unit(table), unit) if unit else 1.0
-    return column if scale in (1.0, None) else replace(column, scale=column.scale * scale)
-
-
-def _defined(name: str, robot: Robot) -> bool:
-    """Return whether the format of a campaign defines a column of this name for the robot."""
-    known = (*names.RESERVED, *robot.joint_names, *names.conditions(robot.joint_names, robot.urdf_links))
-    return name in known or names.target_of(name) is not None
+    scale = size(column.header_unit(table), unit) if unit else None
+    return column if scale is None else replace(column, scale=column.scale * scale)
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:
     """Return the campaign's columns; none of a command or a measurement may have a gap."""
-    whole = (*robot.joint_names, *names.POSITION)
+    whole = [name for name in (*robot.joint_names, *names.POSITION) if name in columns]
     cells: dict[str, Cells] = {}
-    for name in dict.fromkeys([*(n for n in whole if n in columns), *columns]):
+    for name in dict.fromkeys([*whole, *columns]):
         if name in names.LABELS:
             cells[name] = columns[name].text(table)
         else:
             cells[name] = columns[name].complete(table, name) if name in whole else columns[name].numbers(table)
     return cells
-
-
-def _spare(table: Table, columns: Iterable[Column], oriented: Iterable[Column]) -> list[str]:
-    used = {found(table, source) for column in (*columns, *oriented) for source in column.sources}
-    return [name for name in table.columns if name not in used]

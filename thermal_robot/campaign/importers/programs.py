@@ -32,8 +32,7 @@ from thermal_robot.files import is_file
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?"
 _AXIS = r"A\d|E\d|[re]ax_\w"
-_ABSENT = 8.9e9
-"""An external axis that ABB's controller does not have is 9E9."""
+_ABSENT = 8.9e9  # An external axis that ABB's controller does not have is 9E9
 _EXTERNAL = tuple(f"eax_{letter}" for letter in "abcdef")
 _TARGETS = {
     (6, 6): (*(f"rax_{k}" for k in range(1, 7)), *_EXTERNAL),
@@ -111,7 +110,10 @@ def _program(file: Path, language: Language) -> Table:
     declared: dict[str, list[Point]] = {}
     moved: list[tuple[str, Point]] = []
     for each in dict.fromkeys((*beside, file)):
-        for found in language.statements.finditer(_text(each, language.comment)):
+        if not is_file(each) or each.stat().st_size > LARGEST_TABLE:
+            raise CampaignError(str(each), "there is no such file, or it is too large", expected="a program")
+        text = re.sub(rf"{language.comment}[^\n]*", "", each.read_bytes().decode("utf-8", errors="replace"))
+        for found in language.statements.finditer(text):
             name, to = ((found[key] or "").upper() for key in ("name", "to"))
             points = declared.get(to, []) if to else language.points(found["figures"])
             points = [point for point in points if language.first in point or "X" in point]
@@ -119,15 +121,7 @@ def _program(file: Path, language: Language) -> Table:
                 declared[name] = points
             moved += [] if name else [(to, point) for point in points]
     named = moved or [(name, point) for name, several in declared.items() for point in several]
-    table = table_from_frame(pd.DataFrame([{"name": name, **point} for name, point in named] or [{"name": ""}]))
-    return replace(table, file=str(file))
-
-
-def _text(file: Path, comment: str) -> str:
-    """Return the text of a program without its comments."""
-    if not is_file(file) or file.stat().st_size > LARGEST_TABLE:
-        raise CampaignError(str(file), "there is no such file, or it is too large", expected="a program")
-    return re.sub(rf"{comment}[^\n]*", "", file.read_bytes().decode("utf-8", errors="replace"))
+    return table_from_frame(pd.DataFrame([{"name": name, **point} for name, point in named or [("", {})]]), str(file))
 
 
 def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
@@ -140,12 +134,10 @@ def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
     ]
     driven = [table for table in tables if language.first in table.columns]
     if len(driven) != 1 or len(tables) != 2:
-        raise CampaignError(
-            " and ".join(map(str, files)),
-            f"files with axes ({language.first} …), which are commands, and with places, which were measured",
-            found=f"{len(driven)} and {len(tables) - len(driven)}",
-            expected="one of each: a place tells no posture, and is no command",
-        )
+        problem = f"files with axes ({language.first} …), which are commands, and with places, which were measured"
+        expected = "one of each: a place tells no posture, and is no command"
+        named, found = " and ".join(map(str, files)), f"{len(driven)} and {len(tables) - len(driven)}"
+        raise CampaignError(named, problem, found=found, expected=expected)
     measured = next(table for table in tables if table is not driven[0])
     there = {name: cells for name, cells in measured.columns.items() if not re.fullmatch(_AXIS, name)}
     whole = driven[0].take(~np.isnan(driven[0].numbers(language.first, gaps=True)))

@@ -41,15 +41,15 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another."""
     file = next((file for file in files if is_yaml(file)), files[0])
     documents = read_yaml(file)
-    if len(documents) == 1 and isinstance(documents[0], list) and any(_is_sample(item) for item in documents[0]):
-        documents = documents[0]  # samples in one list rather than in documents of their own
-    if len(documents) == 1 and isinstance(documents[0], list):
-        commands = _table(str(file), [_pose(str(file), k, pose) for k, pose in enumerate(documents[0])])
+    listed_once = documents[0] if len(documents) == 1 and isinstance(documents[0], list) else []
+    if any(isinstance(item, dict) and "observations" in item for item in listed_once):
+        documents = listed_once  # samples in one list rather than in documents of their own
+    elif listed_once or documents == [[]]:
+        commands = _table(str(file), [_positions(str(file), k, pose) for k, pose in enumerate(listed_once)])
         tables = [each for each in files if each != file]
         if not tables:
-            raise CampaignError(
-                str(file), "holds poses and no measurements", expected="the table of measured points as a second file"
-            )
+            expected = "the table of measured points as a second file"
+            raise CampaignError(str(file), "holds poses and no measurements", expected=expected)
         both, notes = joined(read_table(tables[0], plan.layout()), commands)
         return Source(both, planned(_UNITS), notes)
     files_of(files, "SAMPLES.yaml, or POSES.yaml MEASURED.csv", 1, 1)
@@ -61,10 +61,6 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     )
 
 
-def _is_sample(item: Any) -> bool:
-    return isinstance(item, dict) and "observations" in item
-
-
 def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
     """Return rows of figures by name as a table; the rows are counted from 1, as samples are."""
     columns = {
@@ -73,14 +69,12 @@ def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
     return Table(file, columns, np.arange(1, len(rows) + 1))
 
 
-def _pose(file: str, index: int, pose: Any) -> dict[str, float]:
-    """Return a capture pose as joint positions by name."""
+def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joints", "positions")) -> dict[str, float]:
+    """Return a capture pose, or the joint states of a sample, as joint positions by name."""
     if not isinstance(pose, dict):
         raise _odd(file, index, pose, "joints and positions")
-    return _positions(file, index, pose.get("joints"), pose.get("positions"))
-
-
-def _positions(file: str, index: int, names: Any, positions: Any) -> dict[str, float]:
+    given: list[Any] = [pose.get(key) for key in keys]
+    names, positions = given
     fits = isinstance(names, list) and isinstance(positions, list) and len(names) == len(positions) > 0
     if not fits or not all(isinstance(p, (int, float)) for p in positions):
         raise _odd(file, index, {"joints": names, "positions": positions}, "as many positions as joints, numbers")
@@ -92,7 +86,7 @@ def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> di
     state = sample.get("joint_states") if isinstance(sample, dict) else None
     if not isinstance(state, dict):
         raise _odd(file, index, sample, "joint_states and observations")
-    row = _positions(file, index, state.get("name"), state.get("position"))
+    row = _positions(file, index, state, ("name", "position"))
     seen = {each["sensor_name"]: each.get("features") or [] for each in _observations(sample)}
     features = seen.get(sensor, [])
     if len(features) < feature:
@@ -112,12 +106,9 @@ def _only_sensor(file: str, documents: Sequence[Any]) -> str:
     """Return the sensor of all observations, where it is one."""
     sensors = sorted({each["sensor_name"] for sample in documents for each in _observations(sample)})
     if len(sensors) != 1:
-        raise CampaignError(
-            file,
-            "it is not clear which sensor measured" if sensors else "there are no observations",
-            found=listed(sensors) if sensors else None,
-            expected="[recording] sensor in the mapping" if sensors else "samples of robot_calibration",
-        )
+        problem = "it is not clear which sensor measured" if sensors else "there are no observations"
+        expected = "[recording] sensor in the mapping" if sensors else "samples of robot_calibration"
+        raise CampaignError(file, problem, found=listed(sensors) if sensors else None, expected=expected)
     return str(sensors[0])
 
 
@@ -132,8 +123,7 @@ ROBOT_CALIBRATION = Format(
 )
 
 
-_UNIVERSE = "universe"
-"""What Pinocchio calls the frame before the first joint: the root of the URDF."""
+_UNIVERSE = "universe"  # What Pinocchio calls the frame before the first joint: the root of the URDF
 
 
 def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
@@ -160,9 +150,8 @@ def _configured(file: Path) -> dict[str, dict[str, Any]]:
     whole = documents[0] if documents and isinstance(documents[0], dict) else {}
     task = _within(whole, "tasks", "calibration") or _within(whole, "calibration")
     if not task:
-        raise CampaignError(
-            str(file), "is no configuration of FIGAROH", key="calibration", expected="tasks.calibration, or calibration"
-        )
+        expected = "tasks.calibration, or calibration"
+        raise CampaignError(str(file), "is no configuration of FIGAROH", key="calibration", expected=expected)
     chain = _within(task, "kinematics") or task
     pose = _within(task, "measurements", "poses").get("tool_pose", task.get("tip_pose"))
     sections: dict[str, dict[str, Any]] = {"robot": {}, "frames": {}}

@@ -18,7 +18,6 @@ the place of the target are fitted together to what was measured in motion.
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -34,24 +33,16 @@ from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.recognise import joint_columns
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table
-from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
 from thermal_robot.kinematics import align, exp3, tool_poses
 from thermal_robot.robot import Robot
 
-WINDOW = 0.2
-"""s over which the velocity of a joint is taken: it averages the steps of an encoder, 1e-5 rad of which are then
-1e-4 rad/s at most."""
-VELOCITY = 1e-3
-"""rad/s or m/s: slower than that a joint stands. In the tolerance of a pair a target 1 m away then moves 50 µm at most,
-and mostly not at all."""
-STANDSTILL = 0.5
-"""s that a robot stands at least: shorter is a turning point, or still swings."""
-SETTLING = 0.25
-"""s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle."""
-TOLERANCE = 0.05
-"""s between a row's instant and the sample paired with it; instruments measure twenty times a second or more."""
+WINDOW = 0.2  # s over which a joint's velocity is taken: steps of an encoder, 1e-5 rad, are then 1e-4 rad/s at most
+VELOCITY = 1e-3  # rad/s or m/s below which a joint stands: a target 1 m away moves 50 µm in a pair's tolerance
+STANDSTILL = 0.5  # s that a robot stands at least: shorter is a turning point, or still swings
+SETTLING = 0.25  # s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle
+TOLERANCE = 0.05  # s between a row's instant and its sample: instruments measure twenty times a second or more
 
 
 @dataclass(frozen=True)
@@ -64,7 +55,7 @@ class Stream:
     names: tuple[str, ...]  # of the k columns: joints, or x y z and perhaps qw qx qy qz
 
     def between(self, times: Array) -> Array:
-        """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
+        """Linear interpolation, (M, k); held beyond the ends."""
         return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
 
     def scaled(self, scale: Array) -> Stream:
@@ -72,7 +63,7 @@ class Stream:
         return replace(self, values=self.values * scale)
 
     def nearest(self, times: Array) -> NDArray[np.int64]:
-        """Return (M,) indices of the samples that are nearest in time."""
+        """Nearest neighbours in time: (M,) indices of samples."""
         after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
         earlier = times - self.time[after - 1] < self.time[after] - times
         return np.where(earlier, after - 1, after)
@@ -83,9 +74,8 @@ def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Strea
     kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
     _, first = np.unique(time[kept], return_index=True)
     if len(first) < 2:
-        raise CampaignError(
-            file, "has fewer than two samples", found=f"{len(first)} of {', '.join(names)}", expected="a recording"
-        )
+        found = f"{len(first)} of {', '.join(names)}"
+        raise CampaignError(file, "has fewer than two samples", found=found, expected="a recording")
     return Stream(file, time[kept][first], values[kept][first], tuple(names))
 
 
@@ -94,8 +84,7 @@ class Pairs:
     """Samples of two recordings at standstill."""
 
     times: Array  # (M,) s, of the robot's clock
-    # joints, target: (M, n) and (M, k) of the samples nearest in time
-    joints: Array
+    joints: Array  # (M, n) of the samples nearest in time, and target: (M, k)
     target: Array
     short: int  # how many standstills were too short
     lonely: int  # how many had no sample of the target within the tolerance
@@ -119,37 +108,27 @@ def paired(
     moved = joints.between(times + WINDOW / 2) - joints.between(times - WINDOW / 2)
     still = np.abs(moved).max(axis=1) <= velocity * WINDOW
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    begins, ends = edges[::2], edges[1::2] - 1
-    long = times[ends] - times[begins] >= standstill
-    middles = (times[begins] + np.minimum(settling, (times[ends] - times[begins]) / 2) + times[ends])[long] / 2
+    begins, ends = times[edges[::2]], times[edges[1::2] - 1]
+    long = ends - begins >= standstill
+    middles = (begins + np.minimum(settling, (ends - begins) / 2) + ends)[long] / 2
     own, seen = joints.nearest(middles), target.nearest(middles - lag)
     near = np.abs(target.time[seen] + lag - middles) <= tolerance
-    return Pairs(
-        middles[near], joints.values[own[near]], target.values[seen[near]], int((~long).sum()), int((~near).sum())
-    )
+    short, lonely = int((~long).sum()), int((~near).sum())
+    return Pairs(middles[near], joints.values[own[near]], target.values[seen[near]], short, lonely)
 
 
-FINEST = 0.005
-"""s between the instants at which speeds are compared: faster than that no joint state is published as a rule."""
-LONGEST = 2_000_000
-"""Instants of either recording that are compared: three hours at the finest step; longer ones take a coarser step."""
-UNEXPLAINED = 0.1
-"""Share of the spread of the measured places that may be left once lag and frames are fitted: a robot that is bent by
-millimetres leaves less than 0.01, two recordings that have nothing to do with each other more than 0.5."""
-MOVING = 0.1
-"""Share of the fastest speed from which a sample tells the time: at rest it does not."""
-MOST = 2000
-"""Samples in motion that are fitted; more take time and add little."""
-BLOCKS = 10
-"""Parts of the recording of which each is left out once: their scatter is the deviation of the lag, whatever the errors
-of the robot that the fit knows nothing of (Tukey's jackknife)."""
-LEAST = 60
-"""Samples in motion that a fit of ten figures and its scatter want."""
+FINEST = 0.005  # s between instants at which speeds are compared: joint states are published no faster as a rule
+LONGEST = 2_000_000  # instants that are compared: three hours at the finest step; longer ones take a coarser step
+UNEXPLAINED = 0.1  # share of the places' spread left by the fit: a bent robot leaves 0.01, foreign recordings 0.5
+MOVING = 0.1  # share of the fastest speed from which a sample tells the time: at rest it does not
+MOST = 2000  # samples in motion that are fitted; more take time and add little
+BLOCKS = 10  # parts of the recording for Tukey's jackknife: honest whatever errors the fit knows nothing of
+LEAST = 60  # samples in motion that a fit of ten figures and its scatter want
 
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much the clocks differ."""
+    """Offset of two clocks."""
 
     value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
     std: float  # one standard deviation, s
@@ -157,7 +136,9 @@ class Lag:
 
 
 def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
-    """Estimate by how much two recordings' clocks differ; refuse those that show no motion in common, or hardly any.
+    """Clock offset by cross-correlation of speeds, then least squares; its deviation by the jackknife.
+
+    Recordings that show no motion in common, or hardly any, are refused.
 
     The target's positions are in any frame that stands still; ``place`` (3,), m, is where it roughly is on the tool.
     """
@@ -169,23 +150,17 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
     inside = (target.time + rough > joints.time[0]) & (target.time + rough < joints.time[-1])
     moving = np.flatnonzero(inside & (speed > MOVING * np.max(speed[inside], initial=0.0)))
     if len(moving) < LEAST:
-        raise CampaignError(
-            target.file,
-            "too few samples are in motion to estimate the offset of the clocks",
-            found=str(len(moving)),
-            expected=f"at least {LEAST}; or [recording] offset in the mapping",
-        )
+        problem = "too few samples are in motion to estimate the offset of the clocks"
+        expected = f"at least {LEAST}; or [recording] offset in the mapping"
+        raise CampaignError(target.file, problem, found=str(len(moving)), expected=expected)
     chosen = moving[np.linspace(0, len(moving) - 1, min(MOST, len(moving))).astype(int)]
-    start = np.concatenate([[rough], np.zeros(6), place])
-    whole, left = _fitted(joints, target, robot, chosen, start)
+    whole, left = _fitted(joints, target, robot, chosen, np.concatenate([[rough], np.zeros(6), place]))
     spread = float(np.linalg.norm(target.values[chosen, :3].std(axis=0)))
     if not left <= UNEXPLAINED * spread:
-        raise CampaignError(
-            f"{joints.file} and {target.file}",
-            "the joints do not move the target as it was measured, however the clocks differ",
-            found=f"{1e3 * left:.0f} mm rms of {1e3 * spread:.0f} mm that no offset explains",
-            expected="recordings of one motion of this robot",
-        )
+        problem = "the joints do not move the target as it was measured, however the clocks differ"
+        found = f"{1e3 * left:.0f} mm rms of {1e3 * spread:.0f} mm that no offset explains"
+        named, expected = f"{joints.file} and {target.file}", "recordings of one motion of this robot"
+        raise CampaignError(named, problem, found=found, expected=expected)
     parts = np.array_split(np.arange(len(chosen)), BLOCKS)
     without = [_fitted(joints, target, robot, np.delete(chosen, part), whole)[0][0] for part in parts]
     deviation = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((np.array(without) - np.mean(without)) ** 2))
@@ -193,34 +168,31 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
 
 
 def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> float:
-    """Return the lag at which the speeds of recordings that begin at 0 are most alike, s."""
+    """Lag of the largest cross-correlation of the speeds of recordings that begin at 0, s."""
     from scipy.signal import correlate, correlation_lags
 
-    spans = [stream.time[-1] - stream.time[0] for stream in (joints, target)]
+    spans = [stream.time[-1] for stream in (joints, target)]
     usual = [float(np.median(np.diff(stream.time))) for stream in (joints, target)]
-    step = max(FINEST, max(usual), max(spans) / LONGEST)
-    grids = [np.arange(0.0, span, step) for span in spans]
+    step = max(FINEST, *usual, max(spans) / LONGEST)
     poses = tool_poses(robot, joints.values)
-    reached = Stream(joints.file, joints.time, poses[:, :3, 3] + poses[:, :3, :3] @ place, ("x", "y", "z"))
-    one, other = (_speeds(s, grid) for s, grid in ((reached, grids[0]), (target, grids[1])))
-    one, other = one - one.mean(), other - other.mean()
-    products = correlate(one, other, method="fft")
-    best = int(np.argmax(products))
-    steps = int(correlation_lags(len(one), len(other))[best])
-    return float(steps * step)
+    reached = replace(joints, values=poses[:, :3, 3] + poses[:, :3, :3] @ place)
+    both = [_speeds(each, np.arange(0.0, span, step)) for each, span in zip((reached, target), spans, strict=True)]
+    one, other = (speeds - speeds.mean() for speeds in both)
+    best = int(np.argmax(correlate(one, other, method="fft")))
+    return float(correlation_lags(len(one), len(other))[best] * step)
 
 
 def _speeds(stream: Stream, times: Array) -> Array:
-    """Return (M,) m/s of the target at some instants, over two steps of them."""
+    """Central differences: (M,) m/s of the target at some instants."""
     places = stream.between(times)[:, :3]
     speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
     return speeds
 
 
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
-    """Return lag, motion of the instrument's frame and place of the target that fit samples, and what is left, m rms.
+    """Least squares: lag, motion of the instrument's frame and place of the target; and what is left, m rms.
 
-    Least squares. The motion turns about the aligned start, so that ten figures near nothing are sought.
+    The motion turns about the aligned start, so that ten figures near nothing are sought.
     """
     from scipy.optimize import least_squares
 
@@ -252,8 +224,7 @@ coming."""
 _PLACE = re.compile(r"(?:^|[./])(?:position|point|translation)[./](?P<axis>[xyz])$")
 _TURN = re.compile(r"(?:^|[./])(?:orientation|rotation)[./](?P<axis>[xyzw])$")
 _WITHOUT_HEADER = Layout(",", 0, False)
-_BEFORE_NAMES = 2
-"""Fields of a stamp, sec and nanosec, at the beginning of each line without a header."""
+_BEFORE_NAMES = 2  # Fields of a stamp, sec and nanosec, at the beginning of each line without a header
 
 
 def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
@@ -266,13 +237,14 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
     table = read_table(file)
     clock = next((name for name in _CLOCKS if name in table.columns), None)
     if clock is None:
-        raise CampaignError(
-            str(file), "has no column of time", row=table.header, expected=f"one of {', '.join(_CLOCKS)}"
-        )
+        expected = f"one of {', '.join(_CLOCKS)}"
+        raise CampaignError(str(file), "has no column of time", row=table.header, expected=expected)
     time = table.numbers(clock, gaps=True) * _CLOCKS[clock]
-    places = [columns and stream(str(file), time, _figures(table, list(columns.values())), list(columns))
-              for columns in (_joints(table, joints), _target(table))]  # fmt: skip
-    return places[0] or None, places[1] or None
+    own, target = (
+        stream(str(file), time, _figures(table, list(columns.values())), list(columns)) if columns else None
+        for columns in (_joints(table, joints), _target(table))
+    )
+    return own, target
 
 
 def _begins_with_figures(file: Path) -> bool:
@@ -289,11 +261,14 @@ def _figures(table: Table, columns: Sequence[str]) -> Array:
 
 def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
     """Return the column of each joint; nothing where there is none of any."""
-    named = {table.text(name)[0]: f"field.position{name[len('field.name'):]}"
-             for name in table.columns if re.fullmatch(r"field\.name\d+", name)}  # fmt: skip
+    named = {
+        table.text(name)[0]: name.replace("name", "position", 1)
+        for name in table.columns
+        if re.fullmatch(r"field\.name\d+", name)
+    }
+    series = joint_columns(named, joints).items()
     columns = joint_columns(table.columns, joints)
-    series = joint_columns(named, joints)
-    columns |= {joint: named[name] for joint, name in series.items() if named[name] in table.columns}
+    columns |= {joint: named[name] for joint, name in series if named[name] in table.columns}
     if columns and len(columns) < len(joints):
         lacking = next(joint for joint in joints if joint not in columns)
         raise table.error("a joint of the chain is not recorded", lacking, expected="all of them")
@@ -302,20 +277,19 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
 
 def _target(table: Table) -> dict[str, str]:
     """Return the columns of the target's place, and of its orientation where all four are there."""
-    place: dict[str, str] = {}
-    turn: dict[str, str] = {}
+    parts: dict[str, str] = {}
     for name in table.columns:
         if found := _PLACE.search(name):
-            place.setdefault(found["axis"], name)
+            parts.setdefault(found["axis"], name)
         elif found := _TURN.search(name):
-            turn.setdefault(f"q{found['axis']}", name)
-    own = {name: name for name in names.MEASURED if name in table.columns}
-    place = place or {axis: own[axis] for axis in names.POSITION if axis in own}
-    turn = turn or {part: own[part] for part in names.ORIENTATION if part in own}
-    if set(place) != set(names.POSITION):
+            parts.setdefault(f"q{found['axis']}", name)
+    for group in (names.POSITION, names.ORIENTATION):
+        if not any(name in parts for name in group):
+            parts |= {name: name for name in group if name in table.columns}
+    if not all(name in parts for name in names.POSITION):
         return {}
-    whole = names.MEASURED if set(turn) == set(names.ORIENTATION) else names.POSITION
-    return {name: {**place, **turn}[name] for name in whole}
+    whole = names.MEASURED if all(name in parts for name in names.MEASURED) else names.POSITION
+    return {name: parts[name] for name in whole}
 
 
 def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
@@ -323,30 +297,25 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
     fields = list(table.columns)
     time = table.numbers(fields[0]) + table.numbers(fields[1]) * _NANOSECOND
     # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
-    texts = list(itertools.takewhile(lambda name: table.first_text(name) is not None or not any(table.columns[name]),
-                                     fields[_BEFORE_NAMES:]))  # fmt: skip
-    first = _BEFORE_NAMES + len(texts)
-    recorded = [table.text(name)[0] for name in texts[1:]]  # the first text is the frame
+    text = (table.first_text(name) is None and any(table.columns[name]) for name in fields[_BEFORE_NAMES:])
+    first = next((k for k, figures in enumerate(text, start=_BEFORE_NAMES) if figures), len(fields))
+    recorded = [table.text(name)[0] for name in fields[_BEFORE_NAMES + 1 : first]]  # the first text is the frame
     columns = joint_columns(recorded, joints)
     if columns and len(columns) == len(joints):
         wanted = [fields[first + recorded.index(columns[joint])] for joint in joints]
         return stream(table.file, time, _figures(table, wanted), joints), None
     if len(recorded) > 1:
-        lacking = next(joint for joint in joints if joint not in columns)
-        raise CampaignError(table.file, "a joint of the chain is not among the names", column=lacking,
-                            found=listed(recorded), expected=f"all of {listed(joints)}")  # fmt: skip
+        problem, found = "a joint of the chain is not among the names", listed(recorded)
+        lacking, expected = next(j for j in joints if j not in columns), f"all of {listed(joints)}"
+        raise CampaignError(table.file, problem, column=lacking, found=found, expected=expected)
     rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
     if len(rest) in (len(names.POSITION), len(names.MEASURED)):
-        order = ("x", "y", "z", "qx", "qy", "qz", "qw")[: len(rest)]
-        by_name = dict(zip(order, rest, strict=True))
+        by_name = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), rest, strict=False))
         wanted = [name for name in names.MEASURED if name in by_name]
         return None, stream(table.file, time, _figures(table, [by_name[name] for name in wanted]), wanted)
-    raise CampaignError(
-        table.file,
-        "neither joint states nor poses are recognised in lines without a header",
-        found=f"{len(fields)} fields",
-        expected="sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)",
-    )
+    problem = "neither joint states nor poses are recognised in lines without a header"
+    expected = "sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)"
+    raise CampaignError(table.file, problem, found=f"{len(fields)} fields", expected=expected)
 
 
 ENDINGS = (".bag", ".mcap", ".db3")
@@ -368,44 +337,36 @@ def read_bag(
     A topic is ``None`` where one alone has such messages. A bag that cannot be read is refused, and so are several
     topics to choose from and a joint that is not recorded.
     """
+    file = str(path)
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise CampaignError(str(path), "bags need rosbags, which is not installed", expected=WITH_ROSBAGS) from error
+        raise CampaignError(file, "bags need rosbags, which is not installed", expected=WITH_ROSBAGS) from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            found = []
-            for types, topic, key in ((_JOINT_STATES, joint_topic, "joints"), (tuple(_TARGETS), target_topic, "pose")):
-                chosen = _connections(str(path), reader, types, topic, key)
-                messages = [
-                    (stamp, reader.deserialize(raw, connection.msgtype), connection.msgtype)
-                    for connection, stamp, raw in (reader.messages(connections=chosen) if chosen else ())
-                ]
-                found.append(messages)
+            states = _messages(file, reader, _JOINT_STATES, joint_topic, "joints")
+            targets = _messages(file, reader, tuple(_TARGETS), target_topic, "pose")
     except AnyReaderError as error:
-        raise CampaignError(
-            str(path), f"cannot be read as a bag ({error})", expected="a bag of ROS 1 or ROS 2"
-        ) from error
-    return _joint_stream(str(path), found[0], joints), _target_stream(str(path), found[1])
+        raise CampaignError(file, f"cannot be read as a bag ({error})", expected="a bag of ROS 1 or ROS 2") from error
+    return _joint_stream(file, states, joints), _target_stream(file, targets)
 
 
-def _connections(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
-    """Return the connections of one topic."""
+def _messages(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
+    """Return the messages of one topic: when each was recorded, itself, and its type."""
     fitting = [c for c in reader.connections if c.msgtype in types]
-    topics = sorted({c.topic for c in fitting})
+    topics, kinds = sorted({c.topic for c in fitting}), " or ".join(types)
     if topic is None and len(topics) > 1:
-        raise CampaignError(
-            file,
-            f"several topics have messages of {' or '.join(types)}",
-            found=listed(topics),
-            expected=f"[recording] {key} in the mapping",
-        )
+        problem, expected = f"several topics have messages of {kinds}", f"[recording] {key} in the mapping"
+        raise CampaignError(file, problem, found=listed(topics), expected=expected)
     if topic is not None and topic not in topics:
-        raise CampaignError(
-            file, f"no messages of {' or '.join(types)} in topic {topic!r}", found=listed(topics), expected="its topics"
-        )
-    return [c for c in fitting if topic in (None, c.topic)]
+        problem = f"no messages of {kinds} in topic {topic!r}"
+        raise CampaignError(file, problem, found=listed(topics), expected="its topics")
+    chosen = [c for c in fitting if topic in (None, c.topic)]
+    return [
+        (stamp, reader.deserialize(raw, connection.msgtype), connection.msgtype)
+        for connection, stamp, raw in (reader.messages(connections=chosen) if chosen else ())
+    ]
 
 
 def _instant(stamp: int, message: Any) -> float:
@@ -415,35 +376,29 @@ def _instant(stamp: int, message: Any) -> float:
 
 
 def _joint_stream(file: str, messages: Sequence[Any], joints: Sequence[str]) -> Stream | None:
-    if not messages:
-        return None
     times, rows = [], []
     for stamp, message, _ in messages:
         where = joint_columns(message.name, joints)
         if len(where) == len(joints):  # a hand may speak in messages of its own
             times.append(_instant(stamp, message))
             rows.append([message.position[message.name.index(where[joint])] for joint in joints])
-    if not rows:
+    if messages and not rows:
         recorded = sorted({name for _, message, _ in messages for name in message.name})
-        raise CampaignError(
-            file, "no message has all joints of the chain", found=listed(recorded), expected=listed(joints)
-        )
-    return stream(file, np.array(times), np.array(rows, dtype=float), joints)
+        problem = "no message has all joints of the chain"
+        raise CampaignError(file, problem, found=listed(recorded), expected=listed(joints))
+    return stream(file, np.array(times), np.array(rows, dtype=float), joints) if rows else None
 
 
 def _target_stream(file: str, messages: Sequence[Any]) -> Stream | None:
-    if not messages:
-        return None
     times, rows = [], []
     for stamp, message, kind in messages:
         held = getattr(message, _TARGETS[kind])
         place = next((getattr(held, name) for name in ("position", "translation") if hasattr(held, name)), held)
         turn = next((getattr(held, name) for name in ("orientation", "rotation") if hasattr(held, name)), None)
-        parts = [] if turn is None else [turn.w, turn.x, turn.y, turn.z]
         times.append(_instant(stamp, message))
-        rows.append([place.x, place.y, place.z, *parts])
-    whole = names.MEASURED if len(rows[0]) == len(names.MEASURED) else names.POSITION
-    return stream(file, np.array(times), np.array(rows, dtype=float), whole)
+        rows.append([place.x, place.y, place.z, *([turn.w, turn.x, turn.y, turn.z] if turn else [])])
+    whole = names.MEASURED[: len(rows[0])] if rows else ()
+    return stream(file, np.array(times), np.array(rows, dtype=float), whole) if rows else None
 
 
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
@@ -456,10 +411,11 @@ def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
     robot = plan.robot()
     settings = plan.over(own).settings(robot)
     joints, target = _streams(files, plan, robot)
-    scales = _scales(target, settings.units, robot)
+    scale = np.array([settings.units.joint_scale(kind) for kind in robot.joint_types])  # SI values of one unit
+    lengths = np.where(np.isin(target.names, names.POSITION), settings.units.length_scale, 1.0)
     known = plan.get("recording", "offset")
     if known is None:
-        estimate = lag(joints.scaled(scales[0]), target.scaled(scales[1]), robot, np.array(settings.target))
+        estimate = lag(joints.scaled(scale), target.scaled(lengths), robot, np.array(settings.target))
         known = estimate.value
         clocks = (
             f"the robot's clock shows {estimate.value:.6f} ± {estimate.std:.6f} s more than the instrument's, "
@@ -467,24 +423,21 @@ def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
         )
     else:
         clocks = f"the robot's clock shows {known:g} s more than the instrument's, as stated"
-    limits = {key: plan.get("recording", key) for key in _LIMITS}
-    pairs = paired(
-        joints.scaled(scales[0]), target, known, **{key: value for key, value in limits.items() if value is not None}
-    )
+    limits = {key: value for key in _LIMITS if (value := plan.get("recording", key)) is not None}
+    pairs = paired(joints.scaled(scale), target, known, **limits)
     if not len(pairs.times):
-        raise CampaignError(
-            joints.file,
-            "the robot never stands still long enough beside a sample of the target",
-            found=f"{pairs.short} standstills too short, {pairs.lonely} without a sample",
-            expected="standstills; [recording] standstill, velocity and tolerance in the mapping",
-        )
+        found = f"{pairs.short} standstills too short, {pairs.lonely} without a sample"
+        expected = "standstills; [recording] standstill, velocity and tolerance in the mapping"
+        problem = "the robot never stands still long enough beside a sample of the target"
+        raise CampaignError(joints.file, problem, found=found, expected=expected)
     notes = [f"{len(joints.time)} joint states and {len(target.time)} samples of the target read", clocks]
     notes.append(f"{len(pairs.times)} standstills taken")
-    if pairs.short:
-        notes.append(f"{pairs.short} standstills left out, too short")
-    if pairs.lonely:
-        notes.append(f"{pairs.lonely} standstills left out, no sample of the target near")
-    return Source(_table(joints, target, pairs, scales[0]), own, tuple(notes), (f"Clocks: {clocks}.",))
+    notes += [f"{pairs.short} standstills left out, too short"] if pairs.short else []
+    notes += [f"{pairs.lonely} standstills left out, no sample of the target near"] if pairs.lonely else []
+    columns: dict[str, Cells] = dict(zip(joints.names, (pairs.joints / scale).T, strict=True))
+    columns |= {**dict(zip(target.names, pairs.target.T, strict=True)), "time": pairs.times - pairs.times[0]}
+    table = Table(f"{joints.file} with {target.file}", columns, np.arange(1, len(pairs.times) + 1))
+    return Source(table, own, tuple(notes), (f"Clocks: {clocks}.",))
 
 
 def _streams(files: Sequence[Path], plan: Plan, robot: Robot) -> tuple[Stream, Stream]:
@@ -492,36 +445,16 @@ def _streams(files: Sequence[Path], plan: Plan, robot: Robot) -> tuple[Stream, S
     found: list[list[Stream]] = [[], []]
     for file in files:
         if file.suffix.lower() in ENDINGS or is_folder(file):
-            topics = [plan.get("recording", key) for key in ("joints", "pose")]
-            both = read_bag(file, robot.joint_names, *topics)
+            both = read_bag(file, robot.joint_names, *(plan.get("recording", key) for key in ("joints", "pose")))
         else:
             both = read_streams(file, robot.joint_names)
         for streams, stream in zip(found, both, strict=True):
-            streams += [stream] if stream is not None else []
+            streams += [] if stream is None else [stream]
     for streams, what in zip(found, ("joint states of the chain", "poses or points of the target"), strict=True):
         if len(streams) != 1:
-            named = " and ".join(map(str, files))
-            raise CampaignError(
-                named,
-                f"{'more than one file has' if streams else 'no file has'} {what}",
-                expected=f"one recording of {what}",
-            )
+            problem = f"{'more than one file has' if streams else 'no file has'} {what}"
+            raise CampaignError(" and ".join(map(str, files)), problem, expected=f"one recording of {what}")
     return found[0][0], found[1][0]
-
-
-def _scales(target: Stream, units: Units, robot: Robot) -> tuple[Array, Array]:
-    """Return the SI values of one unit of each joint's and each of the target's columns."""
-    turned = len(target.names) - len(names.POSITION)
-    lengths = np.array([units.length_scale] * len(names.POSITION) + [1.0] * turned)
-    return np.array([units.joint_scale(kind) for kind in robot.joint_types]), lengths
-
-
-def _table(joints: Stream, target: Stream, pairs: Pairs, scale: Array) -> Table:
-    """Return the pairs as a table in the columns of a campaign."""
-    columns: dict[str, Cells] = dict(zip(joints.names, (pairs.joints / scale).T, strict=True))
-    columns.update(zip(target.names, pairs.target.T, strict=True))
-    columns["time"] = pairs.times - pairs.times[0]
-    return Table(f"{joints.file} with {target.file}", columns, np.arange(1, len(pairs.times) + 1))
 
 
 ROSBAG = Format(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
@@ -28,14 +28,10 @@ FORMATS: dict[str, Format] = {
     "ipa_ur10": IPA_UR10,
 }
 """Formats by name, in the order of the help."""
+IMPORTED = "Imported by `thermal-robot import"  # What the first line of a campaign.toml says that was imported
 
 
-IMPORTED = "Imported by `thermal-robot import"
-"""What the first line of a campaign.toml says that was imported."""
-
-
-@dataclass(frozen=True)
-class Imported:
+class Imported(NamedTuple):
     """A campaign that was imported."""
 
     campaign: Campaign  # as it was written
@@ -46,43 +42,29 @@ class Imported:
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
     """Read files of a format and write them as a campaign.
 
-    Parameters
-    ----------
-    format
-        One of :data:`~thermal_robot.campaign.importers.run.FORMATS`.
-    files
-        As many as the format has.
-    directory
-        Of the campaign; is made if need be. A campaign in it is replaced where it was imported, too.
-    plan
-        What the user says beyond the files; it counts for more than what the format says.
+    The directory is made if need be; a campaign in it is replaced where it was imported, too. ``plan`` is what the user
+    says beyond the files; it counts for more than what the format says.
 
     Raises
     ------
     CampaignError
         Files that cannot be used or would be overwritten, a folder that cannot be written, or that holds a campaign
-        which was not imported.
+        which was not imported: it may hold what was measured, and nothing else does.
     RobotError
         A robot that cannot be loaded.
     """
-    given = plan or Plan()
     read = {Path(file).resolve() for file in files}
     for name in (FILE_NAME, TABLE_NAME, ROBOT_NAME):
         if (directory / name).resolve() in read:
-            raise CampaignError(
-                str(directory / name), "is read from, and would be overwritten", expected="another folder to write"
-            )
-    _require_imported(directory / FILE_NAME)
+            problem = "is read from, and would be overwritten"
+            raise CampaignError(str(directory / name), problem, expected="another folder to write")
+    there = directory / FILE_NAME
+    if there.is_file() and not there.read_text(encoding="utf-8", errors="replace").startswith(f"# {IMPORTED}"):
+        expected = "another folder: what is there was not imported, and would be overwritten"
+        raise CampaignError(str(there), "there is a campaign already", expected=expected)
+    given = plan or Plan()
     source = FORMATS[format].source(files, given)
     full = given.over(source.plan)
     campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
     origin = f"{IMPORTED} {format}` from {', '.join(Path(file).name for file in files)}."
-    file = write_campaign(campaign, directory, comments=(origin, *source.comments))
-    return Imported(campaign, file, notes)
-
-
-def _require_imported(file: Path) -> None:
-    """Refuse to replace a campaign that somebody else wrote: it may hold what was measured, and nothing else does."""
-    if file.is_file() and not file.read_text(encoding="utf-8", errors="replace").startswith(f"# {IMPORTED}"):
-        expected = "another folder: what is there was not imported, and would be overwritten"
-        raise CampaignError(str(file), "there is a campaign already", expected=expected)
+    return Imported(campaign, write_campaign(campaign, directory, comments=(origin, *source.comments)), notes)

@@ -37,8 +37,7 @@ from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import PLAIN, SPACE, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 
-_FEW = 3
-"""Names of either table that a sentence shows: enough to see how the two spell them."""
+_FEW = 3  # Names of either table that a sentence shows: enough to see how the two spell them
 
 
 def commands(file: Path, plan: Plan) -> Table:
@@ -70,69 +69,49 @@ def _fits(table: Table) -> bool:
 def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tuple[str, ...]]:
     """Return one table with the columns of both, and in sentences what was left out.
 
-    A point that was measured several times makes several rows. Rows come in the order of the measurements.
-
-    Parameters
-    ----------
-    measured, commanded
-        The tables. Messages speak of rows and columns of the measured one.
-    key
-        Column of the measured table that holds the names of points; that of the commands is the one that has most of
-        them. Empty where the rows of both are in the same order.
-
-    Raises
-    ------
-    CampaignError
-        Tables of different lengths without names, a point that is commanded twice, no name in common.
+    A point that was measured several times makes several rows, in the order of the measurements. ``key`` is the column
+    of the measured table that holds the names of points; that of the commands is the one that has most of them. Without
+    it the rows of both are in the same order. Refused are tables of different lengths without names, a point that is
+    commanded twice, and no name in common; messages speak of rows and columns of the measured table.
     """
     taken = ""
-    if not key:
-        if len(measured.rows) != len(commanded.rows):
-            headless = measured.headless or commanded.headless
-            raise CampaignError(
-                measured.file,
-                f"has not as many rows as {commanded.file}, and no names that tell which belong together{headless}",
-                found=f"{len(measured.rows)} and {len(commanded.rows)} rows{', without that line' if headless else ''}",
-                expected="as many, in the same order, or a column of names in both",
-            )
-        order: Sequence[int] = range(len(commanded.rows))
-        notes: tuple[str, ...] = (f"rows of {measured.file} and {commanded.file} joined in their order",)
-    else:
-        taken = _names_of(commanded, measured.text(key)) or _no_name(measured, commanded, key)
+    notes: tuple[str, ...] = (f"rows of {measured.file} and {commanded.file} joined in their order",)
+    order: Sequence[int] = range(len(commanded.rows))
+    if key:
+        taken = _names_of(measured, commanded, key)
         measured, order, notes = _by_name(measured, commanded, key, taken)
+    elif len(measured.rows) != len(commanded.rows):
+        headless = measured.headless or commanded.headless
+        together = f"has not as many rows as {commanded.file}, and no names that tell which belong together"
+        found = f"{len(measured.rows)} and {len(commanded.rows)} rows{', without that line' if headless else ''}"
+        expected = "as many, in the same order, or a column of names in both"
+        raise CampaignError(measured.file, f"{together}{headless}", found=found, expected=expected)
     columns = _settled(measured, range(len(measured.rows)))
-    header = None if commanded.unnamed else measured.header
-    if commanded.unnamed:  # known by their numbers, which go on from those of the first table
-        called = {name: str(len(columns) + k) for k, name in enumerate(commanded.columns, start=1)}
-        commanded = replace(commanded, columns={called[name]: cells for name, cells in commanded.columns.items()})
-        taken = called.get(taken, "")
-    for name, cells in _settled(commanded, order).items():
-        if name == taken:
-            continue
-        if name in columns:
+    first = len(columns)
+    for k, (name, cells) in enumerate(_settled(commanded, order).items(), start=1):
+        # columns without names are known by their numbers, which go on from those of the first table
+        called = str(first + k) if commanded.unnamed else name
+        if name != taken and called in columns:
             problem = f"has a column that {measured.file} has, too"
             raise commanded.error(problem, name, expected="every column in one of the two tables")
-        columns[name] = cells
+        if name != taken:
+            columns[called] = cells
+    header = None if commanded.unnamed else measured.header
     return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
 
 
-def _names_of(commanded: Table, points: Sequence[str]) -> str:
-    """Return the column of the commands that has most names of points; empty where none has any."""
+def _names_of(measured: Table, commanded: Table, key: str) -> str:
+    """Return the column of the commands that has most names of points; refuse commands without any."""
+    points = measured.text(key)
     known = set(points) - {""}
     common = {name: len(known & set(commanded.text(name))) for name in commanded.columns}
     best = max(common, key=lambda name: common[name])
-    return best if common[best] else ""
-
-
-def _no_name(measured: Table, commanded: Table, key: str) -> str:
-    first = {name: commanded.text(name)[0] for name in commanded.columns}
-    raise CampaignError(
-        measured.file,
-        f"no point has a name that stands in {commanded.file}",
-        column=key,
-        found=listed(measured.text(key), _FEW),
-        expected=f"names of one of its columns, such as {listed((f'{n} {c}' for n, c in first.items()), _FEW)}",
-    )
+    if not common[best]:
+        such = listed((f"{name} {commanded.text(name)[0]}" for name in commanded.columns), _FEW)
+        problem, expected = f"no point has a name that stands in {commanded.file}", "names of one of its columns"
+        told, expected = listed(points, _FEW), f"{expected}, such as {such}"
+        raise CampaignError(measured.file, problem, column=key, found=told, expected=expected)
+    return best
 
 
 def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Sequence[int], tuple[str, ...]]:
@@ -141,36 +120,27 @@ def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[T
     twice = [name for name, count in Counter(commands).items() if count > 1]
     if twice:
         rows = [int(row) for row, name in zip(commanded.rows, commands, strict=True) if name == twice[0]]
-        raise CampaignError(
-            commanded.file,
-            "a point is commanded more than once",
-            row=rows[1],
-            column=taken,
-            found=f"{twice[0]!r}, as in row {rows[0]}",
-            expected="each name once",
-        )
+        problem, again = "a point is commanded more than once", f"{twice[0]!r}, as in row {rows[0]}"
+        row, expected = rows[1], "each name once"
+        raise CampaignError(commanded.file, problem, row=row, column=taken, found=again, expected=expected)
     where = {name: k for k, name in enumerate(commands)}
-    known = np.array([name in where for name in points])
-    unmeasured = sorted(set(commands) - set(points))
+    unknown, unmeasured = [name for name in points if name not in where], sorted(set(commands) - set(points))
     notes = []
-    if not known.all():
-        unknown = [name for name, there in zip(points, known, strict=True) if not there]
+    if unknown:
         notes.append(f"{len(unknown)} points left out, not commanded: {listed(unknown, _FEW)}")
     if unmeasured:
         notes.append(f"{len(unmeasured)} commands left out, not measured: {listed(unmeasured, _FEW)}")
-    order = [where[name] for name, there in zip(points, known, strict=True) if there]
-    return measured.take(known), order, tuple(notes)
+    order = [where[name] for name in points if name in where]
+    return measured.take(np.array([name in where for name in points])), order, tuple(notes)
 
 
 def _settled(table: Table, order: Sequence[int]) -> dict[str, Cells]:
     """Return columns in an order of rows, numbers where a column has nothing else: decimal commas are settled here."""
     columns: dict[str, Cells] = {}
     for name in table.columns:
-        if table.first_text(name) is None:
-            columns[name] = table.numbers(name, gaps=True)[list(order)]
-        else:
-            cells = table.text(name)
-            columns[name] = [cells[k] for k in order]
+        plain = table.first_text(name) is None
+        cells = table.numbers(name, gaps=True) if plain else np.array(table.text(name), dtype=object)
+        columns[name] = cells[list(order)] if plain else cells[list(order)].tolist()
     return columns
 
 
@@ -202,36 +172,31 @@ _AXES = ("x", "y", "z")
 def _read_points(files: Sequence[Path], plan: Plan) -> Source:
     """Read points and commands, joined by the name of the point; without names, row by row."""
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
-    layout = plan.layout() if laid_out else _laid_out(files[0])
-    table = _called(read_table(files[0], layout), plan)
-    key = plan.get("table", "key") or _NAMES[-1]
-    targets = plan.get("table", "targets")
-    told: list[str] = []
+    table = _called(read_table(files[0], plan.layout() if laid_out else _laid_out(files[0])), plan)
+    key, targets = plan.get("table", "key") or _NAMES[-1], plan.get("table", "targets")
+    columns, told = {axis: axis for axis in _AXES}, []
     if targets:
-        table, note = grouped(table, key, targets)
+        (table, note), columns = grouped(table, key, targets), {}
         told.append(note)
-    both, notes = joined(table, commands(files[1], plan), key if key in table.columns else "")
-    sections = {"columns": {} if targets else {axis: axis for axis in _AXES}}
-    if key in table.columns:
-        sections["columns"]["pose"] = key
-    return Source(both, planned(sections), (*told, *notes))
+    named = key in table.columns
+    both, notes = joined(table, commands(files[1], plan), key if named else "")
+    columns |= {"pose": key} if named else {}
+    return Source(both, planned({"columns": columns}), (*told, *notes))
 
 
 def _laid_out(file: Path) -> Layout:
     """Return how a list of points is laid out: its first line that is no comment tells."""
-    separators = {separator: Layout(separator, 0, False, COMMENT) for separator in (",", ";", "\t", SPACE)}
-    for layout in separators.values():
+    for separator in (",", ";", "\t", SPACE):
+        layout = Layout(separator, 0, False, COMMENT)
         try:
             table = read_table(file, layout)
         except CampaignError:  # another number of fields in some line: not this separator
             continue
         if len(table.columns) >= len(_AXES):
             first = table.take(table.rows == table.rows[0])
-            named = not any(first.first_text(name) is None for name in first.columns)
-            return Layout(layout.separator, 0, named, COMMENT)
-    raise CampaignError(
-        str(file), "is no list of points", expected="lines of names and x y z, separated by blanks, commas or tabs"
-    )
+            return replace(layout, header=all(first.first_text(name) is not None for name in first.columns))
+    expected = "lines of names and x y z, separated by blanks, commas or tabs"
+    raise CampaignError(str(file), "is no list of points", expected=expected)
 
 
 def _called(table: Table, plan: Plan) -> Table:
@@ -243,12 +208,10 @@ def _called(table: Table, plan: Plan) -> Table:
         first = _names_before(table)
         axes = dict(zip(list(table.columns)[first:], _AXES, strict=False))
     if sorted(axes.values()) != list(_AXES) and not plan.sections.get("columns"):
+        found = listed(table.columns) if table.header is not None else f"{len(table.columns)} fields in a line"
+        expected = "at most three names, then x y z; or [columns] in the mapping"
         raise CampaignError(
-            table.file,
-            "x, y and z of the points are not found",
-            row=table.header,
-            found=listed(table.columns) if table.header is not None else f"{len(table.columns)} fields in a line",
-            expected="at most three names, then x y z; or [columns] in the mapping",
+            table.file, "x, y and z of the points are not found", row=table.header, found=found, expected=expected
         )
     titles = dict(zip(list(table.columns)[:first], _NAMES[max(0, len(_NAMES) - first) :], strict=False))
     return replace(table, columns={{**titles, **axes}.get(name, name): cells for name, cells in table.columns.items()})
@@ -276,13 +239,8 @@ def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
     lines = pd.DataFrame({"pose": table.text(found(table, key)), "called": table.text(found(table, targets))})
     order = list(lines["called"].unique())
     if len(order) < 2:
-        raise CampaignError(
-            table.file,
-            "holds a single target of each pose",
-            column=targets,
-            found=listed(order),
-            expected="names of several targets, or no [table] targets",
-        )
+        problem, expected = "holds a single target of each pose", "names of several targets, or no [table] targets"
+        raise CampaignError(table.file, problem, column=targets, found=listed(order), expected=expected)
     lines["visit"] = lines.groupby(["pose", "called"]).cumcount()
     row = lines.groupby(["pose", "visit"], sort=False).ngroup().to_numpy()
     _, first = np.unique(row, return_index=True)
@@ -302,9 +260,6 @@ POINTS = Format(
 )
 
 
-_STAMP = "Timestamp"
-
-
 def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
     table = read_table(files[0], plan.layout())
     joints = sorted((name for name in table.columns if re.fullmatch(r"joint_\d", name)), key=lambda name: name[-1])
@@ -317,20 +272,16 @@ def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
-    table = read_table(files[0], plan.layout())
-    whole = _STAMP in table.columns and all(re.fullmatch(r"\d{14}", stamp) for stamp in table.text(_STAMP))
-    clock: dict[str, Any] = {"time": {"column": _STAMP, "time": "%Y%m%d%H%M%S"}}
-    measured = {axis: f"measurement_{axis}" for axis in "xyz"}
-    turned = {"kind": "euler", "sequence": "XYZ", "unit": "deg", "columns": [f"measurement_r{axis}" for axis in "xyz"]}
+    table, stamp = read_table(files[0], plan.layout()), "Timestamp"
+    whole = stamp in table.columns and all(re.fullmatch(r"\d{14}", each) for each in table.text(stamp))
+    clock: dict[str, Any] = {"time": {"column": stamp, "time": "%Y%m%d%H%M%S"}} if whole else {"order": {"count": True}}
+    columns = {**{axis: f"measurement_{axis}" for axis in "xyz"}, **clock, "temperature": "measurement_temperature"}
+    angles = [f"measurement_r{axis}" for axis in "xyz"]
     sections: dict[str, dict[str, Any]] = {
         "measurements": {"angle_unit": "rad", "length_unit": "mm"},
         "frames": {"target": [0.0, 0.0, 93.0]},
-        "columns": {
-            **measured,
-            **(clock if whole else {"order": {"count": True}}),
-            "temperature": "measurement_temperature",
-        },
-        "orientation": turned,
+        "columns": columns,
+        "orientation": {"kind": "euler", "sequence": "XYZ", "unit": "deg", "columns": angles},
     }
     notes = () if whole else ("the time stamps are no instants: the order of the rows is taken",)
     return Source(table, planned(sections), notes)

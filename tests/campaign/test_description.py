@@ -8,11 +8,11 @@ from pathlib import Path
 
 from campaign.files import ROWS, add, full, put
 
-from thermal_robot.campaign import Units, describe, read_campaign, read_samples
+from thermal_robot.campaign import Units, describe, read_campaign
 
 
-def test_says_what_a_metrologist_asks(tmp_path: Path) -> None:
-    text = _squeezed(describe(full(tmp_path / "hall_3")))
+def test_says_what_a_metrologist_asks() -> None:
+    text = _squeezed(describe(full()))
     for line in (
         "Campaign hall_3",
         "robot                  arm, chain from base to tool, 4 movable joints",
@@ -52,14 +52,10 @@ def test_gaps_and_warnings(tmp_path: Path) -> None:
     assert "are these kelvin?" in text
 
 
-def test_samples(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    text = _squeezed(describe(read_samples(tmp_path / "c" / "measurements.csv", campaign)))
-    assert "samples 3, to be predicted" in text
-
-
-def test_columns_are_aligned(tmp_path: Path) -> None:
-    lines = describe(full(tmp_path / "c")).split("Joints\n")[1].split("\n\n")[0].splitlines()
+def test_samples_are_to_be_predicted_and_columns_are_aligned() -> None:
+    samples = dataclasses.replace(full(), position=None, orientation=None)
+    assert "samples 3, to be predicted" in _squeezed(describe(samples))
+    lines = describe(full()).split("Joints\n")[1].split("\n\n")[0].splitlines()
     assert len({line.index(cell) for line, cell in zip(lines[1:], ("rev", "rev", "pri", "con"), strict=True)}) == 1
 
 
@@ -67,8 +63,8 @@ def _squeezed(text: str) -> str:
     return re.sub(" +", " ", text)
 
 
-def test_every_condition_has_its_unit(tmp_path: Path) -> None:
-    block = describe(full(tmp_path / "c")).split("Conditions recorded\n")[1].split("\n\n")[0]
+def test_every_condition_has_its_unit() -> None:
+    block = describe(full()).split("Conditions recorded\n")[1].split("\n\n")[0]
     units = {tuple(line.split()[:2]): line for line in block.splitlines()}
     for words, unit in (
         (("velocity", "lift"), "deg/s"),
@@ -84,20 +80,16 @@ def test_every_condition_has_its_unit(tmp_path: Path) -> None:
     assert "as given" in next(line for line in block.splitlines() if "humidity" in line)
 
 
-def test_ranges_are_those_of_the_file_in_any_unit(tmp_path: Path) -> None:
-    campaign = full(tmp_path / "c")
-    text = _squeezed(describe(dataclasses.replace(campaign, units=Units("rad", "um"))))
+def test_ranges_are_those_of_the_file_in_any_unit() -> None:
+    text = _squeezed(describe(dataclasses.replace(full(), units=Units("rad", "um"))))
     assert "slide prismatic 30000 .. 90000 0 .. 500000 um 12 %" in text
     assert "lift revolute -0.785398 .. 0.349066 -2 .. 2 rad 28 %" in text
 
 
-def test_many_sessions_are_counted(tmp_path: Path) -> None:
+def test_many_sessions_and_the_noise_of_each_row_are_told(tmp_path: Path) -> None:
     rows = "".join(f"{i},20,30,40,{1000 + i},0,500,day {i:02d}\n" for i in range(12))
     text = describe(read_campaign(put(tmp_path / "c", ROWS.split("\n")[0] + ",session\n" + rows)))
     assert "12: day 00 (1 row)" in text
     assert "day 07 (1 row) and 4 more" in text
-
-
-def test_tells_the_noise_of_each_row(tmp_path: Path) -> None:
     text = _squeezed(describe(read_campaign(put(tmp_path / "c", add(ROWS, noise="0.02 0.5 0.03")))))
     assert "noise of position 0.02 .. 0.5 mm per axis (one sigma), of each row" in text
