@@ -10,7 +10,7 @@ import numpy as np
 from thermal_robot import cli
 
 
-def diagnosed_once(folder, out):
+def diagnosed_files(folder, out):
     """Run `diagnose` with every file that it can write; give status, text, complaint and the files' paths."""
     files = {"json": out / "d.json", "report": out / "r.html", "model": out / "m.json"}
     wanted = [word for kind, path in files.items() for word in (f"--{kind}", str(path))]

@@ -6,7 +6,7 @@ import re
 import pytest
 
 from thermal_robot import cli
-from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
+from thermal_robot.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
 
 
 def refused(capsys, *arguments):
