@@ -1,35 +1,65 @@
-"""The house as a newcomer meets it: short bodies, effects known by their own files alone."""
+"""House rules: who may import whom, what a light import must not load, what a public name must have."""
 
 import ast
-from pathlib import Path
+import importlib
+import pkgutil
+import subprocess
+import sys
+
+import house
+import pytest
 
 import thermal_robot
-from thermal_robot.effects import RANDOM, library
-
-ROOT = Path(thermal_robot.__file__).parent
-MODULES = sorted(p for p in ROOT.rglob("*.py") if p.name != "__init__.py")
-LONGEST_BODY = 40
-KNOWING = {"effects", "blind", "paper"}
-"""Rooms that may know an effect by name: its own, the trial that withholds it, the paper's."""
-FRAMES = {"campaign", "model_file.py", "robot.py", "cli.py"}
-"""Rooms for which ``tool_frame`` and ``base_frame`` are frames, not effects."""
 
 
-def test_no_body_is_long():
-    for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-                body = node.body[1:] if ast.get_docstring(node) else node.body
-                lines = body[-1].end_lineno - body[0].lineno + 1 if body else 0
-                assert lines <= LONGEST_BODY, f"{path}: {node.name} has {lines} lines"
+@pytest.mark.parametrize("rule", house.RULES, ids=lambda rule: rule.__name__)
+def test_the_house_is_in_order(rule):
+    assert list(rule()) == []
 
 
-def test_an_effect_is_known_by_its_own_file_alone():
-    for path in MODULES:
-        room = path.relative_to(ROOT).parts[0]
-        if room in KNOWING:
-            continue
-        names = {*library(), *RANDOM} - ({"base_frame", "tool_frame"} if room in FRAMES else set())
-        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        said = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
-        assert not said & names, path
+def test_the_walk_sees_every_kind_of_import():
+    text = (
+        "import a\nfrom typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from b import c\nelse:\n    import d\n"
+        "def f():\n    import e.g\nclass K:\n    def m(self):\n        from h import i\n    import j\n"
+        "from .k import l\n"
+    )
+    assert set(house.imports(ast.parse(text))) == {
+        ("a", "top"), ("typing", "top"), ("b", "checked"), ("d", "top"), ("e.g", "lazy"), ("h", "lazy"), ("j", "top"),
+        (".k", "top"),
+    }  # fmt: skip
+
+
+def printed(code):
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return done.stdout.strip()
+
+
+def test_a_light_import_loads_nothing_heavy():
+    heavy = ["pandas", "matplotlib", "scipy.stats", "yourdfpy", "rich", "jsonschema", "pyarrow", "tomli_w"]
+    heavy += ["trimesh", "viser", "numpy", "scipy", "pinocchio"]
+    assert printed(f"import sys, thermal_robot; print([m for m in {heavy!r} if m in sys.modules])") == "[]"
+
+
+def test_what_is_loaded_late_is_found_listed_and_typed():
+    code = "import thermal_robot as t; print(t.kinematics.__name__, t.diagnose is t.diagnosis.diagnose)"
+    assert printed(code) == f"{house.PACKAGE}.kinematics True"
+    assert set(thermal_robot.__all__) <= set(dir(thermal_robot))
+    assert not any(house.is_module(f"{house.PACKAGE}.{n}") for n in thermal_robot.__all__)  # it would hide the name
+    typed = {target for target, how in house.IMPORTS[house.PACKAGE] if how == "checked"}
+    homes = {house.room(f"{house.PACKAGE}.{home}") for home in thermal_robot._HOME.values()}
+    assert {house.room(target) for target in typed} == homes
+    assert set(thermal_robot._HOME) == set(thermal_robot.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
+        _ = thermal_robot.diagnos
+
+
+def test_every_name_that_a_module_promises_exists():
+    promised = 0
+    for info in pkgutil.walk_packages(thermal_robot.__path__, f"{house.PACKAGE}."):
+        module = importlib.import_module(info.name)
+        names = getattr(module, "__all__", ())
+        promised += len(names)
+        assert len(set(names)) == len(names), info.name
+        assert [n for n in names if not hasattr(module, n)] == [], info.name
+    assert promised > 50
