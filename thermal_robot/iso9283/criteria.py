@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -144,11 +145,11 @@ class Repeatability:
 
 def repeatability(attained: Attained) -> Repeatability:
     """Compute the repeatability of one pose from n ≥ 2 cycles."""
-    deviations = attained.position - attained.barycentre
+    deviations, turned = attained.position - attained.barycentre, None
     value = float(_of(np.linalg.norm(deviations, axis=1)))
-    mean, turned = attained.mean_rotation, None
-    if attained.rotation is not None and mean is not None:
-        turned = three(SPREADS * angles(attained.rotation, mean).std(axis=0, ddof=1))
+    if attained.rotation is not None:
+        turns = angles(attained.rotation, mean_rotation(attained.rotation))
+        turned = three(SPREADS * turns.std(axis=0, ddof=1))
     return Repeatability(value, _interval(deviations, value), turned)
 
 
@@ -242,24 +243,21 @@ def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None 
         told.
     """
     spread = [repeatability(each) for each in attained]
-    away = None if commanded is None else [accuracy(a, c) for a, c in zip(attained, commanded, strict=True)]
     gone = [float(np.linalg.norm(each.barycentre - attained[0].barycentre)) for each in attained]
-    return Drift(
-        None if away is None else _largest([a.position for a in away]),
-        _largest([r.position for r in spread]),
-        max(gone),
-        None if away is None else _largest_of_three([a.angles for a in away]),
-        _largest_of_three([r.angles for r in spread]),
-    )
+    near, turned = None, None
+    if commanded is not None:
+        away = [accuracy(a, c) for a, c in zip(attained, commanded, strict=True)]
+        near, turned = _change([a.position for a in away]), _change([a.angles for a in away])
+    again, scattered = _change([r.position for r in spread]), _change([r.angles for r in spread])
+    return Drift(near, again, max(gone), turned, scattered)
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max(abs(value - values[0]) for value in values)
-
-
-def _largest_of_three(values: Sequence[Three | None]) -> Three | None:
-    known = np.array([value for value in values if value is not None])
-    return three(np.abs(known - known[0]).max(axis=0)) if len(known) == len(values) else None
+def _change(values: Sequence[Any]) -> Any:
+    """Return the largest change against the first of numbers or threes; ``None`` where one of them is unknown."""
+    if any(value is None for value in values):
+        return None
+    largest = np.abs(np.subtract(values, values[0])).max(axis=0)
+    return three(largest) if np.ndim(largest) else float(largest)
 
 
 @dataclass(frozen=True)
