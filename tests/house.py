@@ -89,10 +89,11 @@ def long_bodies():
 
 
 def effects_known_elsewhere():
+    every = {*library(), *RANDOM}
     for path in MODULES:
         here = path.relative_to(ROOT).parts[0]
         if here not in KNOWING and path.name != "__init__.py":
-            names = {*library(), *RANDOM} - ({"base_frame", "tool_frame"} if here in FRAMES else set())
+            names = every - ({"base_frame", "tool_frame"} if here in FRAMES else set())
             said = {n.value for n in ast.walk(tree(path)) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
             yield from (f"{dotted(path)}: {name}" for name in said & names)
 

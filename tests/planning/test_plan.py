@@ -9,11 +9,11 @@ import pytest
 
 from thermal_robot import CampaignError, EffectError, load_robot, observe, read_campaign
 from thermal_robot.campaign import Units
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.effects import library
 from thermal_robot.planning import plan, text, write_plan
 from thermal_robot.planning.plan import Columns, expectations
 from thermal_robot.robot import joint_range
-from thermal_robot.simulation.schedule import approaches
 
 TARGET = (0.05, 0.03, 0.1)
 DETERMINED = ("joint_gain", "transmission_error", "backlash")
@@ -57,7 +57,7 @@ def at_random(planned, seed):
     robot = commands.robot
     q = rng.uniform(*joint_range(robot), commands.q.shape)
     given = {n: v for n, v in commands.covariates.items() if not n.startswith("approach.")}
-    covariates = {**given, **approaches(q, robot.joint_names, given)}
+    covariates = {**given, **arrivals(q, robot.joint_names, given, None)}
     seen = observe(replace(commands, q=q, covariates=covariates))
     kinds = [library()[e.name].variants(seen)[0] for e in planned.effects if not e.lacks]
     columns = Columns.of(seen, kinds)

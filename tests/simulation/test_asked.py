@@ -171,8 +171,9 @@ def test_what_no_campaign_has_is_refused(rv_m2, given, message):
 def test_every_row_is_one_visit_and_none_follows_itself(rows, repeats):
     places = visits(rows, repeats)
     assert sorted(places.ravel().tolist()) == list(range(rows))
-    q, which = in_turn(np.arange(rows // repeats, dtype=float)[:, None], places)
-    assert np.array_equal(q[:, 0], which)
+    q, labels = in_turn(np.arange(rows // repeats, dtype=float)[:, None], places)
+    which = q[:, 0].astype(int)
+    assert [*labels.get("pose", ())] == ([str(k + 1) for k in which] if repeats > 1 else [])
     assert np.all(np.diff(which) != 0)
     assert np.bincount(which).tolist() == [repeats] * (rows // repeats)
 
