@@ -1,8 +1,8 @@
 """Criteria of ISO 9283:1998 from attained poses: where a robot really was, cycle after cycle.
 
 Clauses: AP 7.2.1, RP 7.2.2, vAP 7.2.3, drift 7.6, AT and RT 8.2 and 8.3. The standard cuts the attained paths with
-planes across the commanded one. Here a point of the path is a command, and what was measured for it in each cycle
-belongs to it: how far the robot lags behind counts in AT. The values of one pose or path are frozen.
+planes across the commanded one. Here a point of the path is a command with what was measured for it in each cycle, so
+that a lag of the robot counts in AT.
 """
 
 from __future__ import annotations
@@ -64,19 +64,18 @@ class Attained:
 
 
 def mean_rotation(rotations: Array) -> Array:
-    """Return the (3, 3) rotation from which the sum of squared chordal distances to (n, 3, 3) rotations is least.
+    """Chordal mean (3, 3) of (n, 3, 3) rotations: the mean matrix projected onto the rotations.
 
-    Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002): the projection of the mean matrix onto the rotations.
+    Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002).
     """
     u, _, vt = np.linalg.svd(rotations.mean(axis=0))
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
 
 def angles(rotations: Array, reference: Array) -> Array:
-    """(..., 3) angles a, b, c from a reference to rotations, about the axes of their common frame, rad.
+    """(..., 3) angles a, b, c from a reference to rotations: the rotation vector of R R_refᵀ, rad.
 
-    They are the rotation vector of R R_refᵀ. The angles of the standard, turns about one axis after the other, are the
-    same but for products of them: 1 µrad at 1 mrad.
+    The standard turns about one axis after the other, which differs by products of the angles: 1 µrad at 1 mrad.
     """
     return log3(rotations @ np.swapaxes(reference, -1, -2))
 
@@ -131,9 +130,8 @@ class Repeatability:
     position
         RP_l: mean distance and three of its standard deviations, m.
     ci95
-        Interval in which RP_l lies that endlessly many cycles would give, with a probability of 95 %, m; ``None`` with
-        two cycles, or without scatter. RP_l of few cycles is too small in the mean, by a sixth with five: the
-        interval counts that, and lies higher.
+        95 % interval of RP_l of endlessly many cycles, m; ``None`` with two cycles, or without scatter. RP_l of few
+        cycles is too small in the mean, by a sixth with five: the interval counts that, and lies higher.
     angles
         RP_a, RP_b, RP_c: three standard deviations, to be read as ±, rad; ``None`` where only positions are known.
     """
@@ -159,11 +157,10 @@ def _of(distances: Array) -> Array:
 
 
 def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
-    """95 % interval of RP_l for normal scatter of any shape, by repeating the test in simulation.
+    """95 % interval of RP_l by parametric bootstrap, from normal scatter with the sample's principal axes.
 
-    What n cycles show, over what endlessly many would, depends on the shape of the scatter alone, not on its size. The
-    shape is that of the sample: how far it spreads along its principal axes. The draws are the same in each call, so
-    that the same table gives the same figures.
+    What n cycles show, over what endlessly many would, depends on the shape of the scatter, not on its size. The draws
+    are the same in each call.
     """
     cycles = len(deviations)
     if cycles < FEWEST_FOR_INTERVAL or value == 0.0:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.write import write_commands, write_planned
 from thermal_robot.diagnosis import settings as design
 from thermal_robot.diagnosis.next_measurement import most_informative
@@ -398,9 +399,8 @@ def _in_order(
 ) -> Campaign:
     """Return the plan of poses (P, n) in the k-th balanced order, with the approaches that follow from it."""
     mixed = poses if k == 0 else poses[rng.permutation(len(poses))]
-    q, which = schedule.in_turn(mixed[schedule.balanced(mixed, visits, rng)], visits)
-    sides = schedule.approaches(q, empty.robot.joint_names, given)
-    labels = {"pose": np.array([str(k + 1) for k in which])} if visits.shape[1] > 1 else {}
+    q, labels = schedule.in_turn(mixed[schedule.balanced(mixed, visits, rng)], visits)
+    sides = arrivals(q, empty.robot.joint_names, given, None)
     return _filled(empty, q, {**given, **sides}, labels)
 
 

@@ -45,8 +45,7 @@ def _commanded(
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
         poses, times = _poses(robot, rows, repeats, commands, rng)
-        q, which = schedule.in_turn(poses, schedule.visits(len(poses) * times, times))
-        labels = {"pose": np.array([str(k + 1) for k in which])} if times > 1 else {}
+        q, labels = schedule.in_turn(poses, schedule.visits(len(poses) * times, times))
         given = schedule.conditions(len(q), schedule.RISE)
         plan = Campaign("simulated", robot, q, covariates=given, labels=labels, base_known=True, tool_known=True)
     return arrived(_under(plan, conditions))
