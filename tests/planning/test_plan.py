@@ -36,7 +36,7 @@ def test_poses_are_within_limits_and_repeats_are_labelled_and_count_among_the_ro
 @pytest.mark.parametrize("repeats", [1, 2, 4])
 def test_each_joint_comes_from_both_sides(source, repeats):
     robot = load_robot(source, "tool0")
-    for seed in range(3):
+    for seed in range(2):
         q = plan(robot, 60, ["backlash"], repeats=repeats, seed=seed).commands.q
         moved = np.diff(q, axis=0)
         assert np.all(moved != 0.0)
@@ -44,11 +44,11 @@ def test_each_joint_comes_from_both_sides(source, repeats):
         assert np.all((rising > 0.35) & (rising < 0.65))
 
 
-def test_the_same_seed_gives_the_same_plan(rv_m2, planned):
-    again, other = (plan(rv_m2, 60, target=TARGET, loads=(1.5,), seed=seed) for seed in (5, 6))
-    assert np.array_equal(again.commands.q, planned.commands.q)
-    assert again.to_dict() == planned.to_dict()
-    assert not np.array_equal(other.commands.q, planned.commands.q)
+def test_the_same_seed_gives_the_same_plan(rv_m2):
+    one, again, other = (plan(rv_m2, 20, DETERMINED, target=TARGET, loads=(1.5,), seed=seed) for seed in (5, 5, 6))
+    assert np.array_equal(again.commands.q, one.commands.q)
+    assert again.to_dict() == one.to_dict()
+    assert not np.array_equal(other.commands.q, one.commands.q)
 
 
 def at_random(planned, seed):
