@@ -17,7 +17,7 @@ from thermal_robot.campaign.write import write_table
 NOISE = 25e-6
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def one_diagnosis_of_a_campaign(diagnosed_once):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(thermal_robot.diagnosis, "diagnose", diagnosed_once)
@@ -47,13 +47,13 @@ def poses(rv_m2, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def diagnosed(folder, tmp_path_factory):
-    return diagnosed_files(folder, tmp_path_factory.mktemp("diagnosed"))
+def diagnosed(folder, tmp_path_factory, diagnosed_once):
+    return diagnosed_files(folder, tmp_path_factory.mktemp("diagnosed"), diagnosed_once)
 
 
 @pytest.fixture(scope="session")
-def diagnosed_poses(poses, tmp_path_factory):
-    return diagnosed_files(poses, tmp_path_factory.mktemp("diagnosed"))
+def diagnosed_poses(poses, tmp_path_factory, diagnosed_once):
+    return diagnosed_files(poses, tmp_path_factory.mktemp("diagnosed"), diagnosed_once)
 
 
 @pytest.fixture

@@ -201,11 +201,11 @@ def test_the_program_itself_exits_as_it_should(folder, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_table_that_is_at_fault_is_bad_input_and_gives_no_model(run, poses, tmp_path):
+def test_a_table_that_is_at_fault_is_bad_input_and_gives_no_model(run, poses, tmp_path, diagnosed_once):
     campaign = read_campaign(poses)
     spoilt = replace(campaign, q=campaign.q * np.where(np.arange(campaign.robot.n) == 2, -1.0, 1.0))
     write_campaign(spoilt, tmp_path / "cell")
-    done = diagnosed_files(tmp_path / "cell", tmp_path)
+    done = diagnosed_files(tmp_path / "cell", tmp_path, diagnosed_once)
     assert done.status == cli.BAD_INPUT
     assert done.complaint.count("\n") == 1
     assert "joint_3 is reversed" in done.complaint

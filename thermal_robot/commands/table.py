@@ -102,47 +102,47 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def _of(*names: str, **how: Any) -> Option:
+def _option(*names: str, **how: Any) -> Option:
     return Option(names, how)
 
 
-def _to(metavar: str, *names_and_help: str, **how: Any) -> Option:
+def _value(metavar: str, *names_and_help: str, **how: Any) -> Option:
     """Return an option that takes a value; its help comes last."""
     *names, text = names_and_help
     return Option(tuple(names), {"metavar": metavar, "help": text, **how})
 
 
-def _in(name: str, text: str, **how: Any) -> Option:
+def _file(name: str, text: str, **how: Any) -> Option:
     return Option((name,), {"help": text, **how}, "in")
 
 
-def _out(metavar: str, *names_and_help: str, **how: Any) -> Option:
-    return _to(metavar, *names_and_help, **how)._replace(stream="out")
+def _output(metavar: str, *names_and_help: str, **how: Any) -> Option:
+    return _value(metavar, *names_and_help, **how)._replace(stream="out")
 
 
 def _flag(name: str, text: str) -> Option:
-    return _of(name, action="store_true", help=text)
+    return _option(name, action="store_true", help=text)
 
 
 def _json(what: str) -> Option:
-    return _out("F", "--json", f"write the {what} as JSON ('-' prints it instead of the text)")
+    return _output("F", "--json", f"write the {what} as JSON ('-' prints it instead of the text)")
 
 
 def _triple(metavar: str, name: str, text: str, *default: float) -> Option:
-    return _to(metavar, name, text, nargs=3, type=float, default=list(default))
+    return _value(metavar, name, text, nargs=3, type=float, default=list(default))
 
 
 def _effects(name: str, text: str, **how: Any) -> Option:
-    return _to("EFFECT", name, text, nargs="+", action="extend", **how)
+    return _value("EFFECT", name, text, nargs="+", action="extend", **how)
 
 
 _NAMED = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
-_CAMPAIGN = _in("campaign", _NAMED)
-_MODEL = _in("model", "file that `diagnose --model` wrote, or - for standard input")
-_REPORT = _out("F.html", "--report", "write a page with figures ('-' prints it)")
+_CAMPAIGN = _file("campaign", _NAMED)
+_MODEL = _file("model", "file that `diagnose --model` wrote, or - for standard input")
+_REPORT = _output("F.html", "--report", "write a page with figures ('-' prints it)")
 _CHOICE = (_effects("--without", "leave effects out", default=[]), _effects("--only", "consider these only"))
 _ROBOT = "its file, or a robot that comes along, as in campaign.toml"
-_ROOT = _to("LINK", "--root", "where the chain starts; the root of the URDF where left out")
+_ROOT = _value("LINK", "--root", "where the chain starts; the root of the URDF where left out")
 _TARGET = "the link that carries the target"
 _WIDE = max(map(len, FORMATS))
 _ALL = {"only": None, "without": ()}
@@ -152,7 +152,7 @@ COMMANDS = {
         "diagnose a campaign that comes with the package, and draw it",
         "",
         "campaigns:demo",
-        [_out("F.html", "--report", "page to draw (default: %(default)s)", default="demo.html")],
+        [_output("F.html", "--report", "page to draw (default: %(default)s)", default="demo.html")],
         fixed=_ALL,
     ),
     "plan": Command(
@@ -160,22 +160,22 @@ COMMANDS = {
         " robot.urdf --tool tool0 --rows 60 -o campaign",
         "making:plan",
         [
-            _to("URDF", "robot", _ROBOT),
-            _to("DIR", "-o", "--output", "folder of the campaign to measure; a table if F.csv"),
-            _to("LINK", "--tool", _TARGET, default=""),
+            _value("URDF", "robot", _ROBOT),
+            _value("DIR", "-o", "--output", "folder of the campaign to measure; a table if F.csv"),
+            _value("LINK", "--tool", _TARGET, default=""),
             _ROOT,
-            _to("N", "--rows", "of the campaign, repeats included (60)", type=int, default=60),
-            _to("K", "--repeats", "how often each pose is measured (1)", type=int, default=1),
-            _to("EFFECT", "--effects", "those to tell; all where left out", nargs="+"),
-            _to("MM", "--noise", "one sigma per axis, mm (0.02)", type=float, default=0.02),
+            _value("N", "--rows", "of the campaign, repeats included (60)", type=int, default=60),
+            _value("K", "--repeats", "how often each pose is measured (1)", type=int, default=1),
+            _value("EFFECT", "--effects", "those to tell; all where left out", nargs="+"),
+            _value("MM", "--noise", "one sigma per axis, mm (0.02)", type=float, default=0.02),
             _flag("--orientation", "orientations will be measured, too"),
             _triple("MM", "--target", "in the tool, mm", 0.0, 0.0, 0.0),
-            _to("KG", "--loads", "payloads beside none", nargs="+", type=float, default=[]),
-            _to("K", "--warming", "by how much the robot warms (6)", type=float, default=6.0),
-            _of("--known", choices=("base", "tool"), nargs="+", default=[], help="frames that will be known"),
-            _of("--angle-unit", choices=ANGLE_UNITS, default="rad", help="of the joints in the table (rad)"),
-            _of("--length-unit", choices=LENGTH_UNITS, default="mm", help="of lengths in the table (mm)"),
-            _to("N", "--seed", "of the candidates (0)", type=int, default=0),
+            _value("KG", "--loads", "payloads beside none", nargs="+", type=float, default=[]),
+            _value("K", "--warming", "by how much the robot warms (6)", type=float, default=6.0),
+            _option("--known", choices=("base", "tool"), nargs="+", default=[], help="frames that will be known"),
+            _option("--angle-unit", choices=ANGLE_UNITS, default="rad", help="of the joints in the table (rad)"),
+            _option("--length-unit", choices=LENGTH_UNITS, default="mm", help="of lengths in the table (mm)"),
+            _value("N", "--seed", "of the candidates (0)", type=int, default=0),
             _json("plan"),
         ],
     ),
@@ -186,17 +186,17 @@ COMMANDS = {
         "list the effects that are considered, and what each needs",
         "",
         "campaigns:effects",
-        [_in("campaign", f"{_NAMED}; what it recorded is then not asked for", nargs="?")],
+        [_file("campaign", f"{_NAMED}; what it recorded is then not asked for", nargs="?")],
     ),
     "diagnose": Command(
         "say where the gap lies, what causes it, how far it shrinks",
         " campaign.toml --report diagnosis.html --model model.json",
         "campaigns:diagnose",
         [
-            _in("campaign", _NAMED, nargs="?"),
+            _file("campaign", _NAMED, nargs="?"),
             _json("diagnosis"),
             _REPORT,
-            _out("F", "--model", "save the corrected model for `predict` ('-' prints it)"),
+            _output("F", "--model", "save the corrected model for `predict` ('-' prints it)"),
             _effects("--without", "leave effects out; `thermal-robot effects` lists their names", default=[]),
             _effects("--only", "consider these only; both options take several names"),
         ],
@@ -207,7 +207,7 @@ COMMANDS = {
         " january june december --report compared.html",
         "several:compare",
         [
-            _to(
+            _value(
                 "campaign",
                 "campaigns",
                 "two or more in order of time: campaign.toml, its folder, or a model",
@@ -226,7 +226,7 @@ COMMANDS = {
         [
             _CAMPAIGN,
             _flag("--no-diagnosis", "show the gap alone, at once"),
-            _to("N", "--port", f"of this machine ({PORT}; the next free one)", type=_port, default=PORT),
+            _value("N", "--port", f"of this machine ({PORT}; the next free one)", type=_port, default=PORT),
             _flag("--open", "open the page in the default browser"),
         ],
         fixed=_ALL,
@@ -237,8 +237,10 @@ COMMANDS = {
         "models:predict",
         [
             _MODEL,
-            _in("samples", "table with the campaign's columns and units, or - for standard input (CSV)"),
-            _out("F", "-o", "--output", "table to write, Parquet by its ending ('-' prints it as CSV)", required=True),
+            _file("samples", "table with the campaign's columns and units, or - for standard input (CSV)"),
+            _output(
+                "F", "-o", "--output", "table to write, Parquet by its ending ('-' prints it as CSV)", required=True
+            ),
             _flag("--noise", "count the instrument's noise in std.x, std.y, std.z"),
         ],
     ),
@@ -248,17 +250,17 @@ COMMANDS = {
         "models:correct",
         [
             _MODEL,
-            _in("poses", "table of nominal joint positions and conditions, as the campaign's; or - (CSV)", nargs="?"),
-            _out("F", "-o", "--output", "table to write, with commands in the place of joint positions ('-': CSV)"),
-            _out("F", "--urdf", "write the calibrated robot as a URDF ('-' prints it)"),
-            _out("F.xml", "--mjcf", "write it as an MJCF for MuJoCo; needs the extra `blind`"),
-            _in("--from-mjcf", "MJCF of the nominal robot to write --mjcf from", metavar="F.xml"),
-            _out("F.csv", "--dh", "write its parameters of Denavit and Hartenberg"),
-            _out("F.yaml", "--ur-kinematics", "write it as Universal Robots' kinematics.yaml"),
+            _file("poses", "table of nominal joint positions and conditions, as the campaign's; or - (CSV)", nargs="?"),
+            _output("F", "-o", "--output", "table to write, with commands in the place of joint positions ('-': CSV)"),
+            _output("F", "--urdf", "write the calibrated robot as a URDF ('-' prints it)"),
+            _output("F.xml", "--mjcf", "write it as an MJCF for MuJoCo; needs the extra `blind`"),
+            _file("--from-mjcf", "MJCF of the nominal robot to write --mjcf from", metavar="F.xml"),
+            _output("F.csv", "--dh", "write its parameters of Denavit and Hartenberg"),
+            _output("F.yaml", "--ur-kinematics", "write it as Universal Robots' kinematics.yaml"),
             _flag("--modified", "those of Craig's modified convention"),
-            _out("F.csv", "--offsets", "write what to add to the commands of each joint's zero"),
-            _to("K", "--min-sigma", "leave out what is less than K standard deviations from zero", type=float),
-            _to("C", "--temperature", "°C at which lengths hold (default: the campaign's reference)", type=float),
+            _output("F.csv", "--offsets", "write what to add to the commands of each joint's zero"),
+            _value("K", "--min-sigma", "leave out what is less than K standard deviations from zero", type=float),
+            _value("C", "--temperature", "°C at which lengths hold (default: the campaign's reference)", type=float),
         ],
     ),
     "wear": Command(
@@ -266,11 +268,11 @@ COMMANDS = {
         " january march june --dates 2026-01-12 2026-03-02 2026-06-08 --limit backlash=5e-4",
         "several:wear",
         [
-            _to("CAMPAIGN", "campaigns", "campaign.toml or its folder, three or more, in order of time", nargs="+"),
-            _to("DATE", "--dates", "of each campaign, 2026-03-01; without them no rate is told", nargs="+"),
-            _to("EFFECT=VALUE", "--limit", "of its parameters, SI; may be repeated", action="append", default=[]),
-            _to("EFFECT", "--only", "consider these effects, and the zeros of joints", nargs="+"),
-            _to("P", "--false-alarm", "share of series without a change that may ring at all (0.01)", type=float),
+            _value("CAMPAIGN", "campaigns", "campaign.toml or its folder, three or more, in order of time", nargs="+"),
+            _value("DATE", "--dates", "of each campaign, 2026-03-01; without them no rate is told", nargs="+"),
+            _value("EFFECT=VALUE", "--limit", "of its parameters, SI; may be repeated", action="append", default=[]),
+            _value("EFFECT", "--only", "consider these effects, and the zeros of joints", nargs="+"),
+            _value("P", "--false-alarm", "share of series without a change that may ring at all (0.01)", type=float),
             _json("result"),
             _REPORT,
         ],
@@ -282,7 +284,7 @@ COMMANDS = {
         [
             _CAMPAIGN,
             _json("criteria"),
-            _out("F", "--csv", "write a table, one row a figure, in m and rad ('-' prints it)"),
+            _output("F", "--csv", "write a table, one row a figure, in m and rad ('-' prints it)"),
         ],
     ),
     "fleet": Command(
@@ -290,18 +292,18 @@ COMMANDS = {
         " campaigns --out fleet --labels hall robot",
         "several:fleet",
         [
-            _to("FOLDER|LIST", "source", "every campaign.toml below it; or CSV or TOML with paths and labels"),
-            _to("DIR", "-o", "--out", "folder of table and page, made if need be", required=True),
-            _to("NAME", "--labels", "what the levels of folders are, from the top", nargs="+", default=[]),
-            _to("N", "--workers", "processes on this machine (default: one a core)", type=int),
-            _to(
+            _value("FOLDER|LIST", "source", "every campaign.toml below it; or CSV or TOML with paths and labels"),
+            _value("DIR", "-o", "--out", "folder of table and page, made if need be", required=True),
+            _value("NAME", "--labels", "what the levels of folders are, from the top", nargs="+", default=[]),
+            _value("N", "--workers", "processes on this machine (default: one a core)", type=int),
+            _value(
                 "MINUTES",
                 "--time-limit",
                 f"for each campaign (default: {TIME_LIMIT / 60.0:.0f})",
                 type=float,
                 default=TIME_LIMIT / 60.0,
             ),
-            _to("ADDRESS", "--scheduler", "of Dask on a cluster, instead of processes here"),
+            _value("ADDRESS", "--scheduler", "of Dask on a cluster, instead of processes here"),
             *_CHOICE,
         ],
     ),
@@ -310,16 +312,16 @@ COMMANDS = {
         " table log.csv --mapping mapping.toml -o campaign",
         "making:import_files",
         [
-            _to("FORMAT", "format", "what the files are, see below", choices=FORMATS),
-            _to("FILES", "files", "to read, as many as the format has", nargs="+"),
-            _to("DIR", "-o", "--output", "folder of the campaign, made if need be", required=True),
-            _to("URDF", "--robot", _ROBOT),
-            _to("LINK", "--tool", _TARGET),
+            _value("FORMAT", "format", "what the files are, see below", choices=FORMATS),
+            _value("FILES", "files", "to read, as many as the format has", nargs="+"),
+            _value("DIR", "-o", "--output", "folder of the campaign, made if need be", required=True),
+            _value("URDF", "--robot", _ROBOT),
+            _value("LINK", "--tool", _TARGET),
             _ROOT,
-            _to("F.yaml", "--kinematics", "calibration of a robot of Universal Robots (ROS)"),
-            _of("--angle-unit", choices=ANGLE_UNITS, help="of the joints, where the format does not say"),
-            _of("--length-unit", choices=LENGTH_UNITS, help="of the positions, where the format does not say"),
-            _to("F.toml", "--mapping", "what the columns are, and the campaign's declarations"),
+            _value("F.yaml", "--kinematics", "calibration of a robot of Universal Robots (ROS)"),
+            _option("--angle-unit", choices=ANGLE_UNITS, help="of the joints, where the format does not say"),
+            _option("--length-unit", choices=LENGTH_UNITS, help="of the positions, where the format does not say"),
+            _value("F.toml", "--mapping", "what the columns are, and the campaign's declarations"),
         ],
         epilog="formats:\n"
         + "\n".join(f"  {name:{_WIDE}}  {each.does}\n  {'':{_WIDE}}  {each.files}" for name, each in FORMATS.items()),
@@ -329,33 +331,33 @@ COMMANDS = {
         " robot.urdf --tool tool0 -o map.parquet --x -0.8 0.8 41 --y -0.8 0.8 41 --z 0.2 0.2 1 --figure map.png",
         "workspace:run",
         [
-            _to("URDF", "robot", _ROBOT),
-            _to("F", "-o", "--output", "F.parquet or F.zarr; gone on with if it is there", required=True),
-            _to("LINK", "--tool", "the link that holds the part", default=""),
+            _value("URDF", "robot", _ROBOT),
+            _value("F", "-o", "--output", "F.parquet or F.zarr; gone on with if it is there", required=True),
+            _value("LINK", "--tool", "the link that holds the part", default=""),
             _ROOT,
             *(
-                _of(f"--{a}", nargs=3, metavar=("FROM", "TO", "N"), help=f"places along {a} of the root frame, m")
+                _option(f"--{a}", nargs=3, metavar=("FROM", "TO", "N"), help=f"places along {a} of the root frame, m")
                 for a in "xyz"
             ),
-            _to("N", "--joints", "instead of places: N joint positions that fill the limits", type=int),
-            _to("S", "--sigma", "1 sigma, rad or m: one, or JOINT=S … (5e-5)", nargs="+", default=["5e-5"]),
-            _to("A", "--expansion", "1/K: one, or SEGMENT=A … (1.2e-5)", nargs="+", default=["1.2e-5"]),
-            _to("K", "--rise", "of temperature: one, or SEGMENT=K … (3)", nargs="+", default=["3"]),
-            _of(
+            _value("N", "--joints", "instead of places: N joint positions that fill the limits", type=int),
+            _value("S", "--sigma", "1 sigma, rad or m: one, or JOINT=S … (5e-5)", nargs="+", default=["5e-5"]),
+            _value("A", "--expansion", "1/K: one, or SEGMENT=A … (1.2e-5)", nargs="+", default=["1.2e-5"]),
+            _value("K", "--rise", "of temperature: one, or SEGMENT=K … (3)", nargs="+", default=["3"]),
+            _option(
                 "--law",
                 choices=("shift", "uniform"),
                 default="shift",
                 help="the rise has happened; or is within ± (shift)",
             ),
-            _to("MM", "--clearance", "diameter for the probability, mm (0.2)", type=float, default=0.2),
-            _to("CP", "--capability", "for the required clearance (1.33)", type=float, default=1.33),
+            _value("MM", "--clearance", "diameter for the probability, mm (0.2)", type=float, default=0.2),
+            _value("CP", "--capability", "for the required clearance (1.33)", type=float, default=1.33),
             _triple("X", "--approach", "where the tool points, root frame (0 0 -1)", 0.0, 0.0, -1.0),
             _triple("X", "--axis", "the tool's direction, tool frame (0 0 1)", 0.0, 0.0, 1.0),
             _triple("MM", "--point", "the tip in the tool frame, mm (0 0 0)", 0.0, 0.0, 0.0),
-            _to("COLUMN", "--by", "what tells the best places (required_warm)", default="required_warm"),
-            _to("RULE", "--where", "what they must have, such as 'capability_warm>=1.33'", nargs="+", default=[]),
-            _to("N", "--count", "of them (5)", type=int, default=5),
-            _out("F.png", "--figure", "draw the column of --by: contours of a plane, else points in space"),
+            _value("COLUMN", "--by", "what tells the best places (required_warm)", default="required_warm"),
+            _value("RULE", "--where", "what they must have, such as 'capability_warm>=1.33'", nargs="+", default=[]),
+            _value("N", "--count", "of them (5)", type=int, default=5),
+            _output("F.png", "--figure", "draw the column of --by: contours of a plane, else points in space"),
             _json("best places"),
             _flag("--replace", "begin anew where another map stands there"),
         ],
@@ -366,7 +368,7 @@ COMMANDS = {
         "making:paper",
         [
             _json("ledger"),
-            _to("M", "--l5", "wrist to tool point, m (default: 0.150, assumed)", type=float),
+            _value("M", "--l5", "wrist to tool point, m (default: 0.150, assumed)", type=float),
             _flag("--markdown", "print the table of docs/paper.md instead of the text"),
         ],
     ),
