@@ -3,6 +3,7 @@
 import argparse
 import inspect
 import json
+from types import SimpleNamespace
 
 import pytest
 from campaign.importers.written import put
@@ -108,19 +109,14 @@ def test_what_cannot_be_imported_is_one_line(run, tmp_path):
 
 
 def test_the_ledger_is_printed_and_written(run, tmp_path, monkeypatch):
-    found = thermal_robot.paper.ledger(thermal_robot.paper.PaperInputs())  # takes half a minute: once for all
-    monkeypatch.setattr(thermal_robot.paper, "ledger", lambda inputs: found)
-    assert run("paper") == (0, f"{found.text()}\n", "")
-    status, out, err = run("paper", "--json", "-")
-    assert (status, err) == (0, "")
-    assert json.loads(out) == json.loads(json.dumps(found.to_dict()))
-    assert run("paper", "--json", tmp_path / "ledger.json") == (0, f"{found.text()}\n", "")
-    assert (tmp_path / "ledger.json").read_text(encoding="utf-8") == out
-    table = run("paper", "--markdown")[1]
-    assert "|" in table
-    assert table != f"{found.text()}\n"
-
-
-@pytest.mark.parametrize("length", ["-1", "nan"])
-def test_a_length_that_is_none_is_bad_input(run, length):
-    refused(run("paper", "--l5", length))
+    """One of a single row; the room of the paper asks for all of it."""
+    told = {"entries": [{"quantity": "σ", "unit": "µm"}]}
+    found = SimpleNamespace(text=lambda: "σ", markdown=lambda: "| σ |", to_dict=lambda: told)
+    asked = []
+    monkeypatch.setattr(thermal_robot.paper, "ledger", lambda inputs: asked.append(inputs.l5) or found)
+    assert run("paper", "--json", tmp_path / "ledger.json") == (0, "σ\n", "")
+    assert run("paper", "--markdown", "--l5", "0.2") == (0, "| σ |\n", "")
+    assert run("paper", "--json", "-") == (0, (tmp_path / "ledger.json").read_text(encoding="utf-8"), "")
+    assert json.loads((tmp_path / "ledger.json").read_text(encoding="utf-8")) == told
+    assert asked == [0.15, 0.2, 0.15]
+    refused(run("paper", "--l5", "nan"))
