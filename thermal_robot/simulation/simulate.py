@@ -280,8 +280,9 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
     ground = Frames.declared(plan).base if base is None else _pose("base", base)
-    point, target = (None if tool is None else _point(tool)), None
-    if point is not None:
+    point, target = _array(tool), None
+    sits = point.shape == (3,)
+    if sits:
         plan = replace(plan, target=point)
     elif tool is not None:
         target = _pose("tool", tool)
@@ -290,7 +291,7 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
     true = Frames(ground, declared.tool if target is None else target)
     usual = {
         "base_known": plan.base_known if base is None else False,
-        "tool_known": plan.tool_known if tool is None else point is not None,
+        "tool_known": plan.tool_known if tool is None else sits,
     }
     sure = {key: usual[key] if value is None else value for key, value in known.items()}
     apart = {"base_known": (true.base, declared.base), "tool_known": (true.tool, declared.tool)}
@@ -301,22 +302,17 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
     return replace(plan, base_known=sure["base_known"], tool_known=sure["tool_known"]), true
 
 
-def _point(tool: Any) -> Array | None:
-    """Return three numbers; ``None`` for everything else."""
+def _array(given: Any) -> Array:
+    """Return numbers as an array; an empty one of everything else."""
     try:
-        point = np.array(tool, dtype=np.float64)
+        return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        return None
-    return point if point.shape == (3,) else None
+        return np.empty(0)
 
 
 def _pose(key: str, given: Any) -> Array:
     """Return a (4, 4) pose, seen to be rigid."""
-    also = ", or three numbers" if key == "tool" else ""
-    try:
-        pose = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        pose = np.empty(0)
+    also, pose = ", or three numbers" if key == "tool" else "", _array(given)
     if pose.shape == (4, 4) and np.isfinite(pose).all():
         turn = pose[:3, :3]
         right = np.allclose(turn @ turn.T, np.eye(3), atol=_RIGID) and np.linalg.det(turn) > 0.0
