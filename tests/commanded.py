@@ -6,16 +6,19 @@ from contextlib import redirect_stderr, redirect_stdout
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+import thermal_robot.diagnosis
 from thermal_robot import cli
 
 
-def diagnosed_once(folder, out):
+def diagnosed_files(folder, out, diagnose):
     """Run `diagnose` with every file that it can write; give status, text, complaint and the files' paths."""
     files = {"json": out / "d.json", "report": out / "r.html", "model": out / "m.json"}
     wanted = [word for kind, path in files.items() for word in (f"--{kind}", str(path))]
     text, complaint = io.StringIO(), io.StringIO()
-    with redirect_stdout(text), redirect_stderr(complaint):
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(text), redirect_stderr(complaint):
+        patch.setattr(thermal_robot.diagnosis, "diagnose", diagnose)
         status = cli.main(["diagnose", str(folder), *wanted])
     return SimpleNamespace(status=status, text=text.getvalue(), complaint=complaint.getvalue(), **files)
 

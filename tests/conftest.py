@@ -1,9 +1,15 @@
-"""Robots that several tests use."""
+"""Robots that several tests use, and diagnoses that are made once."""
+
+import hashlib
+import os
+import pickle
 
 import numpy as np
 import pytest
 from coupled import COUPLED, PARALLELOGRAM
 
+from thermal_robot import diagnose
+from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.robot import load_robot
 
 # Every way in which a chain can be awkward: axes along nothing in particular, prismatic and continuous
@@ -122,3 +128,31 @@ def configurations():
         return rng.uniform(np.maximum(robot.lower, -4.0), np.minimum(robot.upper, 4.0), (rows, robot.n))
 
     return draw
+
+
+@pytest.fixture(scope="session")
+def diagnosed_once(tmp_path_factory):
+    """Diagnose as :func:`thermal_robot.diagnose`, each campaign once in a run: by content, for all its processes."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "diagnoses"
+    folder.mkdir(exist_ok=True)
+    known = {}
+
+    def diagnosed(campaign, *, progress=lambda stage: None, **asked):
+        campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
+        key = hashlib.sha256(pickle.dumps((campaign, sorted(asked.items())))).hexdigest()
+        file = folder / key
+        if key not in known and file.exists():
+            known[key] = pickle.loads(file.read_bytes())
+        if key not in known:
+            stages = []
+            known[key] = diagnose(campaign, progress=stages.append, **asked), stages
+            unfinished = folder / f"{key}.{os.getpid()}"
+            unfinished.write_bytes(pickle.dumps(known[key]))
+            unfinished.replace(file)
+        found, stages = known[key]
+        for stage in stages:
+            progress(stage)
+        return found
+
+    return diagnosed

@@ -28,39 +28,31 @@ def terminal(monkeypatch):
     return screen
 
 
-def work(loudness):
-    with stages(loudness) as progress:
+def told_of_work(loudness, screen=None):
+    screen = screen or io.StringIO()
+    with redirect_stderr(screen), stages(loudness) as progress:
         for stage in SAID:
             progress(stage)
+    return screen.getvalue()
 
 
 def test_the_last_of_several_wishes_counts():
     parser = argparse.ArgumentParser()
     add_loudness(parser, NORMAL)
-    assert [parser.parse_args(a).loudness for a in ([], ["-q"], ["-v"], ["-qv"], ["--verbose", "--quiet"])] == [
-        NORMAL, QUIET, VERBOSE, VERBOSE, QUIET,
-    ]  # fmt: skip
+    for given, loudness in (
+        ("", NORMAL),
+        ("-q", QUIET),
+        ("-v", VERBOSE),
+        ("-qv", VERBOSE),
+        ("--verbose --quiet", QUIET),
+    ):
+        assert parser.parse_args(given.split()).loudness == loudness
 
 
-@pytest.mark.parametrize("loudness", [QUIET, NORMAL])
-def test_off_a_terminal_no_stage_is_told_unasked(capsys, loudness):
-    work(loudness)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_quiet_holds_on_a_terminal(terminal):
-    with redirect_stderr(terminal):
-        work(QUIET)
-    assert terminal.getvalue() == ""
-
-
-def test_verbose_is_a_line_for_each_stage_with_the_seconds_on_a_terminal_too(capsys, terminal):
-    work(VERBOSE)
-    out, err = capsys.readouterr()
-    assert out == ""
-    with redirect_stderr(terminal):
-        work(VERBOSE)
-    for told in (err, terminal.getvalue()):
+def test_stages_are_told_unasked_on_a_terminal_alone(terminal):
+    assert told_of_work(QUIET) == told_of_work(NORMAL) == told_of_work(QUIET, terminal) == ""
+    # where they are asked for, each is a line with the seconds, on a terminal too
+    for told in (told_of_work(VERBOSE), told_of_work(VERBOSE, terminal)):
         lines = [line.split(" s  ") for line in told.splitlines()]
         assert [stage for _, stage in lines] == [*SAID, "done"]
         seconds = [float(number) for number, _ in lines]
@@ -88,34 +80,39 @@ def test_a_terminal_shows_the_stage_as_it_is_called_and_nothing_stays_at_work(te
     assert [t for t in threading.enumerate() if isinstance(t, threading.Timer)] == []
 
 
-def test_counted_work_has_bars_on_a_terminal(terminal):
+def test_counted_work_has_bars_on_a_terminal_and_a_line_for_every_tenth_elsewhere(terminal, capsys):
     with redirect_stderr(terminal), counted(NORMAL) as progress:
         progress("diagnoses", 40, 40)
     assert "40/40" in terminal.getvalue()
+    for loudness, lines in ((QUIET, 0), (NORMAL, 10), (VERBOSE, 10)):
+        with counted(loudness) as progress:
+            for done in range(41):
+                progress("diagnoses", done, 40)
+        err = capsys.readouterr().err
+        assert err.count("\n") == lines
+        assert lines == 0 or err.endswith("diagnoses: 40 of 40\n")
 
 
-@pytest.mark.parametrize(("loudness", "lines"), [(QUIET, 0), (NORMAL, 10), (VERBOSE, 10)])
-def test_counted_work_is_a_line_for_every_tenth_elsewhere(capsys, loudness, lines):
-    with counted(loudness) as progress:
-        for done in range(41):
-            progress("diagnoses", done, 40)
-    err = capsys.readouterr().err
-    assert err.count("\n") == lines
-    assert lines == 0 or err.endswith("diagnoses: 40 of 40\n")
+def test_counted_work_that_takes_long_says_what_time_is_left(capsys, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: clock[0])
+    with counted(NORMAL) as progress:
+        for done in range(1, 101):  # half was done before
+            clock[0] += 60.0 if done > 50 else 0.0
+            progress("campaigns", done, 100)
+    lines = capsys.readouterr().err.splitlines()
+    assert (lines[4], lines[-1]) == ("campaigns: 50 of 100", "campaigns: 100 of 100")
+    told = dict(line.split(", about ") for line in lines[5:-1])
+    assert told["campaigns: 60 of 100"] == "40 min left"
+    assert told["campaigns: 90 of 100"] == "10 min left"
+    assert told["campaigns: 56 of 100"] == "44 min left"  # after five minutes of silence
+    assert [console._span(seconds) for seconds in (3.2, 720.0, 12600.0)] == ["3 s", "12 min", "3.5 h"]
 
 
 def test_a_note_is_one_line_unless_none_is_wanted(capsys):
     note("two\nlines", NORMAL)
     note("nothing", QUIET)
     assert capsys.readouterr().err == "thermal-robot: note: two lines\n"
-
-
-def chatter():
-    for _ in range(3):
-        warnings.warn("an effect is left out", Note, stacklevel=1)
-    warnings.warn("glyph missing", UserWarning, stacklevel=1)
-    warnings.warn("will be removed", DeprecationWarning, stacklevel=1)
-    logging.getLogger("their.library").warning("font %s not found", "x")
 
 
 @pytest.mark.parametrize(
@@ -133,28 +130,11 @@ def test_warnings_and_logs_become_notes_or_nothing(capsys, loudness, told):
         warnings.simplefilter("always", UserWarning)
         shown = warnings.showwarning
         with heard(loudness):
-            chatter()
+            for _ in range(3):
+                warnings.warn("an effect is left out", Note, stacklevel=1)
+            warnings.warn("glyph missing", UserWarning, stacklevel=1)
+            warnings.warn("will be removed", DeprecationWarning, stacklevel=1)
+            logging.getLogger("their.library").warning("font %s not found", "x")
         assert warnings.showwarning is shown
     assert capsys.readouterr().err.splitlines() == [f"thermal-robot: note: {text}" for text in told]
     assert (warnings.showwarning, logging.getLogger().handlers) == before
-
-
-def test_counted_work_that_takes_long_says_what_time_is_left(capsys, monkeypatch):
-    clock = [0.0]
-    monkeypatch.setattr(console.time, "monotonic", lambda: clock[0])
-    with counted(NORMAL) as progress:
-        for done in range(1, 101):  # half was done before
-            clock[0] += 60.0 if done > 50 else 0.0
-            progress("campaigns", done, 100)
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[4] == "campaigns: 50 of 100"
-    told = dict(line.split(", about ") for line in lines[5:-1])
-    assert told["campaigns: 60 of 100"] == "40 min left"
-    assert told["campaigns: 90 of 100"] == "10 min left"
-    assert told["campaigns: 56 of 100"] == "44 min left"  # after five minutes of silence
-    assert lines[-1] == "campaigns: 100 of 100"
-
-
-@pytest.mark.parametrize(("seconds", "said"), [(3.2, "3 s"), (720.0, "12 min"), (12600.0, "3.5 h")])
-def test_a_time_is_written_as_it_is_said(seconds, said):
-    assert console._span(seconds) == said

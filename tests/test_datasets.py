@@ -1,4 +1,4 @@
-"""The campaign that ships: all of its files are there, and it is the one that its stated seed makes."""
+"""The demo: its files are there, its seed makes them, and its diagnosis names exactly what was simulated."""
 
 import json
 
@@ -58,13 +58,9 @@ def test_its_folder_is_whole_and_stands_alone(tmp_path):
     for name in ("campaign.toml", "measurements.csv", "robot.urdf", "truth.json"):
         assert (folder / name).is_file()
         (tmp_path / name).write_bytes((folder / name).read_bytes())
-    np.testing.assert_array_equal(read_campaign(tmp_path).position, demo_campaign().position)
-
-
-def test_it_is_read_anew_each_time():
-    one, two = demo_campaign(), demo_campaign()
-    assert one is not two
-    np.testing.assert_array_equal(one.q, two.q)
+    one, two = read_campaign(tmp_path), demo_campaign()
+    np.testing.assert_array_equal(one.position, two.position)
+    assert two is not demo_campaign()
 
 
 def test_it_has_what_its_effects_need():
@@ -73,3 +69,34 @@ def test_it_has_what_its_effects_need():
     assert np.ptp(campaign.covariates["temperature"]) > 1.0
     assert {f"approach.{joint}" for joint in campaign.robot.joint_names} <= set(campaign.covariates)
     assert campaign.extra == ()
+
+
+def test_the_diagnosis_names_exactly_the_truth(truth, diagnosed_once):
+    found = diagnosed_once(demo_campaign())
+    assert set(found.verdict) == set(truth["effects"])
+    assert not found.unexplained.flagged
+    assert set(found.outliers) == set(truth["outliers"])
+    assert all(found.finding(name).status == "found" for name in truth["effects"])
+    known = [p for p in found.finding("backlash").parameters if p.identified]
+    true = truth["parts"]["backlash"]["values"]
+    assert {p.name for p in known} & set(true)
+    assert all(abs(p.value - true.get(p.name, 0.0)) < 4.0 * p.std for p in known)
+    strains_are_told(found.finding("thermal_elongation"), truth["parts"]["thermal_elongation"]["values"])
+    assert found.gap.rms_after < 1.1 * found.gap.noise_floor < found.gap.rms_before
+    faulty = {name.rsplit(", ", 1)[1] for name in truth["parts"]["backlash"]["values"]}
+    assert found.finding("backlash").locations[0].name in faulty
+
+
+def strains_are_told(finding, true):
+    """Each link has its own; or one is about their mean, and what a link is said to deviate is what it does."""
+    told = {p.name: p for p in finding.parameters if p.identified}
+    assert told
+    if "strain per kelvin" not in told:
+        assert all(abs(p.value - true[p.name]) < 4.0 * p.std for p in told.values())
+        return
+    common = told.pop("strain per kelvin")
+    assert abs(common.value - np.mean(list(true.values()))) < 4.0 * common.std
+    assert told
+    for name, deviation in told.items():
+        own = true[name.replace("deviation of", "strain per kelvin of")]
+        assert abs(common.value + deviation.value - own) < 4.0 * np.hypot(common.std, deviation.std)

@@ -26,8 +26,6 @@ PAGES.append(ROOT / "robots" / "README.md")
 HISTORY = "CHANGELOG.md"
 """The one page that names paths which are gone."""
 
-pages = pytest.mark.parametrize("page", PAGES, ids=[str(p.relative_to(ROOT)) for p in PAGES])
-
 
 def prose(page):
     """The page without its fenced blocks."""
@@ -40,16 +38,20 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
 
 
-@pages
-def test_every_relative_link_leads_somewhere(page):
+def of_pages(pattern, text=lambda page: page.read_text(encoding="utf-8")):
+    """Yield (page, what a pattern finds in it)."""
+    yield from ((page, found) for page in PAGES for found in re.findall(pattern, text(page)))
+
+
+def test_every_relative_link_leads_somewhere():
     missing = []
-    for target in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+    for page, target in of_pages(r"\]\(([^)\s]+)\)", prose):
         if re.match(r"[a-z]+:", target):
             continue
         path, _, anchor = target.partition("#")
         file = (page.parent / path).resolve() if path else page
         if not file.exists() or (anchor and anchor not in anchors(file)):
-            missing.append(target)
+            missing.append((page.name, target))
     assert missing == []
 
 
@@ -76,13 +78,11 @@ def test_a_dotted_path_is_found_or_not():
     assert not found("thermal_robot.Diagnosis.no_such_method")
 
 
-@pages
-def test_every_dotted_path_imports(page):
-    if page.name == HISTORY:
-        return
-    named = re.findall(r"(?<![\w/])(thermal_robot(?:\.[A-Za-z_]\w*)+)(?![\w/])", page.read_text(encoding="utf-8"))
+def test_every_dotted_path_imports():
+    named = of_pages(r"(?<![\w/])(thermal_robot(?:\.[A-Za-z_]\w*)+)(?![\w/])")
+    known = {name for page, name in named if page.name != HISTORY}
     data = {"thermal_robot.effects"}  # also the name of an entry point group
-    assert [name for name in sorted({*named} - data) if not found(name)] == []
+    assert [name for name in sorted(known - data) if not found(name)] == []
 
 
 def options():
@@ -91,11 +91,10 @@ def options():
     return {name: {o for a in sub._actions for o in a.option_strings} for name, sub in chosen.choices.items()}
 
 
-@pages
-def test_every_command_and_option_exists(page):
+def test_every_command_and_option_exists():
     known = options()
-    for command, rest in re.findall(r"thermal-robot ([a-z][a-z0-9]*)\b([^`\n]*)", page.read_text(encoding="utf-8")):
-        assert command in known, f"thermal-robot {command}"
+    for page, (command, rest) in of_pages(r"thermal-robot ([a-z][a-z0-9]*)\b([^`\n]*)"):
+        assert command in known, f"{page.name}: thermal-robot {command}"
         used = set(re.findall(r"(?<!\S)\[?(--?[a-z][\w-]*)", rest.split("#")[0]))
         assert used <= known[command], f"thermal-robot {command}{rest}"
 
@@ -159,10 +158,10 @@ def test_every_room_has_a_line_in_contributing():
     assert [room for room in rooms if f"`{room}" not in text and f"/{room}" not in text] == []
 
 
-def test_the_number_that_contributing_follows():
+def test_the_number_that_contributing_follows(diagnosed_once):
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     campaign = thermal_robot.demo_campaign()
-    found = thermal_robot.diagnose(campaign)
+    found = diagnosed_once(campaign)
     assert found.rows.rows[67] == 69
     assert f"−{-campaign.position[67, 0]:.6f} m" in text
     told = re.findall(r"(?:gap of|remainder of|\|) (\d+) µm", text)
@@ -182,10 +181,10 @@ def named_files(line):
             yield folder + name
 
 
-@pages
-def test_every_file_that_is_named_exists(page):
-    named = {name for line in page.read_text(encoding="utf-8").splitlines() for name in named_files(line)}
-    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+def test_every_file_that_is_named_exists():
+    lines = of_pages(r"(?m)^.*$")
+    named = {(page.name, name) for page, line in lines for name in named_files(line)}
+    assert [at for at in sorted(named) if not (ROOT / at[1]).exists()] == []
 
 
 def said_in_the_program():
@@ -205,10 +204,6 @@ def test_every_message_that_is_explained_is_one_of_the_program():
     page = prose(ROOT / "docs" / "troubleshooting.md")
     messages = re.findall(r"^\| `([^|]+)` \|", page, flags=re.M)
     assert len(messages) >= 30
-    texts = said_in_the_program()
-    unknown = []
-    for message in messages:
-        pattern = ".+".join(re.escape(part) for part in message.split("…"))
-        if not any(re.search(pattern, text.replace("`", "")) for text in texts):
-            unknown.append(message)
-    assert unknown == []
+    texts = {text.replace("`", "") for text in said_in_the_program()}
+    patterns = {message: ".+".join(map(re.escape, message.split("…"))) for message in messages}
+    assert [said for said, pattern in patterns.items() if not any(re.search(pattern, text) for text in texts)] == []

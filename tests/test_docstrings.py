@@ -4,16 +4,13 @@ import doctest
 import inspect
 from types import FunctionType
 
-import pytest
-
 import thermal_robot
 from thermal_robot import correction, effects, iso9283, planning
 
-ROOMS = (thermal_robot, planning, correction)
-"""Packages whose names are public, and all have an example."""
-ALSO = [(effects, name) for name in effects.__all__ if name.islower()]
-ALSO += [(iso9283, "Performance"), (iso9283, "performance")]
-"""Names of other packages that have one, too: what makes effects and chooses among them, and what a standard says."""
+PUBLIC = {name: getattr(room, name) for room in (thermal_robot, planning, correction) for name in room.__all__}
+PUBLIC |= {name: getattr(effects, name) for name in effects.__all__ if name.islower()}
+PUBLIC |= {name: getattr(iso9283, name) for name in ("Performance", "performance")}
+"""What has an example: the names of packages for users, what makes effects and chooses among them, a standard's."""
 IN_FULL = (
     thermal_robot.Campaign,
     thermal_robot.CorrectedModel,
@@ -23,8 +20,6 @@ IN_FULL = (
     iso9283.Performance,
 )
 """Classes of which each method has one of its own."""
-PUBLIC = {name: getattr(room, name) for room in ROOMS for name in room.__all__}
-PUBLIC |= {name: getattr(room, name) for room, name in ALSO}
 
 
 def examples():
@@ -40,49 +35,25 @@ EXAMPLES = list(examples())
 HAVING = {test.name for test in EXAMPLES}
 
 
-@pytest.fixture(scope="module")
-def answers():
-    """Diagnoses that were already made, by what was asked."""
-    return {}
-
-
-@pytest.fixture(autouse=True)
-def diagnosed_once(answers, monkeypatch):
-    """Let examples that ask the same of the same campaign share the answer, which is frozen."""
-    diagnose = thermal_robot.diagnose
-
-    def once(campaign, **asked):
-        what = (campaign.name, campaign.position.tobytes(), repr(sorted(asked.items())))
-        if what not in answers:
-            answers[what] = diagnose(campaign, **asked)
-        return answers[what]
-
-    monkeypatch.setattr(thermal_robot, "diagnose", once)
-
-
-@pytest.mark.parametrize("name", PUBLIC)
-def test_every_public_name_has_an_example(name):
-    assert name in HAVING
-
-
-@pytest.mark.parametrize("kind", IN_FULL, ids=lambda kind: kind.__name__)
-def test_every_method_has_an_example_and_every_property_is_in_one(kind):
-    members = {name: member for name, member in vars(kind).items() if not name.startswith("_")}
-    methods = [
-        name for name, member in members.items() if isinstance(member, (FunctionType, classmethod, staticmethod))
-    ]
-    assert methods
-    assert [name for name in methods if f"{kind.__name__}.{name}" not in HAVING] == []
+def test_every_public_name_and_method_has_an_example_and_every_property_is_in_one():
+    missing = [name for name in PUBLIC if name not in HAVING]
     shown = "".join(example.source for test in EXAMPLES for example in test.examples)
-    properties = [name for name, member in members.items() if hasattr(type(member), "__get__") and name not in methods]
-    assert [name for name in properties if f".{name}" not in shown] == []
+    for kind in IN_FULL:
+        for name, member in vars(kind).items():
+            if name.startswith("_"):
+                continue
+            if isinstance(member, (FunctionType, classmethod, staticmethod)):
+                missing += [f"{kind.__name__}.{name}"] if f"{kind.__name__}.{name}" not in HAVING else []
+            elif hasattr(type(member), "__get__") and f".{name}" not in shown:
+                missing.append(f"{kind.__name__}.{name}")
+    assert missing == []
 
 
-@pytest.mark.parametrize("test", EXAMPLES, ids=lambda test: test.name)
-def test_example_shows_what_it_prints(test, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    told = []
-    result = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS).run(
-        test, out=told.append, clear_globs=False
-    )
-    assert result.failed == 0, "".join(told)
+def test_examples_show_what_they_print(monkeypatch, tmp_path, diagnosed_once):
+    monkeypatch.setattr(thermal_robot, "diagnose", diagnosed_once)
+    runner, told = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS), []
+    for number, test in enumerate(EXAMPLES):
+        (tmp_path / str(number)).mkdir()
+        monkeypatch.chdir(tmp_path / str(number))
+        runner.run(test, out=told.append, clear_globs=False)
+    assert runner.summarize(verbose=False).failed == 0, "".join(told)

@@ -39,11 +39,11 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path, ends):
     assert list(tmp_path.iterdir()) == [file]
 
 
-@pytest.mark.parametrize("write", [lambda path: write_text(path, "text"), lambda path: write_bytes(path, b"text")])
-def test_no_folder_is_an_error_that_names_the_file_and_leaves_nothing(tmp_path, write):
+@pytest.mark.parametrize(("write", "content"), [(write_text, "text"), (write_bytes, b"text")])
+def test_no_folder_is_an_error_that_names_the_file_and_leaves_nothing(tmp_path, write, content):
     file = tmp_path / "nowhere" / "model.json"
     with pytest.raises(FileNotFoundError, match="No such file") as caught:
-        write(file)
+        write(file, content)
     assert (caught.value.filename, caught.value.filename2) == (str(file), None)
     assert ".thermal-robot-" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pages import blocks, shown_lines_are_printed
 
+import thermal_robot
 from thermal_robot import demo_campaign, read_campaign
 
 README = Path(__file__).parents[1] / "README.md"
@@ -47,10 +48,11 @@ def test_its_campaign_is_read(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
+def ran(tmp_path_factory, diagnosed_once):
     """Names, output and folder of README's lines of Python."""
     folder, names, out = tmp_path_factory.mktemp("api"), {}, io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
+        patch.setattr(thermal_robot, "diagnose", diagnosed_once)
         patch.chdir(folder)
         exec(compile(block("python"), "README.md", "exec"), names)
     return names, out.getvalue(), folder

@@ -85,11 +85,11 @@ def plain_cases():
 
 
 @pytest.fixture(scope="module")
-def opened():
+def opened(diagnosed_once):
     """Every plain case with its diagnosis."""
     cases = plain_cases()
     assert len(cases) == 12
-    return [(case, diagnose(FOLDER / "open_cases" / case["case"])) for case in cases]
+    return [(case, diagnosed_once(FOLDER / "open_cases" / case["case"])) for case in cases]
 
 
 @pytest.mark.parametrize("number", range(12))

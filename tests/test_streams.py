@@ -21,13 +21,15 @@ NONE = {"model": "m.json", "samples": None, "json": None, "output": None}
 
 @pytest.fixture
 def stdin(monkeypatch):
+    monkeypatch.setattr(streams, "MOST_PIPED", 100)
+
     def stdin(content):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
 
     return stdin
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def folders(tmp_path, monkeypatch):
     """Where temporary folders are made; empty once all is over."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -43,9 +45,8 @@ def test_files_are_left_alone(folders):
         assert list(folders.iterdir()) == []
 
 
-@pytest.mark.usefixtures("folders")
-def test_standard_input_is_a_file_with_just_these_bytes(stdin):
-    content = "a;b\r\n1,5;µ\r\n".encode()
+@pytest.mark.parametrize("content", ["a;b\r\n1,5;µ\r\n".encode(), b"x" * 100, "x;y\n1;2".encode("utf-16")])
+def test_standard_input_is_a_file_with_just_these_bytes(stdin, content):
     stdin(content)
     given = options(samples="-")
     with piped(given):
@@ -53,7 +54,6 @@ def test_standard_input_is_a_file_with_just_these_bytes(stdin):
         assert (given.piped, given.printed) == (True, False)
 
 
-@pytest.mark.usefixtures("folders")
 def test_what_is_written_for_standard_output_is_printed_byte_by_byte(capfdbinary):
     given = options(output="-")
     with piped(given):
@@ -62,7 +62,6 @@ def test_what_is_written_for_standard_output_is_printed_byte_by_byte(capfdbinary
     assert capfdbinary.readouterr().out == b"x\xc2\xb5\r\n\n"
 
 
-@pytest.mark.usefixtures("folders")
 def test_a_stream_of_text_alone_gets_text(monkeypatch):
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     given = options(json="-")
@@ -71,7 +70,6 @@ def test_a_stream_of_text_alone_gets_text(monkeypatch):
     assert sys.stdout.getvalue() == "µ"
 
 
-@pytest.mark.usefixtures("folders")
 def test_errors_speak_of_the_streams_and_what_was_written_is_printed_all_the_same(stdin, capsys):
     stdin(b"x\n1\n")
     given = options(samples="-", json="-")
@@ -101,31 +99,14 @@ def test_a_stream_serves_once(given):
         (b" \n\n", "is empty"),
         (b"\x89PNG\r\n\x1a\n\0\0\0", "is not text"),
         (b"x" * 101, "is too long"),
+        (None, "is closed"),
+        ("a terminal", "is a terminal"),
     ],
 )
-@pytest.mark.usefixtures("folders")
 def test_what_cannot_be_read_is_one_clear_sentence(stdin, monkeypatch, content, said):
-    monkeypatch.setattr(streams, "MOST_PIPED", 100)
-    stdin(content)
-    with pytest.raises(CampaignError, match=f"^standard input: {said}"), piped(options(samples="-")):
-        pass
-
-
-@pytest.mark.usefixtures("folders")
-def test_bounds_and_wide_characters_are_taken(stdin, monkeypatch):
-    monkeypatch.setattr(streams, "MOST_PIPED", 100)
-    for content in (b"x" * 100, "x;y\n1;2".encode("utf-16")):
-        stdin(content)
-        given = options(samples="-")
-        with piped(given):
-            assert Path(given.samples).read_bytes() == content
-
-
-@pytest.mark.parametrize(("replaced", "said"), [(None, "is closed"), ("terminal", "is a terminal")])
-@pytest.mark.usefixtures("folders")
-def test_a_terminal_and_a_closed_stream_are_refused(monkeypatch, replaced, said):
-    stream = io.TextIOWrapper(io.BytesIO(b"typed"))
-    stream.isatty = lambda: True
-    monkeypatch.setattr(sys, "stdin", replaced and stream)
+    stdin(content if isinstance(content, bytes) else b"typed")
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: content == "a terminal", raising=False)
+    if content is None:
+        monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(CampaignError, match=f"^standard input: {said}"), piped(options(samples="-")):
         pass

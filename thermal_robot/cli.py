@@ -4,57 +4,47 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any, NoReturn
 
-from thermal_robot.blind import command as blind
-from thermal_robot.commands import (
-    check,
-    compare,
-    correct,
-    demo,
-    diagnose,
-    effects,
-    fleet,
-    import_files,
-    iso9283,
-    paper,
-    plan,
-    predict,
-    view,
-    wear,
-)
-from thermal_robot.commands import (
-    map as workspace,
-)
+from thermal_robot.campaign.names import did_you_mean
+from thermal_robot.commands.table import COMMANDS
 from thermal_robot.console import NORMAL, VERBOSE, add_loudness, heard
 from thermal_robot.errors import OwnEffectError, ThermalRobotError, ours
-from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
 from thermal_robot.streams import piped
 
-COMMANDS = {
-    "demo": demo,
-    "plan": plan,
-    "check": check,
-    "effects": effects,
-    "diagnose": diagnose,
-    "compare": compare,
-    "view": view,
-    "predict": predict,
-    "correct": correct,
-    "wear": wear,
-    "iso9283": iso9283,
-    "fleet": fleet,
-    "import": import_files,
-    "map": workspace,
-    "paper": paper,
-    "blind": blind,
-}
-"""Modules by command, in the order of the help: what each does, an example, its options. All are light: what a command
-computes with is imported once it runs."""
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+STATUSES = """\
+exit status:
+  0    done; a diagnosis that finds nothing, or leaves a remainder, is done, too
+  1    the program failed, or what it prints to: a full disk
+  2    bad input; one line on stderr names file, row and column, what was found and what was expected
+  130  interrupted"""
+_CHOICE = re.compile(r"invalid choice: '(?P<found>[^']*)' \(choose from (?P<known>.*)\)")
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line that proposes what was meant, and whose texts keep their lines."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and what was probably meant."""
+        message = " ".join(message.split())
+        meant = _CHOICE.search(message)
+        meant_by = did_you_mean(meant["found"], re.findall(r"[\w-]+", meant["known"])) if meant else ""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}{meant_by}; see {self.prog} --help\n")
+
+    def bare(self, commands: Iterable[str]) -> NoReturn:
+        """Answer a command line that says nothing."""
+        usage = f"usage: {self.prog} COMMAND ...\nCOMMAND is one of {', '.join(commands)}.\n"
+        self.exit(BAD_INPUT, f"{usage}Begin with `{self.prog} demo`; `{self.prog} --help` says more.\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -123,12 +113,12 @@ def _parser() -> Parser:
     parser.add_argument("-V", "--version", action="version", version=f"thermal-robot {__version__}")
     add_loudness(parser, NORMAL)
     commands = parser.add_subparsers(metavar="COMMAND")
-    parser.set_defaults(run=lambda _: parser.bare(commands.choices), prepare=lambda _: None, reads=(), writes=())
-    for name, module in COMMANDS.items():
-        again = f"{module.DOES[0].upper()}{module.DOES[1:]}.\n\nexample:\n  thermal-robot {name}{module.EXAMPLE}"
-        made: Parser = commands.add_parser(name, help=module.DOES, description=again)
+    parser.set_defaults(run=lambda _: parser.bare(COMMANDS), prepare=lambda _: None, reads=(), writes=())
+    for name, command in COMMANDS.items():
+        does = f"{command.does[0].upper()}{command.does[1:]}.\n\nexample:\n  thermal-robot {name}{command.example}"
+        made: Parser = commands.add_parser(name, help=command.does, description=does)
         add_loudness(made, argparse.SUPPRESS)
-        module.add_arguments(made)
+        command.add_arguments(made)
     return parser
 
 

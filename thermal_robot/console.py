@@ -42,10 +42,7 @@ def note(text: str, loudness: str) -> None:
 
 @contextmanager
 def heard(loudness: str) -> Iterator[None]:
-    """Make notes of warnings: of the program's own, each once; of what libraries warn of or log where it is asked for.
-
-    Libraries speak to programmers, in lines that name files of theirs.
-    """
+    """Make notes of warnings: of the program's own, each once; of what libraries say where it is asked for."""
     told = set()
 
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -70,8 +67,7 @@ def heard(loudness: str) -> Iterator[None]:
 def stages(loudness: str) -> Iterator[Callable[[str], None]]:
     """Show the stages of work whose length nobody knows beforehand.
 
-    A terminal shows the stage and the time, once it has lasted; there is no bar, for nothing says how far it is. A line
-    for each stage where it is asked for; nothing elsewhere.
+    A terminal shows stage and time once it has lasted, without a bar. Where it is asked for, each stage is a line.
 
     Yields
     ------
@@ -86,20 +82,11 @@ def stages(loudness: str) -> Iterator[Callable[[str], None]]:
 
         yield line
         line("done")
-    elif loudness == QUIET or not sys.stderr.isatty():
+        return
+    if loudness == QUIET or not sys.stderr.isatty():
         yield lambda _: None
-    else:
-        with _spinning() as show:
-            yield show
-
-
-@contextmanager
-def _spinning() -> Iterator[Callable[[str], None]]:
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    shown = Progress(*columns, console=Console(stderr=True), transient=True)
+        return
+    shown = _progress("Spinner", "TimeElapsed", "Text")
     task = shown.add_task("", total=None)
     patience = threading.Timer(_PATIENCE, shown.start)
     patience.daemon = True
@@ -114,9 +101,9 @@ def _spinning() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def counted(loudness: str) -> Iterator[Counted]:
-    """Show how far work is whose parts are counted: bars on a terminal, elsewhere a line for every tenth.
+    """Show how far work is whose parts are counted, and what time is left.
 
-    Both say what time is left.
+    Bars on a terminal, elsewhere a line for every tenth.
 
     Yields
     ------
@@ -128,25 +115,25 @@ def counted(loudness: str) -> Iterator[Counted]:
     elif loudness == VERBOSE or not sys.stderr.isatty():
         yield _tenths()
     else:
-        with _bars() as show:
+        tasks: dict[str, Any] = {}
+        with _progress("Text", "Bar", "MofNComplete", "TimeRemaining") as bars:
+
+            def show(stage: str, done: int, total: int) -> None:
+                if stage not in tasks:
+                    tasks[stage] = bars.add_task(stage, total=total)
+                bars.update(tasks[stage], completed=done)
+
             yield show
 
 
-@contextmanager
-def _bars() -> Iterator[Counted]:
+def _progress(*kinds: str) -> Any:
+    """Return a display on stderr that leaves nothing behind, of columns of rich; names of stages are not markup."""
+    from rich import progress
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[str, Any] = {}
-
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done)
-
-        yield show
+    plain = {"Text": {"text_format": "{task.description}", "markup": False}}
+    columns = (getattr(progress, f"{kind}Column")(**plain.get(kind, {})) for kind in kinds)
+    return progress.Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 def _tenths() -> Counted:

@@ -16,16 +16,10 @@ _BESIDE = ".thermal-robot-"
 
 @contextmanager
 def whole(path: str | Path) -> Iterator[Path]:
-    """Give a place to write to, which takes the place of ``path`` once all is written.
+    """Give a place to write to, which takes the place of ``path`` at once when all is written: an atomic replace.
 
-    Whoever reads ``path`` sees the file as it was, or as it became, whatever happens in between: a full disk, an
-    exception, a process that is killed. What is no file, such as ``/dev/stdout`` or a pipe, is written to directly; a
-    link stays a link, and a file keeps its permissions.
-
-    Parameters
-    ----------
-    path
-        File to write, in a folder that exists.
+    Whoever reads ``path`` sees the file as it was or as it became, whatever happens in between. What is no file, such
+    as ``/dev/stdout`` or a pipe, is written to directly; a link stays a link, and a file keeps its permissions.
 
     Yields
     ------
@@ -57,29 +51,22 @@ def whole(path: str | Path) -> Iterator[Path]:
         if isinstance(error, OSError) and str(beside) in (error.filename, error.filename2):
             error.filename, error.filename2 = str(path), None  # whoever reads this never heard of the other file
         raise
-    _flush(target.parent)
+    with suppress(OSError):  # the folder's new entry reaches the disk, where folders can be opened
+        number = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8, whole or not at all.
-
-    Raises
-    ------
-    OSError
-        As :func:`whole`.
-    """
+    """Write a text in UTF-8, whole or not at all; raises as :func:`whole`."""
     with whole(path) as place:
         place.write_text(text, encoding="utf-8")
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write bytes, whole or not at all.
-
-    Raises
-    ------
-    OSError
-        As :func:`whole`.
-    """
+    """Write bytes, whole or not at all; raises as :func:`whole`."""
     with whole(path) as place:
         place.write_bytes(content)
 
@@ -137,33 +124,11 @@ def written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> d
 
 
 def write_one(target: str, write: Callable[[Path], object]) -> None:
-    """Write one output.
-
-    Raises
-    ------
-    CampaignError
-        If it cannot be written.
-    """
+    """Write one output; :class:`CampaignError` if it cannot be written."""
     for file, reason in written([(target, write)]).items():
         raise CampaignError(file, "cannot be written", found=reason)
 
 
-def _flush(folder: Path) -> None:
-    """Let the folder's new entry reach the disk, where folders can be opened."""
-    with suppress(OSError):
-        number = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(number)
-        finally:
-            os.close(number)
-
-
 def checksum(path: Path) -> str:
-    """Return the SHA-256 of a file's content, in hexadecimal digits.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
+    """Return the SHA-256 of a file's content, in hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

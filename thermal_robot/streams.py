@@ -24,9 +24,8 @@ def piped(options: argparse.Namespace) -> Iterator[None]:
     Parameters
     ----------
     options
-        Of a command. ``reads`` and ``writes`` name those that are files. One that is ``-`` becomes a path; ``piped``
-        then says whether standard input is read, ``printed`` whether a file takes the place of the text on standard
-        output.
+        Of a command; ``reads`` and ``writes`` name those that are files. One that is ``-`` becomes a path. ``piped``
+        says whether standard input is read, ``printed`` whether a file is printed instead of the text.
 
     Raises
     ------
@@ -60,30 +59,29 @@ def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> st
     """Return the option that stands for a stream, or nothing."""
     found = [name for name in names if getattr(options, name) == "-"]
     if len(found) > 1:
-        raise CampaignError(
-            "-", f"there is one {stream}", found=f"- as {' and as '.join(found)}", expected="one of them"
-        )
+        said = f"- as {' and as '.join(found)}"
+        raise CampaignError("-", f"there is one {stream}", found=said, expected="one of them")
     return "".join(found)
 
 
 def _read() -> bytes:
     """Read all of standard input, within bounds."""
+    source = "text from a file or another program"
     if sys.stdin is None or sys.stdin.closed:
-        raise CampaignError(STDIN, "is closed", expected="text from a file or another program")
+        raise CampaignError(STDIN, "is closed", expected=source)
     if sys.stdin.isatty():
-        raise CampaignError(STDIN, "is a terminal", expected="text from a file or another program: `- < FILE`")
+        raise CampaignError(STDIN, "is a terminal", expected=f"{source}: `- < FILE`")
     try:
         content = sys.stdin.buffer.read(MOST_PIPED + 1)
     except OSError as error:
         raise CampaignError(STDIN, "cannot be read", found=error.strerror) from None
     if not content.strip():
-        raise CampaignError(STDIN, "is empty", expected="text from a file or another program")
+        raise CampaignError(STDIN, "is empty", expected=source)
     if len(content) > MOST_PIPED:
         raise CampaignError(STDIN, "is too long", expected=f"at most {MOST_PIPED / 1e6:.0f} MB; name a file instead")
     if b"\0" in content and not content.startswith(_UTF_16):
-        raise CampaignError(
-            STDIN, "is not text", found="a byte that no text has", expected="a table as CSV, TOML or JSON"
-        )
+        found, expected = "a byte that no text has", "a table as CSV, TOML or JSON"
+        raise CampaignError(STDIN, "is not text", found=found, expected=expected)
     return content
 
 

@@ -1,8 +1,8 @@
-"""Rows of text as a table of a notebook."""
+"""Rows of text as a table: HTML of a notebook, or lines of a terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 _CELL = 'style="text-align: left; vertical-align: top"'
@@ -30,3 +30,13 @@ def html_table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), headi
 def _row(cells: Sequence[str], wide: int, tag: str) -> str:
     filled = [*cells, *[""] * (wide - len(cells))]
     return f"<tr>{''.join(f'<{tag} {_CELL}>{escape(cell)}</{tag}>' for cell in filled)}</tr>"
+
+
+def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
+    """Return rows as lines whose columns stand below each other, those numbered ``left`` to the left."""
+    wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = [
+        [cell.ljust(w) if k in left else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, wide, strict=True))]
+        for row in rows
+    ]
+    return ["  ".join(cells).rstrip() for cells in padded]

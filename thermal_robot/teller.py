@@ -2,41 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 
 class Teller(Protocol):
-    """Who puts results into words and draws them: a module, or an object with these methods."""
+    """Who puts results into words and draws them: a module, or an object, with these functions of one result.
 
-    def headline(self, diagnosis: Any) -> str:
-        """Return the verdict in one plain sentence."""
+    A headline and an advice are one plain sentence, a text is all of it, a fragment is HTML without a page around it.
+    """
 
-    def advice(self, diagnosis: Any) -> str:
-        """Return what to measure next in one plain sentence."""
-
-    def text(self, diagnosis: Any) -> str:
-        """Return all of a diagnosis as plain text."""
-
-    def fragment(self, diagnosis: Any) -> str:
-        """Return all of a diagnosis as HTML without a page around it."""
-
-    def explain_figure(self, explained: Any) -> Any:
-        """Draw what one effect explains."""
-
-    def calibration_text(self, calibration: Any) -> str:
-        """Return all of a calibration as plain text."""
-
-    def comparison_headline(self, comparison: Any) -> str:
-        """Return what changed in one plain sentence."""
-
-    def comparison_text(self, comparison: Any) -> str:
-        """Return all of a comparison as plain text."""
-
-    def comparison_fragment(self, comparison: Any) -> str:
-        """Return all of a comparison as HTML without a page around it."""
-
-    def fleet_text(self, summary: Any) -> str:
-        """Return all of many diagnoses as plain text."""
+    headline: Callable[[Any], str]
+    advice: Callable[[Any], str]
+    text: Callable[[Any], str]
+    fragment: Callable[[Any], str]
+    explain_figure: Callable[[Any], Any]
+    calibration_text: Callable[[Any], str]
+    comparison_headline: Callable[[Any], str]
+    comparison_text: Callable[[Any], str]
+    comparison_fragment: Callable[[Any], str]
+    fleet_text: Callable[[Any], str]
 
 
 _tellers: list[Teller] = []
@@ -48,7 +33,13 @@ def told_by(teller: Any) -> None:
 
 
 def registered() -> Teller:
-    """Return who was registered last; :class:`RuntimeError` if nobody was."""
+    """Return who was registered last.
+
+    Raises
+    ------
+    RuntimeError
+        If nobody was.
+    """
     if not _tellers:
         raise RuntimeError("nobody can tell a diagnosis: import thermal_robot, or call told_by")
     return _tellers[0]

@@ -6,14 +6,22 @@ import sys
 
 import numpy as np
 import pytest
-from commanded import diagnosed_once
+from commanded import diagnosed_files
 from simulate import simulate
 
+import thermal_robot.diagnosis
 from thermal_robot import cli
 from thermal_robot.campaign import write_campaign
 from thermal_robot.campaign.write import write_table
 
 NOISE = 25e-6
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_diagnosis_of_a_campaign(diagnosed_once):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(thermal_robot.diagnosis, "diagnose", diagnosed_once)
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -39,13 +47,13 @@ def poses(rv_m2, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def diagnosed(folder, tmp_path_factory):
-    return diagnosed_once(folder, tmp_path_factory.mktemp("diagnosed"))
+def diagnosed(folder, tmp_path_factory, diagnosed_once):
+    return diagnosed_files(folder, tmp_path_factory.mktemp("diagnosed"), diagnosed_once)
 
 
 @pytest.fixture(scope="session")
-def diagnosed_poses(poses, tmp_path_factory):
-    return diagnosed_once(poses, tmp_path_factory.mktemp("diagnosed"))
+def diagnosed_poses(poses, tmp_path_factory, diagnosed_once):
+    return diagnosed_files(poses, tmp_path_factory.mktemp("diagnosed"), diagnosed_once)
 
 
 @pytest.fixture

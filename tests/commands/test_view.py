@@ -8,7 +8,9 @@ import sys
 import time
 import urllib.error
 import urllib.request
+import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from commanded import refused
@@ -74,23 +76,25 @@ def test_it_is_served_to_this_machine_alone_until_it_is_interrupted():
     assert err == "thermal-robot: interrupted; nothing was left half written\n"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_another_port_is_taken_where_this_one_is_and_the_diagnosis_is_shown():
+def test_another_port_is_taken_where_this_one_is_and_the_diagnosis_is_shown(run, monkeypatch):
     pytest.importorskip("viser", reason=VIEWER)
+    seen = []
+
+    def interrupted():
+        assert answer(seen[0]) == 200
+        raise KeyboardInterrupt
+
+    event = SimpleNamespace(wait=interrupted)
+    monkeypatch.setattr("thermal_robot.commands.campaigns.threading", SimpleNamespace(Event=lambda: event))
+    monkeypatch.setattr(webbrowser, "open", seen.append)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with started(demo_directory(), "--port", port, "-q") as process:
-            try:
-                url = process.stdout.readline().strip()
-                assert answer(url) == 200
-                process.send_signal(signal.SIGINT)
-                process.communicate(timeout=30)
-            finally:
-                process.kill()
-    assert url.startswith("http://127.0.0.1:")
-    assert int(url.rsplit(":", 1)[1]) != port
+        status, out, _ = run("view", demo_directory(), "--port", port, "-q", "--open")
+    assert (status, out) == (130, f"{seen[0]}\n")
+    assert seen[0].startswith("http://127.0.0.1:")
+    assert int(seen[0].rsplit(":", 1)[1]) != port
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "80a", "", "٣"])

@@ -14,18 +14,16 @@ def told(groups):
     return [(g.label, g.path, g.rows.tolist()) for g in groups]
 
 
-def test_rows_of_one_label_are_one_pose_in_the_sequence_of_measurement(rv_m2):
+def test_rows_of_one_label_or_else_of_one_command_are_one_pose_in_the_sequence_of_measurement(rv_m2):
     campaign = cell(rv_m2, [0, 1, 0, 2, 1, 0], covariates={"time": np.array([5.0, 4, 3, 2, 1, 0])})
     groups, alone = repeats(campaign)
     assert told(groups) == [("P1", "", [5, 2, 0]), ("P2", "", [4, 1])]
     assert alone == 1
-
-
-def test_without_labels_rows_of_one_command_are(rv_m2):
-    campaign = cell(rv_m2, [0, 1, 0, 2, 1]).drop_covariate("pose")
-    groups, alone = repeats(campaign)
+    groups, alone = repeats(cell(rv_m2, [0, 1, 0, 2, 1]).drop_covariate("pose"))
     assert told(groups) == [("row 2", "", [0, 2]), ("row 3", "", [1, 4])]
     assert alone == 1
+    without = cell(rv_m2, [0, 0, 0], labels={"pose": np.array(["", "", "x"])})
+    assert repeats(without) == ([], 3)
 
 
 def test_points_of_paths_and_poses_at_rest_never_mix(rv_m2):
@@ -35,11 +33,6 @@ def test_points_of_paths_and_poses_at_rest_never_mix(rv_m2):
             groups, _ = repeats(one)
             assert [(g.path, g.rows.tolist()) for g in groups[:2]] == [("a", [0, 1]), ("b", [2, 3])]
             assert {g.path for g in groups[2:]} <= {""}
-
-
-def test_a_row_without_a_label_repeats_nothing(rv_m2):
-    campaign = cell(rv_m2, [0, 0, 0], labels={"pose": np.array(["", "", "x"])})
-    assert repeats(campaign) == ([], 3)
 
 
 def test_directions_are_the_same_sign_in_every_joint(rv_m2):

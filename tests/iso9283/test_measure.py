@@ -1,4 +1,4 @@
-"""From a campaign to criteria that were computed by hand."""
+"""From a campaign to criteria that were computed by hand: frames, predictions, directions, times, notes."""
 
 from dataclasses import replace
 
@@ -62,6 +62,51 @@ def test_registration_changes_accuracy_and_not_repeatability(by_hand):
         assert other.repeatability.position == pytest.approx(one.repeatability.position)
     rms = [np.sqrt(np.mean([p.accuracy.position**2 for p in found.poses])) for found in (known, fitted)]
     assert rms[1] < 0.8 * rms[0]
+
+
+def test_known_frames_are_taken_as_they_stand_and_axes_are_those_of_the_base(rv_m2):
+    frames, turn = Frames(random_motion(np.random.default_rng(1), 3.0), np.eye(4)), (2e-3, 0, 3e-3)
+    campaign = cell(rv_m2, np.repeat(np.arange(5), 2), OFF[0], frames=frames, turn=turn)
+    found = performance(campaign, frames=frames)
+    assert found.registered == ()
+    for pose in found.poses:
+        assert pose.accuracy.axes == pytest.approx(tuple(OFF[0]))
+        assert pose.accuracy.angles == pytest.approx(turn, abs=1e-8)
+
+
+def test_unknown_frames_are_fitted_and_take_up_what_is_common(rv_m2):
+    frames = Frames(random_motion(np.random.default_rng(2), 3.0), random_motion(np.random.default_rng(3), 0.1))
+    twice = np.repeat(np.arange(8), 2)
+    campaign = cell(rv_m2, twice, OFF[0], frames=frames, turn=np.zeros(3), known=False)
+    found = performance(campaign)
+    assert found.registered == ("base", "tool")
+    assert "12 unknowns, 48 figures" in " ".join(found.notes)
+    assert found.accuracy < 1e-7
+    assert performance(replace(campaign, tool_known=True)).registered == ("base",)
+
+
+@pytest.mark.parametrize(("poses", "told"), [(3, False), (4, True)])
+def test_frames_that_take_up_all_figures_leave_no_accuracy(rv_m2, poses, told):
+    """Nine unknowns: three positions, however often, are nine figures."""
+    campaign = cell(rv_m2, np.repeat(np.arange(poses), 4), np.random.default_rng(0).normal(size=(4 * poses, 3)) * 1e-4)
+    found = performance(replace(campaign, base_known=False, tool_known=False))
+    assert (found.accuracy is not None) == told
+
+
+def test_a_prediction_is_compared_where_it_is_finite(rv_m2):
+    campaign = cell(rv_m2, [0, 0, 1, 1], OFF[0], turn=np.zeros(3))
+    nominal = observe(campaign).predicted_position
+    nominal[[1, 2, 3]] = np.nan
+    first, second = performance(campaign, predicted=(nominal, campaign.orientation)).poses
+    assert first.corrected.axes == pytest.approx(tuple(OFF[0]))
+    assert first.corrected.angles == pytest.approx((0, 0, 0), abs=1e-9)
+    assert second.corrected is None
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 3)), (np.zeros((2, 3)), None), (np.zeros((3, 3)), np.zeros((2, 4)))])
+def test_predictions_of_other_rows_are_refused(rv_m2, wrong):
+    with pytest.raises(CampaignError, match="predict"):
+        performance(cell(rv_m2, [0, 0, 1]), predicted=wrong)
 
 
 def test_a_model_that_knows_half_leaves_half(by_hand):
@@ -165,3 +210,34 @@ def test_several_targets_tell_repeatability_of_two_poses(rv_m2, tmp_path):
     for pose, same in zip(found.poses, expected.poses, strict=True):
         assert pose.repeatability.position == pytest.approx(same.repeatability.position, rel=1e-6)
         assert max(pose.repeatability.angles) < 1e-9
+
+
+SCATTER = 1e-5 * np.random.default_rng(0).normal(size=(200, 3))
+
+
+def in_turns(robot, poses, rows, **fields):
+    """Poses in turn, so many rows in all, as the standard has them."""
+    return cell(robot, np.arange(rows) % poses, SCATTER[:rows], **fields)
+
+
+def test_what_a_reader_must_know_is_noted(rv_m2):
+    plain = in_turns(rv_m2, 5, 150)
+    assert performance(plain).notes == ()  # it is as the standard has it
+    unknown = replace(plain, base_known=False)
+    three = replace(in_turns(rv_m2, 3, 90), base_known=False, tool_known=False)
+    lone = cell(rv_m2, [*np.arange(90) % 3, 3, 3, 4], SCATTER[:93])
+    apart = in_turns(rv_m2, 2, 60)
+    apart = replace(apart, q=apart.q + 0.01 * (np.arange(60) == 1)[:, None])
+    sides = {"approach.joint_1": np.where(np.arange(60) % 4, 1.0, -1.0)}
+    for campaign, *told in (
+        (unknown, "the base frame is fitted", "6 unknowns, 15 figures"),
+        (replace(unknown, tool_known=False), "base and tool frames are fitted"),
+        (three, "AP and AT cannot be told: the unknown base and tool frames have 9 unknowns, and 9"),
+        (lone, "Fewer cycles than the standard's 30: 1 of 4 poses.", "1 of 93 rows repeat nothing"),
+        (in_turns(rv_m2, 2, 12, labels={"path": np.array(["seam"] * 12)}), "standard's 10: 1 of 1 paths"),
+        (in_turns(rv_m2, 2, 60, covariates=sides), "larger than the standard's, which comes from one: 'P1'."),
+        (apart, "different joint commands, which counts as scatter: 'P2'"),
+        (in_turns(rv_m2, 2, 60, noise_position=1e-5), "alone would show 0.0362 mm"),
+    ):
+        notes = " ".join(performance(campaign).notes)
+        assert all(part in notes for part in told), notes

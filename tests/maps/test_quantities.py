@@ -1,4 +1,6 @@
-"""The columns of a map: row by row what the functions of the assembly say."""
+"""Where a map asks, what makes two maps the same, and its columns: what the functions of the assembly say."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +11,9 @@ from thermal_robot.assembly.repeatability import tool_covariance
 from thermal_robot.assembly.thermal import displacement, elongation
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import elongation_jacobian, tool_poses
-from thermal_robot.maps import Joints, Question
+from thermal_robot.maps import Joints, Positions, Question
 from thermal_robot.maps.quantities import UNITS, columns, polygon
-from thermal_robot.maps.question import Spec
+from thermal_robot.maps.question import Spec, within
 from thermal_robot.robot import load_robot
 
 
@@ -61,7 +63,24 @@ def test_a_polygon_of_too_many_segments_is_refused():
         polygon(np.zeros((1, 2, 13)))
 
 
-def test_the_margin_is_a_share_of_the_whole_range(ur10):
+RAIL = """<robot name="rail"><link name="a"/><link name="b"/>
+  <joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/></joint></robot>"""
+
+
+def test_a_slide_without_limits_is_mapped_within_those_that_are_given():
+    rail = load_robot(RAIL, "b")
+    assert not np.isfinite(rail.lower).any()
+    found = columns(Spec(rail, Joints(8, (-0.5,), (0.5,)), Question(coefficients=0.0)), np.arange(8))
+    assert np.all(np.abs(found["j"]) <= 0.5)
+    np.testing.assert_allclose(found["margin"], 0.5)  # of no range
+    for limits in ((), ((-0.5, 0.1), (0.5, 0.2))):
+        with pytest.raises(RobotError, match="limits of 1 joints"):
+            within(rail, *limits)
+
+
+def test_the_margin_is_a_share_of_the_whole_range():
+    pytest.importorskip("example_robot_data", reason="the extra robots is not installed")
+    ur10 = load_robot("example-robot-data:ur10", "tool0")
     found = columns(Spec(ur10, Joints(16)), np.arange(16))
     q = np.stack([found[name] for name in ur10.joint_names], axis=1)
     share = np.minimum(q - ur10.lower, ur10.upper - q) / (ur10.upper - ur10.lower)
@@ -69,11 +88,25 @@ def test_the_margin_is_a_share_of_the_whole_range(ur10):
     assert found["margin"].max() <= 0.5
 
 
-def test_a_slide_without_limits_is_mapped_within_those_that_are_given():
-    text = """<robot name="rail"><link name="a"/><link name="b"/>
-      <joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/></joint></robot>"""
-    rail = load_robot(text, "b")
-    assert not np.isfinite(rail.lower).any()
-    found = columns(Spec(rail, Joints(8, (-0.5,), (0.5,)), Question(coefficients=0.0)), np.arange(8))
-    assert np.all(np.abs(found["j"]) <= 0.5)
-    np.testing.assert_allclose(found["margin"], 0.5)
+def test_places_run_along_x_first():
+    grid = Positions((0.0, 1.0, 3), (2.0, 4.0, 2), (7.0, 7.0, 1))
+    at = grid.place(np.arange(grid.count))
+    np.testing.assert_allclose(at[:4], [[0.0, 2.0, 7.0], [0.5, 2.0, 7.0], [1.0, 2.0, 7.0], [0.0, 4.0, 7.0]])
+    assert grid.count == 6
+
+
+def test_joint_positions_fill_the_limits_and_do_not_depend_on_where_one_begins(rv_m2):
+    every = Joints(512).drawn(np.arange(512), rv_m2)
+    np.testing.assert_array_equal(every[100:], Joints(512).drawn(np.arange(100, 512), rv_m2))
+    low, high = within(rv_m2)
+    assert np.all((every >= low) & (every <= high))
+    np.testing.assert_allclose((every.mean(axis=0) - low) / (high - low), 0.5, atol=0.01)
+
+
+def test_a_fingerprint_is_that_of_all_settings(rv_m2):
+    spec = Spec(rv_m2, Joints(8))
+    assert spec.fingerprint == Spec(rv_m2, Joints(8)).fingerprint
+    line = Positions((0.0, 1.0, 2), (0.0, 0.0, 1), (0.0, 0.0, 1))
+    others = [{"over": over} for over in (Joints(9), line)]
+    others += [{"question": asked} for asked in (Question(rise=4.0), Question({"joint_1": 1e-5}))]
+    assert len({spec.fingerprint, *(replace(spec, **other).fingerprint for other in others)}) == 5

@@ -1,35 +1,42 @@
-"""Poses of a plan: within limits, from both sides, better than chance, the same for the same seed."""
+"""A plan: within limits, from both sides, better than chance; its text; its files, which become a campaign."""
 
+import csv
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from thermal_robot import CampaignError, EffectError, load_robot, observe
+from thermal_robot import CampaignError, EffectError, load_robot, observe, read_campaign
+from thermal_robot.campaign import Units
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.effects import library
-from thermal_robot.planning import plan
+from thermal_robot.planning import plan, text, write_plan
 from thermal_robot.planning.plan import Columns, expectations
 from thermal_robot.robot import joint_range
-from thermal_robot.simulation.schedule import approaches
 
 TARGET = (0.05, 0.03, 0.1)
 DETERMINED = ("joint_gain", "transmission_error", "backlash")
-NOISE = np.full(3, 20e-6)
 
 
-@pytest.mark.parametrize("repeats", [1, 3])
-def test_poses_are_within_limits(arm, repeats):
-    q = plan(arm, 30, ["joint_offset", "backlash"], repeats=repeats, seed=1).commands.q
-    assert q.shape == (30, arm.n)
-    assert np.all((q >= arm.lower) & (q <= arm.upper))
-    assert len(np.unique(q, axis=0)) == 30 // repeats
+def test_poses_are_within_limits_and_repeats_are_labelled_and_count_among_the_rows(arm):
+    for repeats in (1, 3):
+        commands = plan(arm, 30, ["joint_offset", "backlash"], repeats=repeats, seed=1).commands
+        q = commands.q
+        assert q.shape == (30, arm.n)
+        assert np.all((q >= arm.lower) & (q <= arm.upper))
+        assert len(np.unique(q, axis=0)) == 30 // repeats
+    names, counts = np.unique(commands.labels["pose"], return_counts=True)
+    assert counts.tolist() == [3] * 10
+    for name in names:
+        assert np.ptp(q[commands.labels["pose"] == name], axis=0).max() == 0.0
 
 
 @pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
 @pytest.mark.parametrize("repeats", [1, 2, 4])
 def test_each_joint_comes_from_both_sides(source, repeats):
     robot = load_robot(source, "tool0")
-    for seed in range(3):
+    for seed in range(2):
         q = plan(robot, 60, ["backlash"], repeats=repeats, seed=seed).commands.q
         moved = np.diff(q, axis=0)
         assert np.all(moved != 0.0)
@@ -37,20 +44,11 @@ def test_each_joint_comes_from_both_sides(source, repeats):
         assert np.all((rising > 0.35) & (rising < 0.65))
 
 
-def test_repeats_are_labelled_and_count_among_the_rows(rv_m2):
-    commands = plan(rv_m2, 24, ["joint_gain"], repeats=4).commands
-    assert commands.samples == 24
-    names, counts = np.unique(commands.labels["pose"], return_counts=True)
-    assert counts.tolist() == [4] * 6
-    for name in names:
-        assert np.ptp(commands.q[commands.labels["pose"] == name], axis=0).max() == 0.0
-
-
-def test_the_same_seed_gives_the_same_plan(rv_m2, planned):
-    again, other = (plan(rv_m2, 60, target=TARGET, loads=(1.5,), seed=seed) for seed in (5, 6))
-    assert np.array_equal(again.commands.q, planned.commands.q)
-    assert again.to_dict() == planned.to_dict()
-    assert not np.array_equal(other.commands.q, planned.commands.q)
+def test_the_same_seed_gives_the_same_plan(rv_m2):
+    one, again, other = (plan(rv_m2, 20, DETERMINED, target=TARGET, loads=(1.5,), seed=seed) for seed in (5, 5, 6))
+    assert np.array_equal(again.commands.q, one.commands.q)
+    assert again.to_dict() == one.to_dict()
+    assert not np.array_equal(other.commands.q, one.commands.q)
 
 
 def at_random(planned, seed):
@@ -59,10 +57,10 @@ def at_random(planned, seed):
     robot = commands.robot
     q = rng.uniform(*joint_range(robot), commands.q.shape)
     given = {n: v for n, v in commands.covariates.items() if not n.startswith("approach.")}
-    covariates = {**given, **approaches(q, robot.joint_names, given)}
+    covariates = {**given, **arrivals(q, robot.joint_names, given, None)}
     seen = observe(replace(commands, q=q, covariates=covariates))
     kinds = [library()[e.name].variants(seen)[0] for e in planned.effects if not e.lacks]
-    columns = Columns.of(seen, kinds, NOISE)
+    columns = Columns.of(seen, kinds)
     return columns.information, {e.name: e for e in expectations(columns)}
 
 
@@ -74,7 +72,7 @@ def worst(expected):
 @pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
 def test_a_plan_tells_more_than_random_rows(source):
     robot, ratios = load_robot(source, "tool0"), []
-    for seed in range(5):
+    for seed in range(3):
         planned = plan(robot, 60, target=TARGET, seed=seed)
         mine = worst({e.name: e for e in planned.effects})
         for k in range(3):
@@ -139,13 +137,94 @@ def test_numbers_that_no_campaign_has_are_refused(rv_m2, wrong, named):
         plan(rv_m2, **wrong)
 
 
-def test_an_effect_that_nobody_knows_is_refused(rv_m2):
+def test_an_effect_that_nobody_knows_and_a_slide_without_limits_are_refused(rv_m2):
     with pytest.raises(EffectError, match="did you mean 'backlash'"):
         plan(rv_m2, effects=["backlsh"])
-
-
-def test_a_slide_without_limits_is_refused():
     text = """<robot name="r"><link name="a"/><link name="b"/><joint name="slide" type="prismatic"><parent link="a"/>
     <child link="b"/><axis xyz="1 0 0"/></joint></robot>"""
     with pytest.raises(CampaignError, match="slide"):
         plan(load_robot(text, "b"))
+
+
+def test_each_effect_has_a_line_with_its_figures(planned):
+    lines = text(planned).splitlines()
+    for expected in planned.effects:
+        own = next(line for line in lines if line.startswith(f"{expected.name} "))
+        if expected.lacks:
+            assert expected.lacks[0] in own
+        for other in expected.confounded:
+            assert other in own
+    gain = planned.effect("joint_gain")
+    own = next(line for line in lines if line.startswith("joint_gain ")).split()
+    sigmas = [p.sigma for p in gain.parameters]
+    assert f"{sum(p.told for p in gain.parameters)} of 5" in " ".join(own)
+    np.testing.assert_allclose([float(own[3]), float(own[4])], [np.median(sigmas), max(sigmas)], rtol=0.06)
+
+
+def test_the_opening_says_rows_repeats_and_sides(rv_m2):
+    first = text(plan(rv_m2, 24, ["backlash"], repeats=3)).splitlines()[0]
+    assert first.startswith("24 rows: 8 poses, each 3 times.")
+    shares = [int(s) for s in re.findall(r"(\d+) to (\d+) %", first)[0]]
+    assert 30 <= shares[0] <= shares[1] <= 70
+
+
+def read(file):
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def filled_in(folder, positions_mm, temperatures):
+    rows = read(folder / "measurements.csv")
+    for row, place, warm in zip(rows, positions_mm, temperatures, strict=True):
+        row |= dict(zip("xyz", place.tolist(), strict=True)) | {"temperature": warm}
+    with (folder / "measurements.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def test_a_folder_that_is_filled_in_is_the_campaign_that_was_planned(rv_m2, tmp_path):
+    made = plan(rv_m2, 24, repeats=2, target=(0.05, 0.0, 0.1), loads=(1.0,), units=Units("deg", "mm"))
+    commands = made.commands
+    file = write_plan(made, tmp_path / "cell")
+    assert file == tmp_path / "cell" / "campaign.toml"
+    with pytest.raises(CampaignError, match=r"row 2.*still to be filled in"):
+        read_campaign(file)
+    place = observe(commands).predicted_position
+    filled_in(tmp_path / "cell", 1e3 * place, commands.covariates["temperature"])
+    again = read_campaign(file)
+    np.testing.assert_allclose(again.q, commands.q, atol=1e-8)
+    np.testing.assert_allclose(again.position, place, atol=1e-12)
+    assert again.covariates.keys() == commands.covariates.keys()
+    for name, values in commands.covariates.items():
+        np.testing.assert_allclose(again.covariates[name], values, rtol=1e-8, err_msg=name)
+    assert again.labels["pose"].tolist() == commands.labels["pose"].tolist()
+    assert (again.noise_position, again.target.tolist()) == (pytest.approx(20e-6), [0.05, 0.0, 0.1])
+
+
+def test_what_is_recorded_is_left_empty(rv_m2, tmp_path):
+    write_plan(plan(rv_m2, 20, ["joint_gain"], orientation=True), tmp_path)
+    asked, planned = read(tmp_path / "measurements.csv"), read(tmp_path / "plan.csv")
+    for name in ("x", "y", "z", "qw", "qx", "qy", "qz", "temperature"):
+        assert {row[name] for row in asked} == {""}
+    assert all(float(row["temperature"]) >= 20.0 for row in planned)
+    assert [row["joint_1"] for row in asked] == [row["joint_1"] for row in planned]
+
+
+def test_a_table_has_the_campaigns_columns(rv_m2, tmp_path):
+    made = plan(rv_m2, 20, ["joint_gain"], units=Units("deg", "mm"))
+    assert write_plan(made, tmp_path / "table.csv") == tmp_path / "table.csv"
+    rows = read(tmp_path / "table.csv")
+    assert list(rows[0]) == [*rv_m2.joint_names, "time", "temperature", "x", "y", "z"]
+    np.testing.assert_allclose([float(row["joint_2"]) for row in rows], np.degrees(made.commands.q[:, 1]), rtol=1e-8)
+
+
+def test_a_campaign_is_not_written_over_and_a_folder_that_cannot_be_made_is_told(rv_m2, tmp_path):
+    made = plan(rv_m2, 20, ["joint_gain"])
+    write_plan(made, tmp_path)
+    before = (tmp_path / "measurements.csv").read_bytes()
+    with pytest.raises(CampaignError, match="already"):
+        write_plan(made, tmp_path)
+    assert (tmp_path / "measurements.csv").read_bytes() == before
+    with pytest.raises(CampaignError, match="cannot be written"):
+        write_plan(made, tmp_path / "measurements.csv" / "no")

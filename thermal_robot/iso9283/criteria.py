@@ -1,8 +1,8 @@
 """Criteria of ISO 9283:1998 from attained poses: where a robot really was, cycle after cycle.
 
 Clauses: AP 7.2.1, RP 7.2.2, vAP 7.2.3, drift 7.6, AT and RT 8.2 and 8.3. The standard cuts the attained paths with
-planes across the commanded one. Here a point of the path is a command, and what was measured for it in each cycle
-belongs to it: how far the robot lags behind counts in AT. The values of one pose or path are frozen.
+planes across the commanded one. Here a point of the path is a command with what was measured for it in each cycle, so
+that a lag of the robot counts in AT.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,19 +64,18 @@ class Attained:
 
 
 def mean_rotation(rotations: Array) -> Array:
-    """Return the (3, 3) rotation from which the sum of squared chordal distances to (n, 3, 3) rotations is least.
+    """Chordal mean (3, 3) of (n, 3, 3) rotations: the mean matrix projected onto the rotations.
 
-    Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002): the projection of the mean matrix onto the rotations.
+    Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002).
     """
     u, _, vt = np.linalg.svd(rotations.mean(axis=0))
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
 
 def angles(rotations: Array, reference: Array) -> Array:
-    """(..., 3) angles a, b, c from a reference to rotations, about the axes of their common frame, rad.
+    """(..., 3) angles a, b, c from a reference to rotations: the rotation vector of R R_refᵀ, rad.
 
-    They are the rotation vector of R R_refᵀ. The angles of the standard, turns about one axis after the other, are the
-    same but for products of them: 1 µrad at 1 mrad.
+    The standard turns about one axis after the other, which differs by products of the angles: 1 µrad at 1 mrad.
     """
     return log3(rotations @ np.swapaxes(reference, -1, -2))
 
@@ -130,9 +130,8 @@ class Repeatability:
     position
         RP_l: mean distance and three of its standard deviations, m.
     ci95
-        Interval in which RP_l lies that endlessly many cycles would give, with a probability of 95 %, m; ``None`` with
-        two cycles, or without scatter. RP_l of few cycles is too small in the mean, by a sixth with five: the
-        interval counts that, and lies higher.
+        95 % interval of RP_l of endlessly many cycles, m; ``None`` with two cycles, or without scatter. RP_l of few
+        cycles is too small in the mean, by a sixth with five: the interval counts that, and lies higher.
     angles
         RP_a, RP_b, RP_c: three standard deviations, to be read as ±, rad; ``None`` where only positions are known.
     """
@@ -144,11 +143,11 @@ class Repeatability:
 
 def repeatability(attained: Attained) -> Repeatability:
     """Compute the repeatability of one pose from n ≥ 2 cycles."""
-    deviations = attained.position - attained.barycentre
+    deviations, turned = attained.position - attained.barycentre, None
     value = float(_of(np.linalg.norm(deviations, axis=1)))
-    mean, turned = attained.mean_rotation, None
-    if attained.rotation is not None and mean is not None:
-        turned = three(SPREADS * angles(attained.rotation, mean).std(axis=0, ddof=1))
+    if attained.rotation is not None:
+        turns = angles(attained.rotation, mean_rotation(attained.rotation))
+        turned = three(SPREADS * turns.std(axis=0, ddof=1))
     return Repeatability(value, _interval(deviations, value), turned)
 
 
@@ -158,11 +157,10 @@ def _of(distances: Array) -> Array:
 
 
 def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
-    """95 % interval of RP_l for normal scatter of any shape, by repeating the test in simulation.
+    """95 % interval of RP_l by parametric bootstrap, from normal scatter with the sample's principal axes.
 
-    What n cycles show, over what endlessly many would, depends on the shape of the scatter alone, not on its size. The
-    shape is that of the sample: how far it spreads along its principal axes. The draws are the same in each call, so
-    that the same table gives the same figures.
+    What n cycles show, over what endlessly many would, depends on the shape of the scatter, not on its size. The draws
+    are the same in each call.
     """
     cycles = len(deviations)
     if cycles < FEWEST_FOR_INTERVAL or value == 0.0:
@@ -242,24 +240,21 @@ def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None 
         told.
     """
     spread = [repeatability(each) for each in attained]
-    away = None if commanded is None else [accuracy(a, c) for a, c in zip(attained, commanded, strict=True)]
     gone = [float(np.linalg.norm(each.barycentre - attained[0].barycentre)) for each in attained]
-    return Drift(
-        None if away is None else _largest([a.position for a in away]),
-        _largest([r.position for r in spread]),
-        max(gone),
-        None if away is None else _largest_of_three([a.angles for a in away]),
-        _largest_of_three([r.angles for r in spread]),
-    )
+    near, turned = None, None
+    if commanded is not None:
+        away = [accuracy(a, c) for a, c in zip(attained, commanded, strict=True)]
+        near, turned = _change([a.position for a in away]), _change([a.angles for a in away])
+    again, scattered = _change([r.position for r in spread]), _change([r.angles for r in spread])
+    return Drift(near, again, max(gone), turned, scattered)
 
 
-def _largest(values: Sequence[float]) -> float:
-    return max(abs(value - values[0]) for value in values)
-
-
-def _largest_of_three(values: Sequence[Three | None]) -> Three | None:
-    known = np.array([value for value in values if value is not None])
-    return three(np.abs(known - known[0]).max(axis=0)) if len(known) == len(values) else None
+def _change(values: Sequence[Any]) -> Any:
+    """Return the largest change against the first of numbers or threes; ``None`` where one of them is unknown."""
+    if any(value is None for value in values):
+        return None
+    largest = np.abs(np.subtract(values, values[0])).max(axis=0)
+    return three(largest) if np.ndim(largest) else float(largest)
 
 
 @dataclass(frozen=True)

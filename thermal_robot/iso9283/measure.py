@@ -42,9 +42,8 @@ class Seen:
     """A campaign in the axes of the base.
 
     ``attained`` was measured, ``commanded`` are the nominal robot's poses (``None`` where the frames take up all
-    figures, so that AP would be zero by itself), ``corrected`` what a model predicts. ``fitted``, ``unknowns``,
-    ``figures``: the frames that were fitted to the same rows, how many numbers that took, and how many figures of
-    different poses there are.
+    figures, so that AP would be zero by itself), ``corrected`` what a model predicts. ``fitted`` are the frames that
+    were fitted to the same rows, ``unknowns`` the numbers that took, ``figures`` those of different poses.
     """
 
     campaign: Campaign
@@ -55,41 +54,33 @@ class Seen:
     unknowns: int
     figures: int
 
-    @classmethod
-    def of(cls, campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Array | None] | None) -> Seen:
-        """See a campaign; arguments as of :func:`~thermal_robot.iso9283.measure.performance`."""
-        each = 3 if campaign.orientation is None else 6
-        held = campaign.tool_known or campaign.simulated_position is not None
-        unknown = {"base": 0 if campaign.base_known else 6, "tool": 0 if held else each}
-        taken = sum(unknown.values())
-        figures = each * len(np.unique(np.round(campaign.q / SAME_COMMAND), axis=0))
-        told = taken < figures
-        if frames is None:
-            # by least squares, as surveyors align two systems: the standard sets no cycle aside
-            every = np.ones(campaign.samples, dtype=bool)
-            frames = register(campaign, every) if told else Frames.declared(campaign)
-        base = frames.base
-        should = None
-        if told:
-            found = observe(campaign, frames)
-            should = Attained(found.position, found.rotation)
-        fitted = tuple(name for name, count in unknown.items() if count)
-        is_ = _in_base(base, np.asarray(campaign.position), campaign.orientation)
-        after = None if predicted is None else _in_base(base, *_checked(campaign, predicted))
-        return cls(campaign, is_, should, after, fitted, taken, figures)
-
-    def accuracy(self, rows: Rows) -> Accuracy | None:
+    def near(self, rows: Rows) -> Accuracy | None:
         """Return AP of some rows."""
-        if self.commanded is None:
-            return None
-        return accuracy(self.attained.take(rows), self.commanded.take(rows))
+        return None if self.commanded is None else accuracy(self.attained.take(rows), self.commanded.take(rows))
 
     def after(self, rows: Rows) -> Accuracy | None:
-        """Return AP of some rows against the corrected model."""
+        """Return AP of some rows against the corrected model, where that predicts them."""
         if self.corrected is None:
             return None
         rows = rows[np.isfinite(self.corrected.position[rows]).all(axis=1)]
         return accuracy(self.attained.take(rows), self.corrected.take(rows)) if len(rows) else None
+
+
+def _seen(campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Array | None] | None) -> Seen:
+    """See a campaign; arguments as of :func:`performance`."""
+    each = 3 if campaign.orientation is None else 6
+    held = campaign.tool_known or campaign.simulated_position is not None
+    unknown = {"base": 0 if campaign.base_known else 6, "tool": 0 if held else each}
+    taken, figures = sum(unknown.values()), each * len(np.unique(np.round(campaign.q / SAME_COMMAND), axis=0))
+    told = taken < figures
+    if frames is None:
+        # by least squares, as surveyors align two systems: the standard sets no cycle aside
+        frames = register(campaign, np.ones(campaign.samples, dtype=bool)) if told else Frames.declared(campaign)
+    found = observe(campaign, frames) if told else None
+    should = None if found is None else Attained(found.position, found.rotation)
+    is_ = _in_base(frames.base, np.asarray(campaign.position), campaign.orientation)
+    after = None if predicted is None else _in_base(frames.base, *_checked(campaign, predicted))
+    return Seen(campaign, is_, should, after, tuple(n for n, count in unknown.items() if count), taken, figures)
 
 
 def _in_base(base: Array, position: Array, orientation: Array | None) -> Attained:
@@ -115,25 +106,11 @@ def _checked(campaign: Campaign, predicted: tuple[Array, Array | None]) -> tuple
 _NAMED = 5
 
 
-def notes_of(
+def _notes(
     seen: Seen, groups: Sequence[Repeats], poses: Sequence[PoseCriteria], paths: Sequence[PathCriteria], alone: int
 ) -> Iterator[str]:
-    """Yield the notes on a campaign, its repeats and their criteria; ``alone`` rows repeat nothing."""
-    yield from _of_frames(seen)
-    yield from _of_cycles(poses, paths)
-    campaign = seen.campaign
-    apart = [g.label for g in groups if np.ptp(campaign.q[g.rows], axis=0).max() > SAME_COMMAND]
-    if apart:
-        yield f"Rows of one label have different joint commands, which counts as scatter: {listed(apart, _NAMED)}."
-    if campaign.noise_position:
-        alone_shows = 1e3 * of_noise(campaign.noise_position)
-        yield f"RP_l holds the noise of the instrument, which alone would show {alone_shows:.3g} mm."
-    if alone:
-        yield f"{alone} of {campaign.samples} rows repeat nothing, and count for the registration only."
-
-
-def _of_frames(seen: Seen) -> Iterator[str]:
-    many = len(seen.fitted) > 1
+    """Yield what a reader must know beside the figures; ``alone`` rows repeat nothing."""
+    campaign, many = seen.campaign, len(seen.fitted) > 1
     frames = f"{' and '.join(seen.fitted)} frame{'s' if many else ''}"
     if seen.commanded is None:
         yield (
@@ -146,21 +123,24 @@ def _of_frames(seen: Seen) -> Iterator[str]:
             f"({seen.unknowns} unknowns, {seen.figures} figures of different poses). They are smaller than against "
             "frames that are measured by themselves. RP, vAP and RT do not depend on it."
         )
-
-
-def _of_cycles(poses: Sequence[PoseCriteria], paths: Sequence[PathCriteria]) -> Iterator[str]:
-    few = sum(p.cycles < CYCLES for p in poses)
-    if few:
-        yield f"Fewer cycles than the standard's {CYCLES}: {few} of {len(poses)} poses."
-    short = sum(p.cycles < PATH_CYCLES for p in paths)
-    if short:
-        yield f"Fewer cycles than the standard's {PATH_CYCLES}: {short} of {len(paths)} paths."
-    several = [p.pose for p in poses if (p.directions or 0) > 1]
-    if several:
+    for name, standard, cycles in (
+        ("poses", CYCLES, [p.cycles for p in poses]),
+        ("paths", PATH_CYCLES, [p.cycles for p in paths]),
+    ):
+        if few := sum(count < standard for count in cycles):
+            yield f"Fewer cycles than the standard's {standard}: {few} of {len(cycles)} {name}."
+    if several := [p.pose for p in poses if (p.directions or 0) > 1]:
         yield (
             "Reached from several directions, so that RP holds what vAP tells and is larger than the standard's, which "
             f"comes from one: {listed(several, _NAMED)}."
         )
+    if apart := [g.label for g in groups if np.ptp(campaign.q[g.rows], axis=0).max() > SAME_COMMAND]:
+        yield f"Rows of one label have different joint commands, which counts as scatter: {listed(apart, _NAMED)}."
+    if campaign.noise_position:
+        alone_shows = 1e3 * of_noise(campaign.noise_position)
+        yield f"RP_l holds the noise of the instrument, which alone would show {alone_shows:.3g} mm."
+    if alone:
+        yield f"{alone} of {campaign.samples} rows repeat nothing, and count for the registration only."
 
 
 def performance(
@@ -205,24 +185,18 @@ def performance(
         raise CampaignError(campaign.name, "nothing was measured", column="x", expected="measured positions")
     groups, alone = repeats(campaign)
     if not groups:
-        raise CampaignError(
-            campaign.name,
-            "no pose is repeated",
-            column="pose",
-            found=f"{campaign.samples} rows, each another pose",
-            expected=f"the same label in rows that repeat a pose, {CYCLES} of each for the standard",
-        )
-    seen = Seen.of(campaign, frames, predicted)
+        found = f"{campaign.samples} rows, each another pose"
+        expected = f"the same label in rows that repeat a pose, {CYCLES} of each for the standard"
+        raise CampaignError(campaign.name, "no pose is repeated", column="pose", found=found, expected=expected)
+    seen = _seen(campaign, frames, predicted)
     at_rest = [_pose(seen, group) for group in groups if not group.path]
     along = dict.fromkeys(group.path for group in groups if group.path)
     paths = [_path(seen, path, [group for group in groups if group.path == path]) for path in along]
-    sigma = campaign.noise_position
-    alone_shows = None if sigma is None else of_noise(sigma)
-    notes = tuple(notes_of(seen, groups, at_rest, paths, alone))
-    robot = campaign.robot
-    return Performance(
-        campaign.name, robot.name, robot.tool_frame, tuple(at_rest), tuple(paths), seen.fitted, alone_shows, notes
-    )
+    notes = tuple(_notes(seen, groups, at_rest, paths, alone))
+    sigma, robot = campaign.noise_position, campaign.robot
+    shown = None if sigma is None else of_noise(sigma)
+    named = (campaign.name, robot.name, robot.tool_frame)
+    return Performance(*named, tuple(at_rest), tuple(paths), seen.fitted, shown, notes)
 
 
 def _pose(seen: Seen, group: Repeats) -> PoseCriteria:
@@ -238,7 +212,7 @@ def _pose(seen: Seen, group: Repeats) -> PoseCriteria:
         cycles=len(rows),
         directions=None if approached is None else len(approached),
         repeatability=repeatability(seen.attained.take(rows)),
-        accuracy=seen.accuracy(rows),
+        accuracy=seen.near(rows),
         corrected=seen.after(rows),
         variation=variation([seen.attained.take(part) for part in counting]) if several else None,
         variation_cycles=tuple(len(part) for part in counting) if several else (),
@@ -248,7 +222,7 @@ def _pose(seen: Seen, group: Repeats) -> PoseCriteria:
 
 
 def _path(seen: Seen, path: str, points: Sequence[Repeats]) -> PathCriteria:
-    away = [found for point in points if (found := seen.accuracy(point.rows))]
+    away = [found for point in points if (found := seen.near(point.rows))]
     after = [found for point in points if (found := seen.after(point.rows))]
     return PathCriteria(
         path=path,

@@ -5,19 +5,21 @@ Tables are in mm and mrad, the poses below each other; their cells are texts, fo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import floor, isfinite, log10
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from thermal_robot.iso9283.criteria import PathCriteria, PoseCriteria, Three
+from thermal_robot.iso9283.criteria import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.groups import CYCLES, PATH_CYCLES
+from thermal_robot.tables import aligned
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+SCHEMA = "thermal-robot/iso9283/1"
 WIDTH = 96
 MILLI = 1e3
 MOST = 40
@@ -27,20 +29,83 @@ LONGEST_NAME = 20
 NOTHING = 1e-6
 """mm and mrad: what is smaller is rounding, and asks for no decimals."""
 _LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
-_MISSING = "–"
-Cell = str | int | float | None
+Criteria = PoseCriteria | PathCriteria
+
+_FIGURES = {
+    "AP_p": "accuracy.position",
+    "AP_abc": "accuracy.angles",
+    "AP_xyz": "accuracy.axes",
+    "AP_p corrected": "corrected.position",
+    "AP_abc corrected": "corrected.angles",
+    "AP_xyz corrected": "corrected.axes",
+    "RP_l": "repeatability.position",
+    "RP_abc": "repeatability.angles",
+    "vAP_p": "variation.position",
+    "vAP_abc": "variation.angles",
+    "dAP_p": "drift.accuracy",
+    "dAP_abc": "drift.accuracy_angles",
+    "dRP_l": "drift.repeatability",
+    "dRP_abc": "drift.repeatability_angles",
+    "shift": "drift.shift",
+}
+"""Criteria of a pose, and where they stand; three letters stand for three figures. Of a path: AT for AP, RT for RP."""
+_OF_PATH = {"AP_p", "AP_abc", "AP_p corrected", "AP_abc corrected", "RP_l", "RP_abc"}
+_COLUMNS = {
+    "RP_l": "pose n dir AP_p corrected AP_x AP_y AP_z RP_l low high",
+    "RP_a": "pose AP_a AP_b AP_c ±RP_a ±RP_b ±RP_c",
+    "vAP_p": "pose dir n vAP_p vAP_a vAP_b vAP_c",
+    "dRP_l": "pose times n dAP_p dRP_l shift",
+    "RT_p": "path points n AT_p corrected RT_p",
+    "RT_a": "path AT_a AT_b AT_c ±RT_a ±RT_b ±RT_c",
+}
+"""Columns of each table by the criterion without which a pose or path has no row in it."""
+_HEADINGS = {
+    "RP_l": "POSES: AP and RP in mm; n: cycles; dir: directions of approach; low, high: 95 % interval of RP_l",
+    "RP_a": "POSES: angles about the axes of the base, in mrad",
+    "vAP_p": "DIRECTIONS: vAP in mm; n: cycles from each, the least",
+    "dRP_l": "DRIFT against the first time, in mm; n: cycles at each, the least; shift: of the barycentre",
+    "RT_p": "PATHS: AT and RT in mm; n: cycles of each point, the least",
+    "RT_a": "PATHS: angles about the axes of the base, in mrad",
+}
+_WHERE_KNOWN = ("corrected", "vAP_a", "vAP_b", "vAP_c")
+"""Columns that are there only where some row has them."""
+
+
+def _figures(one: Criteria) -> dict[str, float]:
+    """Return every figure of a pose or path by its criterion, m and rad."""
+    found: dict[str, float] = {}
+    for name, place in _FIGURES.items():
+        if isinstance(one, PathCriteria):
+            if name not in _OF_PATH:
+                continue
+            name = name.replace("AP", "AT").replace("RP_l", "RT_p").replace("RP", "RT")
+        part, _, attribute = place.partition(".")
+        value = getattr(getattr(one, part), attribute, None)
+        if isinstance(value, tuple):
+            stem, _, letters = name.partition("_")
+            found |= {f"{stem}_{letters[k]}{letters[3:]}": value[k] for k in range(3)}
+        elif value is not None:
+            found[name] = value
+    return found
+
+
+def _cycles(one: Criteria, name: str) -> int:
+    """Cycles of the direction, time or point with the fewest that a criterion is made of."""
+    if isinstance(one, PoseCriteria) and name[0] in "vds":
+        return min(one.variation_cycles if name[0] == "v" else one.drift_cycles)
+    return one.cycles
 
 
 @dataclass(frozen=True)
 class Table:
-    """Criteria of poses or paths, one below the other; one without rows shows nothing.
+    """Criteria of poses or paths, one below the other.
 
     ``head`` names the columns, the label's first; ``more`` poses or paths are not shown.
     """
 
-    heading: str = ""
-    head: tuple[str, ...] = ()
-    rows: tuple[tuple[str, ...], ...] = ()
+    heading: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
     more: int = 0
 
     @property
@@ -48,128 +113,42 @@ class Table:
         """What is not shown, and where that is; empty where all is."""
         return f"and {self.more} more, in the JSON and the CSV" if self.more else ""
 
+    @classmethod
+    def of(cls, found: Sequence[Criteria], needs: str) -> Table | None:
+        """Write SI figures in thousandths with as many decimals as the smallest needs; ``None`` without rows."""
+        cells = [_cells(one, figures, needs) for one in found if needs in (figures := _figures(one))]
+        if not cells:
+            return None
+        head, heading = _COLUMNS[needs].split(), _HEADINGS[needs]
+        shown = [name for name in head if name not in _WHERE_KNOWN or any(row.get(name) is not None for row in cells)]
+        if "vAP_a" in shown:
+            heading = heading.replace("in mm", "in mm and mrad")
+        rows = [[row.get(name) for name in shown] for row in cells]
+        decimals = _decimals([cell for row in rows for cell in row if isinstance(cell, float)])
+        texts = tuple(tuple(_text(cell, decimals) for cell in row) for row in rows[:MOST])
+        return cls(heading, tuple(shown), texts, len(rows) - len(texts))
 
-def millimetres(value: float) -> str:
-    """Write a length with three digits, no fewer than a micrometre needs."""
-    return f"{_cell(value, _decimals([value]))} mm"
-
-
-def _counted(name: str, counts: Sequence[int], standard: int) -> str:
-    """Say how many there are, and how often they were repeated, beside what the standard asks for."""
-    if not counts:
-        return ""
-    often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
-    return f"{len(counts)} {name}{'s' if len(counts) > 1 else ''} of {often} cycles (the standard: {standard})"
-
-
-def poses(found: Sequence[PoseCriteria]) -> Table:
-    """AP and RP of positions; nothing without poses."""
-    corrected = any(p.corrected for p in found)
-    after_name = ["corrected"] if corrected else []
-    head = ["pose", "n", "dir", "AP_p", *after_name, "AP_x", "AP_y", "AP_z", "RP_l", "low", "high"]
-    rows: list[list[Cell]] = []
-    for p in found:
-        a = p.accuracy
-        away = a.position if a else None
-        after = [p.corrected.position if p.corrected else None] if corrected else []
-        low, high = p.repeatability.ci95 or (None, None)
-        axes = _of(a.axes if a else None)
-        rows.append([p.pose, p.cycles, p.directions, away, *after, *axes, p.repeatability.position, low, high])
-    return _table(
-        "POSES: AP and RP in mm; n: cycles; dir: directions of approach; low, high: 95 % interval of RP_l", head, rows
-    )
+    def __str__(self) -> str:
+        lines = [f"  {line}" for line in aligned([self.head, *self.rows])]
+        return "\n".join([self.heading, *lines, *([f"  {self.rest}"] if self.rest else [])])
 
 
-def turns(found: Sequence[PoseCriteria]) -> Table:
-    """AP and RP of orientations; nothing where only positions are known."""
-    return _turns("pose", "AP", "RP", ((p.pose, p) for p in found))
+def _cells(one: Criteria, figures: dict[str, float], needs: str) -> dict[str, str | int | float | None]:
+    """Return what a row of a table may show, by its column."""
+    corrected = figures.get("AP_p corrected", figures.get("AT_p corrected"))
+    angles = {f"±{name}": value for name, value in figures.items()}
+    cells = {**figures, **angles, "corrected": corrected, "n": _cycles(one, needs)}
+    if isinstance(one, PathCriteria):
+        return {**cells, "path": one.path, "points": one.points}
+    low, high = one.repeatability.ci95 or (None, None)
+    directions = len(one.variation_cycles) if needs == "vAP_p" else one.directions
+    times = len(one.drift_cycles)
+    return {**cells, "pose": one.pose, "dir": directions, "times": times, "low": low, "high": high}
 
 
-def variations(found: Sequence[PoseCriteria]) -> Table:
-    """VAP; nothing where no pose was reached from several directions."""
-    shown = [(p, p.variation) for p in found if p.variation]
-    turned = any(v.angles is not None for _, v in shown)
-    rows: list[list[Cell]] = [
-        [p.pose, len(p.variation_cycles), min(p.variation_cycles), v.position, *(_of(v.angles) if turned else [])]
-        for p, v in shown
-    ]
-    head = ["pose", "dir", "n", "vAP_p", *(["vAP_a", "vAP_b", "vAP_c"] if turned else [])]
-    return _table(f"DIRECTIONS: vAP in mm{' and mrad' if turned else ''}; n: cycles from each, the least", head, rows)
-
-
-def drifts(found: Sequence[PoseCriteria]) -> Table:
-    """Drift; nothing where no pose was measured at several times."""
-    shown = [(p, p.drift) for p in found if p.drift]
-    rows: list[list[Cell]] = [
-        [p.pose, len(p.drift_cycles), min(p.drift_cycles), d.accuracy, d.repeatability, d.shift] for p, d in shown
-    ]
-    head = ["pose", "times", "n", "dAP_p", "dRP_l", "shift"]
-    return _table(
-        "DRIFT against the first time, in mm; n: cycles at each, the least; shift: of the barycentre", head, rows
-    )
-
-
-def paths(found: Sequence[PathCriteria]) -> Table:
-    """AT and RT of positions; nothing without paths."""
-    corrected = any(p.corrected for p in found)
-    head = ["path", "points", "n", "AT_p", *(["corrected"] if corrected else []), "RT_p"]
-    rows: list[list[Cell]] = []
-    for p in found:
-        after = [p.corrected.position if p.corrected else None] if corrected else []
-        away = p.accuracy.position if p.accuracy else None
-        rows.append([p.path, p.points, p.cycles, away, *after, p.repeatability.position])
-    return _table("PATHS: AT and RT in mm; n: cycles of each point, the least", head, rows)
-
-
-def path_turns(found: Sequence[PathCriteria]) -> Table:
-    """AT and RT of orientations; nothing where only positions are known."""
-    return _turns("path", "AT", "RT", ((p.path, p) for p in found))
-
-
-def _turns(what: str, accuracy: str, again: str, found: Iterable[tuple[str, PoseCriteria | PathCriteria]]) -> Table:
-    rows: list[list[Cell]] = [
-        [name, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
-        for name, p in found
-        if p.repeatability.angles is not None
-    ]
-    head = [what, *(f"{accuracy}_{axis}" for axis in "abc"), *(f"±{again}_{axis}" for axis in "abc")]
-    return _table(f"{what.upper()}S: angles about the axes of the base, in mrad", head, rows)
-
-
-def wrapped(sentence: str, indent: str) -> str:
-    """Break a sentence into lines."""
-    return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent), break_on_hyphens=False)
-
-
-def _of(values: Three | None) -> list[Cell]:
-    return [None] * 3 if values is None else [*values]
-
-
-def _table(heading: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
-    """Write SI figures in thousandths with as many decimals as the smallest needs."""
-    if not rows:
-        return Table()
-    decimals = _decimals([cell for row in rows for cell in row if isinstance(cell, float)])
-    shown = tuple(tuple(_cell(cell, decimals) for cell in row) for row in rows[:MOST])
-    return Table(heading, tuple(head), shown, len(rows) - len(shown))
-
-
-def lines(table: Table) -> list[str]:
-    """Align the columns of a table as plain text, labels on the left, figures on the right; nothing without rows."""
-    if not table.rows:
-        return []
-    cells = (table.head, *table.rows)
-    wide = [max(len(row[k]) for row in cells) for k in range(len(table.head))]
-    aligned = [
-        "  " + "  ".join([row[0].ljust(wide[0]), *(c.rjust(w) for c, w in zip(row[1:], wide[1:], strict=True))])
-        for row in cells
-    ]
-    return [table.heading, *aligned, *([f"  {table.rest}"] if table.rest else [])]
-
-
-def _cell(cell: Cell, decimals: int) -> str:
+def _text(cell: str | int | float | None, decimals: int) -> str:
     if cell is None:
-        return _MISSING
+        return "–"
     if isinstance(cell, str):
         return cell if len(cell) <= LONGEST_NAME else f"{cell[: LONGEST_NAME - 1]}…"
     if isinstance(cell, int):
@@ -187,7 +166,21 @@ def _decimals(values: Sequence[float]) -> int:
     return min(max(1 - floor(log10(sizes[len(sizes) // 2])), _LEAST_DECIMALS), _MOST_DECIMALS)
 
 
-SCHEMA = "thermal-robot/iso9283/1"
+def _counted(name: str, counts: Sequence[int], standard: int) -> str:
+    """Say how many there are, and how often they were repeated, beside what the standard asks for."""
+    if not counts:
+        return ""
+    often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
+    return f"{len(counts)} {name}{'s' if len(counts) > 1 else ''} of {often} cycles (the standard: {standard})"
+
+
+def _wrapped(sentence: str, indent: str) -> str:
+    """Break a sentence into lines."""
+    return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent), break_on_hyphens=False)
+
+
+def _worst(found: Sequence[Criteria], part: str) -> float | None:
+    return max((value.position for one in found if (value := getattr(one, part))), default=None)
 
 
 @dataclass(frozen=True)
@@ -237,39 +230,39 @@ class Performance:
     @property
     def accuracy(self) -> float | None:
         """AP_p of the worst pose, m."""
-        return max((p.accuracy.position for p in self.poses if p.accuracy), default=None)
+        return _worst(self.poses, "accuracy")
 
     @property
     def corrected(self) -> float | None:
         """AP_p of the worst pose against the corrected model, m."""
-        return max((p.corrected.position for p in self.poses if p.corrected), default=None)
+        return _worst(self.poses, "corrected")
 
     @property
     def repeatability(self) -> float | None:
         """RP_l of the worst pose, m."""
-        return max((p.repeatability.position for p in self.poses), default=None)
+        return _worst(self.poses, "repeatability")
 
     @property
     def path_accuracy(self) -> float | None:
         """AT_p of the worst path, m."""
-        return max((p.accuracy.position for p in self.paths if p.accuracy), default=None)
+        return _worst(self.paths, "accuracy")
 
     @property
     def path_corrected(self) -> float | None:
         """AT_p of the worst path against the corrected model, m."""
-        return max((p.corrected.position for p in self.paths if p.corrected), default=None)
+        return _worst(self.paths, "corrected")
 
     @property
     def path_repeatability(self) -> float | None:
         """RT_p of the worst path, m."""
-        return max((p.repeatability.position for p in self.paths), default=None)
+        return _worst(self.paths, "repeatability")
 
     @property
     def summary(self) -> str:
         """The worst figures in one line."""
         named = [("AP_p", self.accuracy), ("corrected", self.corrected), ("RP_l", self.repeatability)]
         named += [("AT_p", self.path_accuracy), ("corrected", self.path_corrected), ("RT_p", self.path_repeatability)]
-        said = [f"{name} {millimetres(value)}" for name, value in named if value is not None]
+        said = [f"{name} {_text(value, _decimals([value]))} mm" for name, value in named if value is not None]
         return f"ISO 9283, the worst of {self.extent}: {'; '.join(said)}"
 
     @property
@@ -311,59 +304,28 @@ class Performance:
         import pandas as pd
 
         columns = ["label", "cycles", "criterion", "value", "ci95_low", "ci95_high", "unit"]
-        return pd.DataFrame([*self._of_poses(), *self._of_paths()], columns=columns)
+        return pd.DataFrame(self._rows(), columns=columns)
 
-    def _of_poses(self) -> Iterator[tuple[Any, ...]]:
-        for p in self.poses:
-            for name, found in (("AP_{}", p.accuracy), ("AP_{} corrected", p.corrected)):
-                if found:
-                    yield from _figures(p.pose, p.cycles, name, "p", found.position, found.angles)
-                    yield from _three(p.pose, p.cycles, name, "xyz", found.axes, "m")
-            spread = p.repeatability
-            yield from _figures(p.pose, p.cycles, "RP_{}", "l", spread.position, spread.angles, spread.ci95)
-            if p.variation:
-                fewest = min(p.variation_cycles)
-                yield from _figures(p.pose, fewest, "vAP_{}", "p", p.variation.position, p.variation.angles)
-            if p.drift:
-                fewest, d = min(p.drift_cycles), p.drift
-                if d.accuracy is not None:
-                    yield from _figures(p.pose, fewest, "dAP_{}", "p", d.accuracy, d.accuracy_angles)
-                yield from _figures(p.pose, fewest, "dRP_{}", "l", d.repeatability, d.repeatability_angles)
-                yield from _figures(p.pose, fewest, "shift", "", d.shift, None)
+    @property
+    def _all(self) -> tuple[Criteria, ...]:
+        return (*self.poses, *self.paths)
 
-    def _of_paths(self) -> Iterator[tuple[Any, ...]]:
-        for p in self.paths:
-            for name, found in (("AT_{}", p.accuracy), ("AT_{} corrected", p.corrected), ("RT_{}", p.repeatability)):
-                if found:
-                    yield from _figures(p.path, p.cycles, name, "p", found.position, found.angles)
+    def _rows(self) -> Iterator[tuple[Any, ...]]:
+        for one in self._all:
+            label = one.pose if isinstance(one, PoseCriteria) else one.path
+            for name, value in _figures(one).items():
+                interval = one.repeatability.ci95 if isinstance(one, PoseCriteria) and name == "RP_l" else None
+                low, high = interval or (float("nan"), float("nan"))
+                unit = "rad" if name.partition("_")[2][:1] in {"a", "b", "c"} else "m"
+                yield label, _cycles(one, name), name, value, low, high, unit
 
     @property
     def tables(self) -> tuple[Table, ...]:
         """The criteria as tables of texts, in mm and mrad: those of poses, then those of paths, none that is empty."""
-        at_rest = [table(self.poses) for table in (poses, turns, variations, drifts)]
-        return tuple(t for t in (*at_rest, paths(self.paths), path_turns(self.paths)) if t.rows)
+        made = (Table.of(self._all, needs) for needs in _COLUMNS)
+        return tuple(table for table in made if table)
 
     def __str__(self) -> str:
         title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {self.extent}"
-        blocks = [[wrapped(title, "")], *map(lines, self.tables), [wrapped(note, "  - ") for note in self.notes]]
-        return "\n\n".join("\n".join(block) for block in blocks if block)
-
-
-def _figures(
-    label: str,
-    cycles: int,
-    name: str,
-    letter: str,
-    position: float,
-    angles: Three | None,
-    ci95: tuple[float, float] | None = None,
-) -> Iterator[tuple[Any, ...]]:
-    low, high = ci95 or (float("nan"), float("nan"))
-    yield label, cycles, name.format(letter), position, low, high, "m"
-    if angles is not None:
-        yield from _three(label, cycles, name, "abc", angles, "rad")
-
-
-def _three(label: str, cycles: int, name: str, letters: str, values: Three, unit: str) -> Iterator[tuple[Any, ...]]:
-    for letter, value in zip(letters, values, strict=True):
-        yield label, cycles, name.format(letter), value, float("nan"), float("nan"), unit
+        notes = "\n".join(_wrapped(note, "  - ") for note in self.notes)
+        return "\n\n".join(part for part in (_wrapped(title, ""), *map(str, self.tables), notes) if part)

@@ -15,12 +15,8 @@ if TYPE_CHECKING:
 
 
 TITLES = {
-    "std.x": "Scatter along x, 1σ",
-    "std.y": "Scatter along y, 1σ",
-    "std.z": "Scatter along z, 1σ",
-    "shift.x": "Thermal displacement along x",
-    "shift.y": "Thermal displacement along y",
-    "shift.z": "Thermal displacement along z",
+    **{f"std.{axis}": f"Scatter along {axis}, 1σ" for axis in "xyz"},
+    **{f"shift.{axis}": f"Thermal displacement along {axis}" for axis in "xyz"},
     "polygon.area": "Area of the polygon of thermal displacements",
     "polygon.width": "Width of the polygon of thermal displacements",
     "probability": "Probability of joining",

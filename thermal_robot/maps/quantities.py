@@ -20,11 +20,39 @@ from thermal_robot.assembly.thermal import elongation
 from thermal_robot.assembly.workspace import assembly_map
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import chain_frames, elongation_jacobian, frame_jacobians
-from thermal_robot.maps import settings
 from thermal_robot.maps.question import Joints, Spec, within
 from thermal_robot.robot import Robot
 
 Rows = NDArray[np.intp]
+
+SEEDS = 12
+"""Places of a chunk whose postures are searched from everywhere at a time; all others continue from neighbours."""
+STARTS = 64
+"""Configurations from which a posture is searched at a seed: one of eight postures that attracts a twentieth of all
+starts is missed once in 27."""
+IDLE = 3
+"""Times in a row that seeds, taken where fewest postures are known, bring nothing new before the search ends: what one
+in twenty places has is then overlooked in one map of six."""
+MOST = 32
+"""Postures that are kept of a place: sixteen is the most of six joints in general; redundant arms may have more."""
+NEIGHBOURS = 9
+"""From which a place is continued: those beside it in a plane, corners too."""
+STEPS = 60
+"""Of the search for one configuration."""
+PULL = 0.5
+"""Share of the way home that a step takes in directions that the task leaves free."""
+LONGEST = 0.4
+"""rad or m; of a step, so that a posture is not left."""
+CLOSE = 1e-11
+"""m and rad; a pose is reached."""
+SETTLED = 1e-7
+"""rad or m; the way home that is left where the free directions have settled."""
+DAMPING = 1e-12
+"""m² and rad²; beside the square of what is missing: keeps what nothing asks for out of the step."""
+ALIKE = 1e-4
+"""rad or m; two configurations of a place that differ by less are one."""
+MOST_LINKS = 12
+"""Segments whose 2^11 corners are compared for the width of a polygon."""
 
 
 class Task:
@@ -54,7 +82,7 @@ class Task:
         """(N, n) configurations near others at which the tip is at (N, 3) places, and whether it is."""
         q, found, robot = start.copy(), np.zeros(len(start), dtype=bool), self.robot
         eye = np.eye(6)
-        for step_number in range(settings.STEPS):
+        for step_number in range(STEPS):
             open_ = np.flatnonzero(~found)
             if not len(open_):
                 break
@@ -65,17 +93,17 @@ class Task:
             missing[:, 3:] = np.cross(held, self.approach)  # vanishes at a half turn, too
             jacobian = np.ascontiguousarray(frame_jacobians(robot, q[open_], frames=frames, point=self.tip))
             jacobian[:, 3:] -= held[:, :, None] * np.einsum("ni,nij->nj", held, jacobian[:, 3:])[:, None]
-            damping = 0.5 * np.sum(missing**2, axis=1) + settings.DAMPING
+            damping = 0.5 * np.sum(missing**2, axis=1) + DAMPING
             square = jacobian @ np.swapaxes(jacobian, 1, 2) + damping[:, None, None] * eye
-            away = settings.PULL * (self.home - q[open_])
+            away = PULL * (self.home - q[open_])
             both = np.stack([missing, np.einsum("nij,nj->ni", jacobian, away)], axis=2)
             task, along = np.moveaxis(np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(square, both), 2, 0)
             free = away - along
-            reached = (np.max(np.abs(missing), axis=1) < settings.CLOSE) & (held @ self.approach > 0.0)
-            late = step_number > settings.STEPS // 2  # what has not settled by then goes on without being drawn
-            settled = late | (np.max(np.abs(free), axis=1) < settings.SETTLED)
+            reached = (np.max(np.abs(missing), axis=1) < CLOSE) & (held @ self.approach > 0.0)
+            late = step_number > STEPS // 2  # what has not settled by then goes on without being drawn
+            settled = late | (np.max(np.abs(free), axis=1) < SETTLED)
             step = task if late else task + free
-            step *= np.minimum(1.0, settings.LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
+            step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
             found[open_] = reached & settled
             step[found[open_]] = 0.0
             q[open_] += step
@@ -87,7 +115,7 @@ class _Known:
     """The postures that are known of M places, so many at most."""
 
     def __init__(self, task: Task, places: int) -> None:
-        self.task, self.q = task, np.full((places, settings.MOST, task.robot.n), np.nan)
+        self.task, self.q = task, np.full((places, MOST, task.robot.n), np.nan)
         self.count = np.zeros(places, dtype=np.intp)
 
     def fresh(self, places: Rows, q: Array) -> NDArray[np.bool_]:
@@ -99,7 +127,7 @@ class _Known:
             _, first = np.unique(places[left], return_index=True)
             rows = left[first]
             apart = np.abs(self.task.way(self.q[places[rows]], q[rows, None])).max(axis=2)
-            unknown = ~(apart < settings.ALIKE).any(axis=1) & (self.count[places[rows]] < settings.MOST)
+            unknown = ~(apart < ALIKE).any(axis=1) & (self.count[places[rows]] < MOST)
             rows = rows[unknown]
             self.q[places[rows], self.count[places[rows]]] = q[rows]
             self.count[places[rows]] += 1
@@ -115,7 +143,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
     """
     from scipy.spatial import cKDTree
 
-    near = cKDTree(targets).query(targets, k=min(settings.NEIGHBOURS, len(targets)))[1].reshape(len(targets), -1)
+    near = cKDTree(targets).query(targets, k=min(NEIGHBOURS, len(targets)))[1].reshape(len(targets), -1)
     known = _Known(task, len(targets))
     starts, random, idle = _everywhere(task), np.random.default_rng(0), 0
 
@@ -126,7 +154,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
         new[found] = known.fresh(places[found], q[found])
         return places[new], q[new]
 
-    while idle < settings.IDLE:
+    while idle < IDLE:
         seeds = _wanting(known.count, random)
         places, q = searched(np.repeat(seeds, len(starts)), np.tile(starts, (len(seeds), 1)))
         every, all_q = [places], [q]
@@ -138,10 +166,10 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
         while len(places):
             before = np.repeat(q, near.shape[1], axis=0)
             places, q = searched(near[places].ravel(), before)
-        if known.count.min() == settings.MOST:
+        if known.count.min() == MOST:
             break
     places = np.repeat(np.arange(len(targets)), known.count)
-    q = known.q[np.arange(settings.MOST) < known.count[:, None]]
+    q = known.q[np.arange(MOST) < known.count[:, None]]
     order = np.lexsort((np.linalg.norm(q - task.home, axis=1), places))
     return places[order], q[order]
 
@@ -153,7 +181,7 @@ def _everywhere(task: Task) -> Array:
     robot = task.robot
     low = np.where(task.whole, task.home - np.pi, robot.lower)
     high = np.where(task.whole, task.home + np.pi, robot.upper)
-    drawn = qmc.Sobol(robot.n, scramble=False).random(settings.STARTS)
+    drawn = qmc.Sobol(robot.n, scramble=False).random(STARTS)
     return np.vstack([task.home, low + drawn * (high - low)])
 
 
@@ -161,7 +189,7 @@ def _wanting(count: NDArray[np.intp], random: np.random.Generator) -> Rows:
     """Return places without a posture, and such that have fewer than others: half of the seeds each."""
     some = (count > 0) & (count < count.max())
     halves = (np.flatnonzero(chosen) for chosen in (count == 0, some if some.any() else count > 0))
-    return np.concatenate([random.permutation(half)[: settings.SEEDS // 2] for half in halves])
+    return np.concatenate([random.permutation(half)[: SEEDS // 2] for half in halves])
 
 
 def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
@@ -187,26 +215,11 @@ def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
 Columns = dict[str, NDArray[Any]]
 
 UNITS = {
-    "place": "",
-    "branch": "",
-    "x": "m",
-    "y": "m",
-    "z": "m",
-    "std.x": "m",
-    "std.y": "m",
-    "std.z": "m",
-    "shift.x": "m",
-    "shift.y": "m",
-    "shift.z": "m",
-    "polygon.area": "m²",
-    "polygon.width": "m",
-    "probability": "1",
-    "probability_warm": "1",
-    "capability": "1",
-    "capability_warm": "1",
-    "required": "m",
-    "required_warm": "m",
-    "margin": "1",
+    **{"place": "", "branch": ""},
+    **{f"{kind}{axis}": "m" for kind in ("", "std.", "shift.") for axis in "xyz"},
+    **{"polygon.area": "m²", "polygon.width": "m"},
+    **dict.fromkeys(("probability", "probability_warm", "capability", "capability_warm"), "1"),
+    **{"required": "m", "required_warm": "m", "margin": "1"},
 }
 """Columns beside the joints', and their units."""
 
@@ -237,18 +250,7 @@ def _told(spec: Spec, q: Array) -> Columns:
     from thermal_robot.assembly.probability import capability, failing_probability, planes
 
     robot, asked = spec.robot, spec.question
-    found = assembly_map(
-        robot,
-        q,
-        asked.sigma_q,
-        coefficients=asked.coefficients,
-        rise=asked.rise,
-        clearance=asked.clearance,
-        capability=asked.capability,
-        law=asked.law,
-        axis=asked.axis,
-        point=asked.point,
-    )
+    found = assembly_map(robot, q, **{name: value for name, value in vars(asked).items() if name != "approach"})
     plane = planes(found.directions)
     scatter = plane @ found.covariance @ np.swapaxes(plane, 1, 2)
     across = np.einsum("nij,nj->ni", plane, found.displacement)
@@ -257,9 +259,9 @@ def _told(spec: Spec, q: Array) -> Columns:
     area, width = polygon(plane @ (elongation_jacobian(robot, q) * grown))
     std = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
     return {
-        **dict(zip(("x", "y", "z"), found.positions.T, strict=True)),
-        **dict(zip(("std.x", "std.y", "std.z"), std.T, strict=True)),
-        **dict(zip(("shift.x", "shift.y", "shift.z"), found.displacement.T, strict=True)),
+        **dict(zip("xyz", found.positions.T, strict=True)),
+        **{f"std.{axis}": std[:, k] for k, axis in enumerate("xyz")},
+        **{f"shift.{axis}": found.displacement[:, k] for k, axis in enumerate("xyz")},
         "polygon.area": area,
         "polygon.width": width,
         "probability": found.probability,
@@ -279,8 +281,8 @@ def polygon(edges: Array) -> tuple[Array, Array]:
     g_i``. Refused for more segments than have their corners compared.
     """
     links = edges.shape[2]
-    if links > settings.MOST_LINKS:
-        raise RobotError(f"the polygon of {links} segments has too many corners; {settings.MOST_LINKS} are compared")
+    if links > MOST_LINKS:
+        raise RobotError(f"the polygon of {links} segments has too many corners; {MOST_LINKS} are compared")
     first, second = np.triu_indices(links, 1)
     crossed = edges[:, 0, first] * edges[:, 1, second] - edges[:, 1, first] * edges[:, 0, second]
     # a corner and the one opposite are as far apart as one with its signs and one with all others: half of them do

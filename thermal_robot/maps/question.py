@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.maps import settings
 from thermal_robot.robot import ENDS, Robot
 
+CHUNK = 4096
+"""Places, or configurations, that are worked on at once: their arrays take some ten megabytes."""
 Span = tuple[float, float, int]
 """First and last value of an axis, and how many."""
 
@@ -136,13 +137,13 @@ class Spec:
 
     def chunks(self) -> Iterator[NDArray[np.int64]]:
         """Yield the numbers of places or configurations that are worked on at once."""
-        for start in range(0, self.over.count, settings.CHUNK):
-            yield np.arange(start, min(start + settings.CHUNK, self.over.count))
+        for start in range(0, self.over.count, CHUNK):
+            yield np.arange(start, min(start + CHUNK, self.over.count))
 
     @property
     def parts(self) -> int:
         """How many chunks there are."""
-        return -(-self.over.count // settings.CHUNK)
+        return -(-self.over.count // CHUNK)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all that decides the map, as JSON would hold it."""
@@ -154,7 +155,7 @@ class Spec:
             "joints": list(self.robot.joint_names),
             "over": type(self.over).__name__.lower(),
             **{key: _plain(value) for part in (self.over, self.question) for key, value in vars(part).items()},
-            "chunk": settings.CHUNK,
+            "chunk": CHUNK,
         }
 
     @property

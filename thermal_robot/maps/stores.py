@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
+from itertools import count, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import CampaignError, RobotError, require
-from thermal_robot.maps import settings
 from thermal_robot.maps.quantities import UNITS, Columns, columns
 from thermal_robot.maps.question import Joints, Over, Positions, Question, Spec
 from thermal_robot.robot import Robot
@@ -21,60 +22,27 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-ZARR, PARQUET = ".zarr", ".parquet"
 NOTES = "map.json"
 """Beside the parts of a Parquet folder: what decides the map."""
+LISTED = 10
+"""Best places that are told."""
 
 
-class Store(Protocol):
-    """Chunks of a map on disk."""
-
-    @property
-    def notes(self) -> dict[str, Any]:
-        """What decides the map; empty where there is none yet."""
-        ...
-
-    @property
-    def done(self) -> int:
-        """How many chunks are there, from the first on."""
-        ...
-
-    def begin(self, notes: dict[str, Any]) -> None:
-        """Make an empty map."""
-        ...
-
-    def add(self, columns: Columns) -> None:
-        """Add the next chunk, whole."""
-        ...
-
-    def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
-        """Yield the columns, some of them by name, chunk by chunk."""
-        ...
-
-
-def store(path: str | Path) -> Store:
-    """Return the store of a path, by how its name ends; refused for another one, or a library not installed."""
-    folder = Path(path)
-    if folder.suffix == ZARR:
-        return ZarrStore(folder)
-    if folder.suffix == PARQUET:
-        return ParquetStore(folder)
-    raise CampaignError(
-        str(path), "no kind of map", found=folder.suffix or "no ending", expected=f"{ZARR} or {PARQUET}"
-    )
-
-
-class ParquetStore:
+class _Parquet:
     """A folder of parts, one a chunk, and its notes."""
 
+    library, extra = "pyarrow", "parquet"
+
     def __init__(self, folder: Path) -> None:
-        try:
-            import pyarrow  # noqa: F401
-        except ImportError as error:
-            raise CampaignError(
-                str(folder), "pyarrow is not installed", expected='pip install "thermal-robot[parquet]"'
-            ) from error
         self.folder = folder
+        try:
+            import_module(self.library)
+        except ImportError as error:
+            expected = f'pip install "thermal-robot[{self.extra}]"'
+            raise CampaignError(str(folder), f"{self.library} is not installed", expected=expected) from error
+
+    def _part(self, k: int) -> Path:
+        return self.folder / f"part-{k:06d}.parquet"
 
     @property
     def notes(self) -> dict[str, Any]:
@@ -82,16 +50,10 @@ class ParquetStore:
         file = self.folder / NOTES
         return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
 
-    def _part(self, k: int) -> Path:
-        return self.folder / f"part-{k:06d}.parquet"
-
     @property
     def done(self) -> int:
         """How many chunks are there, from the first on."""
-        k = 0
-        while self._part(k).is_file():
-            k += 1
-        return k
+        return next(k for k in count() if not self._part(k).is_file())
 
     def begin(self, notes: dict[str, Any]) -> None:
         """Make an empty map."""
@@ -119,17 +81,10 @@ class ParquetStore:
             yield {name: table[name].to_numpy() for name in table.column_names}
 
 
-class ZarrStore:
+class _Zarr(_Parquet):
     """A group of one array a column; rows beyond those that are counted are an unfinished chunk."""
 
-    def __init__(self, folder: Path) -> None:
-        try:
-            import zarr  # noqa: F401
-        except ImportError as error:
-            raise CampaignError(
-                str(folder), "zarr is not installed", expected='pip install "thermal-robot[maps]"'
-            ) from error
-        self.folder = folder
+    library, extra = "zarr", "maps"
 
     def _group(self, mode: Any = "r+") -> Any:
         import zarr
@@ -138,39 +93,44 @@ class ZarrStore:
 
     @property
     def notes(self) -> dict[str, Any]:
-        """What decides the map; empty where there is none yet."""
         return dict(self._group("r").attrs["notes"]) if (self.folder / "zarr.json").is_file() else {}
 
     @property
     def done(self) -> int:
-        """How many chunks are there, from the first on."""
         return len(self._group("r").attrs["rows"]) if self.notes else 0
 
     def begin(self, notes: dict[str, Any]) -> None:
-        """Make an empty map."""
         self._group("w").attrs.update({"notes": notes, "rows": []})
 
     def add(self, columns: Columns) -> None:
         """Add the next chunk; it counts once its number of rows is written."""
         group = self._group()
         rows = [int(count) for count in group.attrs["rows"]]
-        before = sum(rows)
-        count = len(next(iter(columns.values())))
+        before, more = sum(rows), len(next(iter(columns.values())))
         for name, values in columns.items():
             if name not in group:
                 group.create_array(name, shape=(0,), chunks=(1 << 16,), dtype=values.dtype)
             array = group[name]
-            array.resize((before + count,))
+            array.resize((before + more,))
             array[before:] = values
-        group.attrs.update({"rows": [*rows, count]})
+        group.attrs.update({"rows": [*rows, more]})
 
     def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
-        """Yield the columns, some of them by name, chunk by chunk."""
         group, start = self._group("r"), 0
-        for count in group.attrs["rows"]:
-            every = sorted(group.array_keys()) if names is None else names
-            yield {name: np.asarray(group[name][start : start + count]) for name in every}
-            start += count
+        every = sorted(group.array_keys()) if names is None else names
+        for more in group.attrs["rows"]:
+            yield {name: np.asarray(group[name][start : start + more]) for name in every}
+            start += more
+
+
+def store(path: str | Path) -> _Parquet:
+    """Return the store of a path, by how its name ends; refused for another one, or a library not installed."""
+    folder = Path(path)
+    kinds = {".zarr": _Zarr, ".parquet": _Parquet}
+    if folder.suffix not in kinds:
+        found = folder.suffix or "no ending"
+        raise CampaignError(str(path), "no kind of map", found=found, expected=" or ".join(kinds))
+    return kinds[folder.suffix](folder)
 
 
 Limits = Mapping[str, tuple[float | None, float | None]]
@@ -224,8 +184,7 @@ class Map:
         CampaignError
             A column that the map has not.
         """
-        for name in names or ():
-            self._known(name)
+        self._known(*(names or ()))
         return self._store.chunks(None if names is None else list(dict.fromkeys(names)))
 
     def frame(self, names: Sequence[str] | None = None) -> pd.DataFrame:
@@ -242,7 +201,7 @@ class Map:
         *,
         largest: bool = False,
         within: Limits | None = None,
-        count: int = settings.LISTED,
+        count: int = LISTED,
     ) -> pd.DataFrame:
         """Return the best rows, the best posture of each place, best first.
 
@@ -264,28 +223,26 @@ class Map:
         """
         import pandas as pd
 
-        for name in (by, *(within or {})):
-            self._known(name)
-        sign, kept = -1.0 if largest else 1.0, pd.DataFrame(columns=list(self.columns))
+        limits = within or {}
+        self._known(by, *limits)
+        kept = []
         for chunk in self.chunks():
-            wanted = np.isfinite(chunk[by])
-            for name, (low, high) in (within or {}).items():
-                wanted &= (chunk[name] >= (-np.inf if low is None else low)) & (
-                    chunk[name] <= (np.inf if high is None else high)
-                )
-            rows = np.flatnonzero(wanted)
-            rows = rows[np.argsort(sign * chunk[by][rows], kind="stable")]
-            rows = rows[np.sort(np.unique(chunk["place"][rows], return_index=True)[1])][:count]
-            part = pd.DataFrame({name: chunk[name][rows] for name in self.columns})
-            both = part if kept.empty else pd.concat([kept, part], ignore_index=True)
-            kept = both.sort_values(by, ascending=not largest, kind="stable")[:count].reset_index(drop=True)
-        return kept
+            part = pd.DataFrame({name: chunk[name] for name in self.columns})
+            for name, (low, high) in limits.items():
+                part = part[part[name].between(-np.inf if low is None else low, np.inf if high is None else high)]
+            part = part[np.isfinite(part[by])].sort_values(by, ascending=not largest, kind="stable")
+            kept.append(part.drop_duplicates("place")[:count])
+        some = [part for part in kept if len(part)]
+        if not some:
+            return pd.DataFrame(columns=list(self.columns))
+        best: pd.DataFrame = pd.concat(some).sort_values(by, ascending=not largest, kind="stable")
+        return best[:count].reset_index(drop=True)
 
-    def _known(self, name: str) -> None:
-        if name not in self.columns:
-            raise CampaignError(
-                str(self.path), "the map has no such column", column=name, expected=f"one of {', '.join(self.columns)}"
-            )
+    def _known(self, *names: str) -> None:
+        for name in names:
+            if name not in self.columns:
+                expected = f"one of {', '.join(self.columns)}"
+                raise CampaignError(str(self.path), "the map has no such column", column=name, expected=expected)
 
     def values(self, by: str, *, largest: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return (K, 3) places, m, that are reached, and (K,) the best value of a column among their postures."""
@@ -355,21 +312,11 @@ def workspace_map(
     if not known or replace:
         kept.begin({**spec.to_dict(), "fingerprint": spec.fingerprint, "parts": spec.parts})
     elif known.get("fingerprint") != spec.fingerprint:
-        raise CampaignError(
-            str(path), "holds another map", found=_differs(known, spec), expected="the same settings, or replace"
-        )
-    done = kept.done
-    for k, rows in enumerate(spec.chunks()):
-        if k < done:
-            continue
+        other = [key for key, own in spec.to_dict().items() if known.get(key) != own]
+        found = "other " + ", ".join(other) if other else "settings of another version"
+        raise CampaignError(str(path), "holds another map", found=found, expected="the same settings, or replace")
+    for k, rows in islice(enumerate(spec.chunks()), kept.done, None):
         progress("chunks", k, spec.parts)
         kept.add(columns(spec, rows))
     progress("chunks", spec.parts, spec.parts)
     return Map(path)
-
-
-def _differs(known: dict[str, object], spec: Spec) -> str:
-    """Say in which settings two maps differ."""
-    own = spec.to_dict()
-    other = [key for key in own if known.get(key) != own[key]]
-    return "other " + ", ".join(other) if other else "settings of another version"

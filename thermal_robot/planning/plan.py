@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.write import write_commands, write_planned
 from thermal_robot.diagnosis import settings as design
 from thermal_robot.diagnosis.next_measurement import most_informative
@@ -37,6 +38,7 @@ from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.simulation import schedule
 from thermal_robot.simulation.schedule import RISE
+from thermal_robot.tables import aligned
 
 FRAMES = "unknown frames"
 
@@ -130,49 +132,47 @@ class Columns:
 
     Attributes
     ----------
-    frames, effects
-        (N, m, f) and (N, m, P).
+    root
+        (N, m, f + P): the frames, then the effects.
+    flat
+        Number f of columns of the frames.
     blocks
         The effects, in the order of their columns.
     """
 
-    frames: Array
-    effects: Array
+    root: Array
+    flat: int
     blocks: tuple[Block, ...]
 
     @classmethod
-    def of(cls, observations: Observations, effects: Sequence[Effect], noise: Array) -> Columns:
-        """Return the columns of effects in rows whose components have the noise (m,), m and rad."""
-        items = tuple(block(observations, effect) for effect in effects)
-        frames = frame_columns(observations)[0] * design.LOOSE
+    def of(cls, seen: Observations, effects: Sequence[Effect]) -> Columns:
+        """Return the columns of effects; the campaign states the noise of each component, m and rad."""
+        items = tuple(block(seen, effect) for effect in effects)
+        frames = frame_columns(seen)[0] * design.LOOSE
         rows, measures, flat = frames.shape
+        campaign = seen.campaign
+        noise = np.repeat(np.array([campaign.noise_position, campaign.noise_orientation], dtype=float), 3)[:measures]
         linear = Linear(np.zeros((rows, measures)), frames, items)
-        stack = whitened(linear, Whitening(np.ones(rows), noise, 0.0)).reshape(rows, measures, -1)
-        sizes = np.concatenate([*(item.sizes for item in items), np.zeros(0)])
-        return cls(stack[:, :, :flat], stack[:, :, flat:-1] * sizes, items)
-
-    @property
-    def root(self) -> Array:
-        """(N, m, f + P) all columns."""
-        return np.concatenate([self.frames, self.effects], axis=2)
-
-    @property
-    def information(self) -> float:
-        """Of all rows about the effects' parameters, nats."""
-        flat, precision = self.frames.shape[2], self.precision
-        whole, known = (np.linalg.slogdet(part)[1] for part in (precision, precision[:flat, :flat]))
-        return float(0.5 * (whole - known))
+        stack = whitened(linear, Whitening(np.ones(rows), noise, 0.0)).reshape(rows, measures, -1)[:, :, :-1]
+        return cls(stack * np.concatenate([np.ones(flat), *(item.sizes for item in items)]), flat, items)
 
     @property
     def precision(self) -> Array:
         """(f + P, f + P) of the posterior, in units of the expected sizes."""
-        flat = equations_of(self.root)
-        return np.asarray(flat.T @ flat + np.eye(flat.shape[1]))
+        rows = equations_of(self.root)
+        return np.asarray(rows.T @ rows + np.eye(rows.shape[1]))
+
+    @property
+    def information(self) -> float:
+        """Of all rows about the effects' parameters, nats."""
+        precision = self.precision
+        whole, frames = (np.linalg.slogdet(part)[1] for part in (precision, precision[: self.flat, : self.flat]))
+        return float(0.5 * (whole - frames))
 
 
 def expectations(columns: Columns) -> tuple[Expected, ...]:
     """Return how well each effect of the columns will be known."""
-    flat, precision = columns.frames.shape[2], columns.precision
+    flat, precision = columns.flat, columns.precision
     ends = np.cumsum([flat, *(len(item.sizes) for item in columns.blocks)])
     own = [np.arange(a, b) for a, b in pairwise(ends)]
     frames, whole = np.arange(flat), _left(precision, np.arange(len(precision)))
@@ -356,80 +356,52 @@ def plan(
         noise_orientation=noise_orientation if orientation else None,
         units=units or Units(),
     )
-    draft = _Draft(made, given, schedule.visits(rows, repeats), orientation)
-    return _planned(draft, kinds, rng)
+    return _planned(made, given, schedule.visits(rows, repeats), kinds, rng)
 
 
-@dataclass(frozen=True, eq=False)
-class _Draft:
-    """What is decided before poses are: an empty campaign, (N,) conditions, (P, K) rows of each pose."""
-
-    empty: Campaign
-    given: dict[str, Array]
-    places: NDArray[np.int64]
-    orientation: bool
-
-    @property
-    def noise(self) -> Array:
-        """(m,) one sigma of each component."""
-        turn = self.empty.noise_orientation
-        return np.array([self.empty.noise_position] * 3 + ([turn] * 3 if turn else []), dtype=float)
-
-    def campaign(self, q: Array, covariates: dict[str, Array], labels: dict[str, Any] | None = None) -> Campaign:
-        """Return rows with these commands and conditions."""
-        turned = np.tile([1.0, 0.0, 0.0, 0.0], (len(q), 1)) if self.orientation else None
-        rows = np.arange(2, len(q) + 2)
-        return replace(self.empty, q=q, orientation=turned, covariates=covariates, rows=rows, labels=labels or {})
-
-    def ordered(self, poses: Array) -> Campaign:
-        """Return the plan of poses (P, n) in this order, with the approaches that follow from it."""
-        q, which = schedule.in_turn(poses, self.places)
-        names = self.empty.robot.joint_names
-        sides = schedule.approaches(q, names, self.given)
-        labels = {"pose": np.array([str(k + 1) for k in which])} if self.places.shape[1] > 1 else {}
-        return self.campaign(q, {**self.given, **sides}, labels)
+def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dict[str, Any] | None = None) -> Campaign:
+    """Return rows with these commands and conditions."""
+    turned = None if empty.noise_orientation is None else np.tile([1.0, 0.0, 0.0, 0.0], (len(q), 1))
+    rows = np.arange(2, len(q) + 2)
+    return replace(empty, q=q, orientation=turned, covariates=covariates, rows=rows, labels=labels or {})
 
 
-def _planned(draft: _Draft, kinds: Sequence[Effect], rng: np.random.Generator) -> Plan:
-    """Choose poses, then their order."""
-    poses, places = draft.places.shape
+def _planned(
+    empty: Campaign, given: dict[str, Array], visits: schedule.Rows, kinds: Sequence[Effect], rng: np.random.Generator
+) -> Plan:
+    """Choose poses, then their order, for (N,) conditions and (P, K) rows of each pose."""
+    poses, places = visits.shape
     each = max(FEWEST_CHOICES, min(CHOICES, MOST_CANDIDATES // (poses * places)))
     place = np.repeat(np.arange(poses), each)
-    robot = draft.empty.robot
+    robot = empty.robot
     offered = rng.uniform(*joint_range(robot), (len(place), robot.n))
-    rows = draft.places[place].ravel()
-    covariates = {name: values[rows] for name, values in draft.given.items()}
+    rows = visits[place].ravel()
+    covariates = {name: values[rows] for name, values in given.items()}
     for joint in robot.joint_names:
         covariates[f"approach.{joint}"] = rng.choice([-1.0, 1.0], len(rows))
-    seen = observe(draft.campaign(np.repeat(offered, places, axis=0), covariates))
+    seen = observe(_filled(empty, np.repeat(offered, places, axis=0), covariates))
     lacks = {kind.name: gate.missing(kind, seen) for kind in kinds}
     tested = [gate.variants(kind, seen)[0] for kind in kinds if not lacks[kind.name]]
-    columns = Columns.of(seen, tested, draft.noise)
-    root, frames = (part.reshape(len(place), -1, part.shape[2]) for part in (columns.root, columns.frames))
-    chosen = most_informative(root, frames, poses, place)[0]
+    columns = Columns.of(seen, tested)
+    root = columns.root.reshape(len(place), -1, columns.root.shape[2])
+    chosen = most_informative(root, root[:, :, : columns.flat], poses, place)[0]
     chosen.sort(key=lambda row: int(place[row]))
-    best, found, told = _best_order(draft, offered[chosen], tested, rng)
-    known = {expected.name: expected for expected in expectations(found)}
+    orders = (_in_order(empty, given, visits, offered[chosen], k, rng) for k in range(ORDERS))
+    found = ((commands, Columns.of(observe(commands), tested)) for commands in orders)
+    best, told, columns = max(((c, own.information, own) for c, own in found), key=lambda each: each[1])
+    known = {expected.name: expected for expected in expectations(columns)}
     without = {kind.name: Expected(kind.name, kind.title, (), lacks=lacks[kind.name]) for kind in kinds}
-    effects = tuple(known.get(kind.name, without[kind.name]) for kind in kinds)
-    return Plan(best, effects, told, places)
+    return Plan(best, tuple(known.get(kind.name, without[kind.name]) for kind in kinds), told, places)
 
 
-def _best_order(
-    draft: _Draft, poses: Array, tested: Sequence[Effect], rng: np.random.Generator
-) -> tuple[Campaign, Columns, float]:
-    """Return the balanced order of poses that tells most, its columns and what it tells."""
-    best: tuple[Campaign, Columns, float] | None = None
-    for k in range(ORDERS):
-        start = np.arange(len(poses)) if k == 0 else rng.permutation(len(poses))
-        mixed = poses[start]
-        campaign = draft.ordered(mixed[schedule.balanced(mixed, draft.places, rng)])
-        columns = Columns.of(observe(campaign), tested, draft.noise)
-        told = columns.information
-        if best is None or told > best[2]:
-            best = campaign, columns, told
-    assert best is not None
-    return best
+def _in_order(
+    empty: Campaign, given: dict[str, Array], visits: schedule.Rows, poses: Array, k: int, rng: np.random.Generator
+) -> Campaign:
+    """Return the plan of poses (P, n) in the k-th balanced order, with the approaches that follow from it."""
+    mixed = poses if k == 0 else poses[rng.permutation(len(poses))]
+    q, labels = schedule.in_turn(mixed[schedule.balanced(mixed, visits, rng)], visits)
+    sides = arrivals(q, empty.robot.joint_names, given, None)
+    return _filled(empty, q, {**given, **sides}, labels)
 
 
 def _number(value: object) -> bool:
@@ -444,10 +416,10 @@ def _check(
     def refuse(column: str, found: object, expected: str) -> None:
         raise CampaignError("plan", "cannot be planned", column=column, found=repr(found), expected=expected)
 
-    least, most = FEWEST_ROWS, MOST_ROWS
-    if not isinstance(rows, (int, np.integer)) or not least <= rows <= most:
+    least, most, whole = FEWEST_ROWS, MOST_ROWS, (int, np.integer)
+    if not isinstance(rows, whole) or not least <= rows <= most:
         refuse("rows", rows, f"a whole number from {least} to {most}")
-    if not isinstance(repeats, (int, np.integer)) or not 1 <= repeats <= rows // 2 or rows % repeats:
+    if not isinstance(repeats, whole) or not 1 <= repeats <= rows // 2 or rows % repeats:
         refuse("repeats", repeats, f"a whole number that divides the {rows} rows into two poses or more")
     for name, value in (("noise", noise), ("noise_orientation", turn)):
         if not _number(value) or not 0.0 < value < np.inf:
@@ -462,7 +434,6 @@ def _check(
 
 
 _HEAD = ("effect", "unit", "expected size", "1 sigma", "worst", "beside all", "told", "confounded with")
-_NUMBERS = range(2, 7)
 
 
 def text(plan: Plan) -> str:
@@ -482,10 +453,8 @@ def text(plan: Plan) -> str:
     joint_gain ...
     """
     rows = [_HEAD, *(line for expected in plan.effects for line in _lines(expected))]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(_HEAD))]
-    table = [_row(row, widths) for row in rows]
     lacking = [f"{e.name} {_why(e)}" for e in plan.effects if not e.parameters]
-    return "\n".join([_opening(plan), "", *table, *(["", *lacking] if lacking else [])])
+    return "\n".join([_opening(plan), "", *aligned(rows, left=(0, 1, 7)), *(["", *lacking] if lacking else [])])
 
 
 def _opening(plan: Plan) -> str:
@@ -500,28 +469,15 @@ def _opening(plan: Plan) -> str:
     )
 
 
-def _row(cells: tuple[str, ...], widths: list[int]) -> str:
-    aligned = (c.rjust(w) if k in _NUMBERS else c.ljust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True)))
-    return "  ".join(aligned).rstrip()
-
-
 def _lines(expected: Expected) -> Iterator[tuple[str, ...]]:
-    units = dict.fromkeys(parameter.unit for parameter in expected.parameters)
-    for k, unit in enumerate(units):
+    for k, unit in enumerate(dict.fromkeys(parameter.unit for parameter in expected.parameters)):
         own = [parameter for parameter in expected.parameters if parameter.unit == unit]
-        yield expected.name if k == 0 else "", *_figures(unit, own), ", ".join(expected.confounded) if k == 0 else ""
-
-
-def _figures(unit: str, own: list[ExpectedParameter]) -> tuple[str, ...]:
-    told = [parameter for parameter in own if parameter.told]
-    meant = told or own
-    figures = (
-        np.median([p.size for p in own]),
-        np.median([p.sigma for p in meant]),
-        max(p.sigma for p in meant),
-        np.median([p.beside for p in meant]),
-    )
-    return unit, *(f"{figure:.2g}" for figure in figures), f"{len(told)} of {len(own)}"
+        told = [parameter for parameter in own if parameter.told]
+        sigmas, beside = ([getattr(p, name) for p in told or own] for name in ("sigma", "beside"))
+        figures = (np.median([p.size for p in own]), np.median(sigmas), max(sigmas), np.median(beside))
+        counted = f"{len(told)} of {len(own)}"
+        name, confounded = ("", "") if k else (expected.name, ", ".join(expected.confounded))
+        yield name, unit, *(f"{figure:.2g}" for figure in figures), counted, confounded
 
 
 def _why(expected: Expected) -> str:

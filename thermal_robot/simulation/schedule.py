@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.turning import arrivals
 
 ROWS = 60
 """Rows of a campaign of which nobody says how long it is: an hour's work, as :data:`SECONDS_A_ROW` has it."""
@@ -59,11 +58,6 @@ def visits(rows: int, repeats: int) -> Rows:
     return np.asarray(place + poses * np.arange(repeats)[:, None]).T
 
 
-def approaches(q: Array, names: tuple[str, ...], covariates: dict[str, Array]) -> dict[str, Array]:
-    """Return (N,) ``approach.<joint>`` of rows in their order; where nothing is known, at the first, 0."""
-    return arrivals(q, names, covariates, None)
-
-
 def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
     """(P,) an order of poses (P, n) in which each joint comes from either side about equally often.
 
@@ -98,7 +92,8 @@ def _pose_of(places: Rows) -> Rows:
     return found
 
 
-def in_turn(poses: Array, places: Rows) -> tuple[Array, Rows]:
-    """Return (N, n) the poses (P, n) in the order of rows, and (N,) which pose each row measures."""
+def in_turn(poses: Array, places: Rows) -> tuple[Array, dict[str, NDArray[np.str_]]]:
+    """Return (N, n) the poses (P, n) in the order of rows, and where they are repeated (N,) labels ``pose`` from 1."""
     which = _pose_of(places)
-    return np.asarray(poses[which]), which
+    labels = {"pose": np.array([str(k + 1) for k in which])} if places.shape[1] > 1 else {}
+    return np.asarray(poses[which]), labels

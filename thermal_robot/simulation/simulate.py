@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -37,7 +37,7 @@ CALL = "simulate()"
 """What messages call the file that there is none of."""
 
 
-def commanded(
+def _commanded(
     robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
 ) -> Campaign:
     """Return the rows that are simulated, with their conditions and nothing measured."""
@@ -45,8 +45,7 @@ def commanded(
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
         poses, times = _poses(robot, rows, repeats, commands, rng)
-        q, which = schedule.in_turn(poses, schedule.visits(len(poses) * times, times))
-        labels = {"pose": np.array([str(k + 1) for k in which])} if times > 1 else {}
+        q, labels = schedule.in_turn(poses, schedule.visits(len(poses) * times, times))
         given = schedule.conditions(len(q), schedule.RISE)
         plan = Campaign("simulated", robot, q, covariates=given, labels=labels, base_known=True, tool_known=True)
     return arrived(_under(plan, conditions))
@@ -210,25 +209,25 @@ def _require_conditions(effect: Effect, seen: Observations) -> None:
 
 def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
     """Return (P,) the values of an effect's parameters."""
-    found = np.zeros(len(places))
+    pairs: Iterable[tuple[int, Any]]
+    names = [place.name for place in places]
     if isinstance(given, Mapping):
-        for name, value in given.items():
-            k = _which(effect, places, name)
-            found[k] = _number(effect, places[k], value)
-        return found
-    if isinstance(given, (list, tuple, np.ndarray)):
-        each = list(given)
-        if len(each) != len(places):
-            names = listed([place.name for place in places])
-            raise EffectError(f"effect {effect.name!r} has {len(places)} parameters, {len(each)} values given: {names}")
-        return np.array([_number(effect, place, value) for place, value in zip(places, each, strict=True)])
-    units = dict.fromkeys(place.unit for place in places)
-    if len(units) > 1:
-        raise EffectError(
-            f"effect {effect.name!r}: one number cannot stand for parameters in {', '.join(units)}; "
-            f"give values by name: {listed([place.name for place in places])}"
-        )
-    return np.array([_number(effect, place, given) for place in places])
+        pairs = [(_which(effect, places, name), value) for name, value in given.items()]
+    elif isinstance(given, (list, tuple, np.ndarray)):
+        if len(given) != len(places):
+            told = f"effect {effect.name!r} has {len(places)} parameters, {len(given)} values given"
+            raise EffectError(f"{told}: {listed(names)}")
+        pairs = enumerate(given)
+    else:
+        units = dict.fromkeys(place.unit for place in places)
+        if len(units) > 1:
+            told = f"effect {effect.name!r}: one number cannot stand for parameters in {', '.join(units)}"
+            raise EffectError(f"{told}; give values by name: {listed(names)}")
+        pairs = ((k, given) for k in range(len(places)))
+    found = np.zeros(len(places))
+    for k, value in pairs:
+        found[k] = _number(effect, places[k], value)
+    return found
 
 
 def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
@@ -257,98 +256,63 @@ def _number(effect: Effect, place: Parameter, value: Any) -> float:
 
 
 _MEASURES = ("position", "pose")
+_ALIGNED = (1.0, 0.0, 0.0, 0.0)
+"""Quaternion wxyz of no turn: it tells effects that orientations will be measured."""
 
 
-@dataclass(frozen=True)
-class Instrument:
-    """An instrument with normal noise, the same along and about each axis.
-
-    Attributes
-    ----------
-    turns
-        Whether it measures orientations, too.
-    noise, noise_orientation
-        One sigma per axis, m and rad.
-    """
-
-    turns: bool
-    noise: float
-    noise_orientation: float
-
-    def awaiting(self, plan: Campaign) -> Campaign:
-        """Return rows that tell effects what will be measured: orientations, not yet turned, where they are."""
-        turned = np.tile([1.0, 0.0, 0.0, 0.0], (plan.samples, 1)) if self.turns else None
-        return replace(plan, orientation=turned)
-
-    def reading(self, position: Array, rotation: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
-        """Return a reading of (N, 3) positions, m, and of (N, 3, 3) rotations, (N, 4) quaternions wxyz or ``None``."""
-        read = position + self.noise * rng.normal(size=position.shape)
-        if not self.turns:
-            return read, None
-        turn = exp3(self.noise_orientation * rng.normal(size=position.shape))
-        return read, rotation_to_quaternion(turn @ rotation)
-
-
-def instrument(measures: Any, noise: Any, noise_orientation: Any) -> Instrument:
-    """Return the instrument that a user asks for; see :func:`thermal_robot.simulate`."""
+def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[bool, float, float]:
+    """Return whether orientations are measured, too, and one sigma per axis, m and rad."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
     if turn > 0.0 and what != "pose":
         expected = 'measures="pose", or no noise of orientations'
         raise CampaignError(CALL, "only positions are measured", column="noise_orientation", expected=expected)
-    return Instrument(what == "pose", shift, turn)
+    return what == "pose", shift, turn
 
 
 _RIGID = 1e-6
 """Of a rotation: by how much its entries, written with few digits, may be off."""
 
 
-def placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
+def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
     """Return the rows with what they declare of their frames, and the true ones; see :func:`thermal_robot.simulate`."""
-    declared = Frames.declared(plan)
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
-    ground = declared.base if base is None else _pose("base", base)
-    point = None if tool is None else _point(tool)
-    if point is not None:
+    ground = Frames.declared(plan).base if base is None else _pose("base", base)
+    point, target = _array(tool), None
+    sits = point.shape == (3,)
+    if sits:
         plan = replace(plan, target=point)
-        target, sits = Frames.declared(plan).tool, True
     elif tool is not None:
-        target, sits = _pose("tool", tool), False
+        target = _pose("tool", tool)
         plan = replace(plan, target=target[:3, 3])
-    else:
-        target, sits = declared.tool, plan.tool_known
-    stands = plan.base_known if base is None else False
-    stands, sits = (
-        own if key is None else key for own, key in ((stands, known["base_known"]), (sits, known["tool_known"]))
-    )
-    for key, claimed, true, where in (
-        ("base_known", stands, ground, declared.base),
-        ("tool_known", sits, target, Frames.declared(plan).tool),
-    ):
-        if claimed and not np.allclose(true, where, atol=_RIGID, rtol=0.0):
+    declared = Frames.declared(plan)
+    true = Frames(ground, declared.tool if target is None else target)
+    usual = {
+        "base_known": plan.base_known if base is None else False,
+        "tool_known": plan.tool_known if tool is None else sits,
+    }
+    sure = {key: usual[key] if value is None else value for key, value in known.items()}
+    apart = {"base_known": (true.base, declared.base), "tool_known": (true.tool, declared.tool)}
+    for key, pair in apart.items():
+        if sure[key] and not np.allclose(*pair, atol=_RIGID, rtol=0.0):
             expected = "a frame where it is declared: its error is an effect of its own"
             raise CampaignError(CALL, "the frame that is given is elsewhere", column=key, expected=expected)
-    return replace(plan, base_known=stands, tool_known=sits), Frames(ground, target)
+    return replace(plan, base_known=sure["base_known"], tool_known=sure["tool_known"]), true
 
 
-def _point(tool: Any) -> Array | None:
-    """Return three numbers; ``None`` for everything else."""
+def _array(given: Any) -> Array:
+    """Return numbers as an array; an empty one of everything else."""
     try:
-        point = np.array(tool, dtype=np.float64)
+        return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        return None
-    return point if point.shape == (3,) else None
+        return np.empty(0)
 
 
 def _pose(key: str, given: Any) -> Array:
     """Return a (4, 4) pose, seen to be rigid."""
-    also = ", or three numbers" if key == "tool" else ""
-    try:
-        pose = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        pose = np.empty(0)
+    also, pose = ", or three numbers" if key == "tool" else "", _array(given)
     if pose.shape == (4, 4) and np.isfinite(pose).all():
         turn = pose[:3, :3]
         right = np.allclose(turn @ turn.T, np.eye(3), atol=_RIGID) and np.linalg.det(turn) > 0.0
@@ -358,18 +322,18 @@ def _pose(key: str, given: Any) -> Array:
     raise CampaignError(CALL, "no pose", column=key, found=shown(given), expected=expected)
 
 
-def measured(
+def _measured(
     plan: Campaign,
     frames: Frames,
     effects: Sequence[tuple[Effect, Array]],
-    instrument: Instrument,
+    noise: tuple[float, float],
     joints: np.random.Generator,
     readings: np.random.Generator,
 ) -> Campaign:
     """Return the campaign that an instrument measures of a robot with effects at work, at its true frames.
 
-    Each effect has the (P,) values of its parameters; ``joints`` and ``readings`` are the chance of what scatters, and
-    of the instrument.
+    Each effect has the (P,) values of its parameters; ``noise`` is one sigma per axis, m and rad; ``joints`` and
+    ``readings`` are the chance of what scatters, and of the instrument.
     """
     systematic = [(effect, values) for effect, values in effects if not isinstance(effect, RandomEffect)]
     moved, shift = displacement(observe(plan, frames), systematic)
@@ -378,14 +342,12 @@ def measured(
     position = real.predicted_position + (0.0 if shift is None else shift)
     if not np.isfinite(position).all():
         raise CampaignError(CALL, "these values lead to no finite position", column="effects", expected="smaller ones")
-    read, orientation = instrument.reading(position, frames.base[:3, :3] @ real.rotation, readings)
-    found = replace(
-        plan,
-        position=read,
-        orientation=orientation,
-        noise_position=instrument.noise or None,
-        noise_orientation=instrument.noise_orientation or None,
-    )
+    read, turned = position + noise[0] * readings.normal(size=position.shape), None
+    if plan.orientation is not None:
+        turn = exp3(noise[1] * readings.normal(size=position.shape))
+        turned = rotation_to_quaternion(turn @ (frames.base[:3, :3] @ real.rotation))
+    shift_sigma, turn_sigma = (sigma or None for sigma in noise)
+    found = replace(plan, position=read, orientation=turned, noise_position=shift_sigma, noise_orientation=turn_sigma)
     return replace(found, warnings=tuple(doubts(found)))
 
 
@@ -500,12 +462,13 @@ def simulate(
     seed = fitted(whole(0), seed, CALL, "seed")
     poses, joints, readings = (np.random.default_rng([seed, part]) for part in (_POSES, _JOINTS, _INSTRUMENT))
     given = commands.measures if measures is None and isinstance(commands, Campaign) else measures
-    used = instrument(given, noise, noise_orientation)
-    plan = used.awaiting(commanded(robot, rows, repeats, commands, conditions, poses))
-    plan, frames = placed(plan, base, tool, base_known, tool_known)
+    turns, *noises = _instrument(given, noise, noise_orientation)
+    plan = _commanded(robot, rows, repeats, commands, conditions, poses)
+    plan = replace(plan, orientation=np.tile(_ALIGNED, (plan.samples, 1)) if turns else None)
+    plan, frames = _placed(plan, base, tool, base_known, tool_known)
     seen = observe(plan, frames)
-    effects_at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
-    return measured(plan, frames, effects_at_work, used, joints, readings)
+    at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
+    return _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings)
 
 
 def _loaded(robot: Any, tool_frame: str) -> Robot:

@@ -1,0 +1,117 @@
+"""Commands that take one campaign: check, effects, diagnose, demo, view, iso9283."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thermal_robot.campaign import describe, write_predictions
+from thermal_robot.commands.shared import as_json, as_page, deliver, read, read_from, tell
+from thermal_robot.console import stages
+from thermal_robot.datasets import demo_campaign, demo_directory
+from thermal_robot.errors import CampaignError
+from thermal_robot.files import require_free, write_one
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis import Diagnosis
+
+
+def check(options: argparse.Namespace) -> None:
+    """Read a campaign and describe it."""
+    tell(options, describe(read(options)))
+
+
+def effects(options: argparse.Namespace) -> None:
+    """Print the effects, and what a campaign lacks for each."""
+    from thermal_robot.diagnosis import Finding
+    from thermal_robot.effects import gate, library
+    from thermal_robot.effects.catalogue import random_effects
+    from thermal_robot.observations import observe
+    from thermal_robot.report.words import needs
+
+    bare = options.campaign is None  # poses and nothing else
+    campaign = replace(demo_campaign(), covariates={}, labels={}) if bare else read(options)
+    known, observations = (*library().values(), *random_effects()), observe(campaign)
+    wide = max(len(effect.name) for effect in known)
+    print("Effects that are considered, and what each needs beside measured poses:" if bare else campaign.name)
+    for effect in known:
+        missing = gate.missing(effect, observations)
+        asked = needs(Finding(effect.name, "not_testable", needs=missing), campaign.robot.joint_names)
+        print(f"  {effect.name:{wide}}  {effect.title}{f'; needs {asked}' if asked else ''}")
+
+
+def diagnosed(options: argparse.Namespace) -> Diagnosis:
+    """Diagnose the campaign that was named, telling the stages."""
+    from thermal_robot.diagnosis import diagnose
+
+    with stages(options.loudness) as progress:
+        progress("reading the campaign")
+        return diagnose(read(options), only=options.only, without=options.without, progress=progress)
+
+
+def diagnose(options: argparse.Namespace) -> None:
+    """Diagnose a campaign, print the result and write what is asked for."""
+    from thermal_robot.report import html
+
+    files = read_from(options.campaign, Path() if options.piped else None)
+    require_free((options.json, options.model, options.report), files)
+    found = diagnosed(options)
+    outputs = [
+        (options.json, found.to_json),
+        as_page(options.report, html, found, files, lambda file: file.name),
+        (options.model if found.usable else None, lambda path: found.model.save(path)),
+    ]
+    deliver(options, outputs, str(found), found.summary)
+    if not found.usable:
+        raise CampaignError(str(options.campaign), found.reason)
+
+
+def demo(options: argparse.Namespace) -> None:
+    """Diagnose the demo's campaign, print it and draw it."""
+    from thermal_robot.report import html
+
+    options.campaign = demo_directory()
+    intro = f"The demo's campaign is simulated; its answer lies in {options.campaign / 'truth.json'}."
+    found = diagnosed(options)
+    tell(options, f"{intro}\n\n{found}", found.summary)
+    write_one(options.report, as_page(options.report, html, found)[1])
+    tell(options, f"Drawn in {options.report}")
+
+
+def iso9283(options: argparse.Namespace) -> None:
+    """Compute the criteria, print them and write what is asked for."""
+    from thermal_robot.iso9283 import performance
+
+    require_free((options.json, options.csv), read_from(options.campaign, Path() if options.piped else None))
+    found = performance(read(options))
+    table = (options.csv, lambda path: write_predictions(path, found.to_frame()))
+    deliver(options, [as_json(options.json, found.to_dict()), table], str(found), found.summary)
+
+
+def view(options: argparse.Namespace) -> None:
+    """Serve the scene until it is interrupted."""
+    try:
+        import viser  # noqa: F401
+    except ImportError as error:
+        problem, extra = "the viewer needs viser, which is not installed", 'pip install "thermal-robot[viewer]"'
+        raise CampaignError("view", problem, expected=extra) from error
+    from thermal_robot.viewer.scene import scene_of_campaign, scene_of_diagnosis
+    from thermal_robot.viewer.window import Window, solids
+
+    scene = scene_of_campaign(read(options)) if options.no_diagnosis else scene_of_diagnosis(diagnosed(options))
+    robot = scene.robot
+    window = Window(scene, solids(robot.urdf, robot.folder or Path(), scene.size), options.port)
+    try:
+        tell(options, f"{window.url} shows {scene.title}; Ctrl-C ends it", window.url)
+        sys.stdout.flush()  # nothing more is printed for hours
+        if options.open:
+            import webbrowser
+
+            webbrowser.open(window.url)
+        threading.Event().wait()
+    finally:
+        window.close()

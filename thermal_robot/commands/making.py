@@ -1,0 +1,63 @@
+"""Commands that start without a campaign: plan, import, paper."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from thermal_robot.campaign import Units
+from thermal_robot.commands.shared import as_json, deliver, tell
+from thermal_robot.files import write_one
+from thermal_robot.robot import ENDS, load_robot
+
+
+def plan(options: argparse.Namespace) -> None:
+    """Plan, write what was asked for, and say what to expect."""
+    from thermal_robot.planning import plan, text, write_plan
+
+    found = plan(
+        load_robot(options.robot, options.tool, root_frame=options.root),
+        options.rows,
+        options.effects,
+        repeats=options.repeats,
+        noise=1e-3 * options.noise,
+        orientation=options.orientation,
+        target=[1e-3 * part for part in options.target],
+        loads=options.loads,
+        rise=options.warming,
+        base_known="base" in options.known,
+        tool_known="tool" in options.known,
+        units=Units(options.angle_unit, options.length_unit),
+        seed=options.seed,
+    )
+    if options.output:
+        write_plan(found, options.output)
+    shown = text(found)
+    deliver(options, [as_json(options.json, found.to_dict())], shown, shown.partition("\n")[0])
+
+
+def import_files(options: argparse.Namespace) -> None:
+    """Import the files and say what became of them."""
+    from thermal_robot.campaign.importers.plan import Plan, planned, read_mapping
+    from thermal_robot.campaign.importers.run import import_files
+
+    ends = dict(zip(("urdf", *ENDS), (options.robot, options.tool, options.root), strict=True))
+    said = {
+        "robot": {**ends, "kinematics": options.kinematics},
+        "measurements": {"angle_unit": options.angle_unit, "length_unit": options.length_unit},
+    }
+    stated = {section: {k: v for k, v in content.items() if v is not None} for section, content in said.items()}
+    plan = planned(stated).over(read_mapping(Path(options.mapping)) if options.mapping else Plan())
+    done = import_files(options.format, [Path(file) for file in options.files], Path(options.output), plan)
+    tell(options, f"{options.format}: {'; '.join(done.notes)}; written to {done.file}")
+
+
+def paper(options: argparse.Namespace) -> None:
+    """Print the ledger, and write it where that is asked for."""
+    from thermal_robot.paper import PaperInputs, ledger
+
+    found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))
+    if options.json:
+        write_one(options.json, as_json(options.json, found.to_dict())[1])
+    if not options.printed:
+        print(found.markdown() if options.markdown else found.text())
