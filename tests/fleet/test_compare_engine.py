@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import lstsq
 
 from thermal_robot.effects import Parameter, library
-from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare import _equal, _judged, _parameters
 from thermal_robot.fleet.compare_joint import Problem, joint, some_of
 from thermal_robot.fleet.compare_sums import Candidate, Sums, told
@@ -133,7 +133,7 @@ def test_what_changed_is_found_among_all_and_what_is_there_already_is_not_offere
 )
 def test_of_many_parts_those_that_join_one_after_another_give_the_same(changes, monkeypatch):
     whole = joint(listed(4), four(changes))
-    monkeypatch.setattr(compare_settings, "AT_ONCE", 7)
+    monkeypatch.setattr(settings, "AT_ONCE", 7)
     by_and_by = joint(listed(4), four(changes))
     assert by_and_by.looked_at == whole.looked_at
     assert {(c.part.where, c.part.parameters) for c in by_and_by.changes} == {
@@ -245,4 +245,4 @@ def test_a_parameter_that_repeats_another_is_told_once():
 
 def test_probabilities_are_probabilities():
     for name in ("MAY_BE", "CHANGED", "EVERYWHERE", "FALSE_CHANGE", "AGREE", "MOST", "DISTINCT"):
-        assert 0.0 < getattr(compare_settings, name) < 1.0, name
+        assert 0.0 < getattr(settings, name) < 1.0, name

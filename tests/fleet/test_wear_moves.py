@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 from scipy.stats import binom, multivariate_normal
 from wear_cases import columns, jumping, measured, series_of
 
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.wear_moves import (
     Beside,
     Grid,

@@ -39,7 +39,7 @@ from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare_joint import Change as Differs
 from thermal_robot.fleet.compare_joint import Joint, joint
 from thermal_robot.fleet.compare_sums import (
@@ -56,7 +56,7 @@ from thermal_robot.fleet.compare_sums import (
 )
 from thermal_robot.fleet.comparison import Change, Comparison, Parameter, Predicted, Status
 from thermal_robot.fleet.comparison import Effect as Compared
-from thermal_robot.inference import settings
+from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import equations_of, orthonormal
 from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
@@ -299,7 +299,7 @@ def _judged(
         needed |= {c for c in tell if size[c] > 0.0}
         whole += max(size.values()) ** 2
         agreed += max(size.values()) ** 2 * _agree(values, size, metric)
-    if whole == 0.0 or agreed / whole >= compare_settings.MOST or (len(tell) == 2 and len(needed) == 1):
+    if whole == 0.0 or agreed / whole >= settings.MOST or (len(tell) == 2 and len(needed) == 1):
         return "changed", ""  # of two campaigns one alone needs it: a fault that began or was mended
     return "contradicts", _why([names[c] for c in sorted(needed)], [names[c] for c in tell if c not in needed])
 
@@ -308,7 +308,7 @@ def _agree(values: dict[int, Array], size: dict[int, float], metric: Array) -> b
     """Whether any two campaigns need an effect at one place in the same size, or in sizes that are near."""
     for a, b in combinations(values, 2):
         left = _length(values[a] - values[b], metric)
-        if size[a] > 0.0 if left == 0.0 else left <= compare_settings.AGREE * max(size[a], size[b]):
+        if size[a] > 0.0 if left == 0.0 else left <= settings.AGREE * max(size[a], size[b]):
             return True
     return False
 
@@ -336,7 +336,7 @@ def _parameters(item: Candidate, said: Sequence[Sums], own: list[int], names: Se
     for c, one in enumerate(said):
         covariance, seen = one.inverse
         spread = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
-        known = (seen[own] > compare_settings.SEEN) & (spread < compare_settings.TOLD)
+        known = (seen[own] > settings.SEEN) & (spread < settings.TOLD)
         values[c, known] = ((covariance @ one.vector)[own] * item.sizes)[known]
         stds[c, known] = (spread * item.sizes)[known]
     found = []
@@ -389,7 +389,7 @@ def _equal(said: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]
 def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int]:
     """Return vᵀ M⁺ v and the rank of M; what is left of columns of this square by rounding is none."""
     value, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * longest)
+    seen = value > max(inference.INFORMATION_FLOOR, inference.PROJECTED_FLOOR * longest)
     along = axes[:, seen].T @ vector
     return float((along**2 / value[seen]).sum()), int(seen.sum())
 
@@ -410,7 +410,7 @@ def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str
     if not rows and (low <= high).all():  # neither has its rows
         q = poses(a.model, common)
     q = q[((q >= low - STILL) & (q <= high + STILL)).all(axis=1)]
-    if len(q) < compare_settings.TRIED:
+    if len(q) < settings.TRIED:
         return replace(nothing, note="the two did not measure a common part of the workspace")
     at = [observed(found.model, q, common) for found in (a, b)]
     gauge = _gauge(a.model, b.model, at[0])
@@ -418,13 +418,13 @@ def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str
     variance = sum(_variance(d.model, s, one, gauge) for d, s, one in zip((a, b), spreads, at, strict=True))
     distance, stated = np.sqrt((gap**2).sum(axis=1)), np.sqrt(np.asarray(variance).sum(axis=1))
     rms, deviation = float(np.sqrt((distance**2).mean())), float(np.sqrt((stated**2).mean()))
-    far = float((distance > compare_settings.TWICE * stated).mean())
-    return Predicted(names, len(q), rms, deviation, far, rms <= compare_settings.TWICE * deviation)
+    far = float((distance > settings.TWICE * stated).mean())
+    return Predicted(names, len(q), rms, deviation, far, rms <= settings.TWICE * deviation)
 
 
 def _some(q: Array) -> Array:
     """Return rows spread evenly over all."""
-    count = min(len(q), compare_settings.POSES)
+    count = min(len(q), settings.POSES)
     return np.asarray(q[np.linspace(0, len(q) - 1, count).astype(int)])
 
 
@@ -475,14 +475,14 @@ def _require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
     """Refuse to compare campaigns whose joints differ, or whose same joints put the tool frame elsewhere."""
     first, (low, high) = robots[0], joint_range(robots[0])
     low, high = np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
-    q = np.random.default_rng(0).uniform(low, high, (compare_settings.TRIED, first.n))
+    q = np.random.default_rng(0).uniform(low, high, (settings.TRIED, first.n))
     for robot, name in zip(robots[1:], names[1:], strict=True):
         if robot.joint_names != first.joint_names:
             problem = f"is of another robot than {names[0]}: their joints differ"
             joints = ", ".join(robot.joint_names), ", ".join(first.joint_names)
             raise CampaignError(name, problem, found=joints[0], expected=joints[1])
         apart = float(np.abs(robot.forward(q) - first.forward(q)).max())
-        if apart > compare_settings.SAME_PLACE:
+        if apart > settings.SAME_PLACE:
             raise CampaignError(
                 name,
                 f"is described by another nominal model than {names[0]}: the same joint positions put "

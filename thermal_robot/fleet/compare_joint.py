@@ -22,9 +22,9 @@ from scipy.special import chdtrc
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
-from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare_sums import Candidate, Sums
-from thermal_robot.inference import settings
+from thermal_robot.inference import settings as inference
 from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.explain import log_odds, share_of_places
 from thermal_robot.inference.search import Search, gains
@@ -86,8 +86,8 @@ class Problem:
             for place, own, where, shared, prior in _choices(item, said) if item.at else ():
                 held = np.array([p.positive for k, p in zip(item.at, item.told, strict=True) if k in own]) & shared
                 value, axes = np.linalg.eigh(np.sum([said[c].some(own).matrix for c in where], axis=0))
-                basis = np.eye(len(own)) if held.any() else axes[:, value > settings.INFORMATION_FLOOR]
-                spread = item.effect.size_spread if shared else compare_settings.CHANGE_SPREAD
+                basis = np.eye(len(own)) if held.any() else axes[:, value > inference.INFORMATION_FLOOR]
+                spread = item.effect.size_spread if shared else settings.CHANGE_SPREAD
                 positive = (held @ basis).astype(bool)
                 if basis.shape[1]:
                     parts.append(Part(number, place, own, where, shared, prior, spread, basis, positive))
@@ -111,9 +111,7 @@ class Problem:
         positive = np.concatenate([*(part.positive for part in parts), np.zeros(0, dtype=bool)])
         spreads = np.array([part.spread for part in parts])
         ranks = tuple(basis.shape[1] for basis in bases)
-        return Gram(
-            matrix, vector, self.total, slices, bases, positive, ranks, spreads, self.equations, compare_settings.HELD
-        )
+        return Gram(matrix, vector, self.total, slices, bases, positive, ranks, spreads, self.equations, settings.HELD)
 
     def better(self, held: Sequence[Part], bases: Sequence[Combination], best: float) -> list[Part]:
         """Return parts that better a combination, beside it or in place of one of its blocks.
@@ -131,12 +129,12 @@ class Problem:
                 continue
             inside = [held[b] for b in base.blocks]
             own = self._beside(inside, base, part, best)
-            if own <= best + settings.BETTER:
+            if own <= best + inference.BETTER:
                 continue
             others = tuple(c for c in range(len(self.said)) if c not in part.where)
             small = alike.get((part.effect, part.parameters, others), part)
             fewer = (len(others), others) < (len(part.where), part.where) and small not in held
-            fewer = fewer and self._beside(inside, base, small, own) > own - settings.NEARLY
+            fewer = fewer and self._beside(inside, base, small, own) > own - inference.NEARLY
             found[part.effect, part.place] = small if fewer else part
         chosen = set(found.values())
         return [part for part in self.parts if part in chosen]
@@ -148,8 +146,8 @@ class Problem:
         found: dict[Part, tuple[float, Combination]] = {}
         used = sorted({b for base in bases for b in base.blocks})
         others = [part for part in self.parts if part not in held]
-        for first in range(0, len(others), compare_settings.AT_ONCE):
-            some = others[first : first + compare_settings.AT_ONCE]
+        for first in range(0, len(others), settings.AT_ONCE):
+            some = others[first : first + settings.AT_ONCE]
             gram = self.gram([*(held[b] for b in used), *some])
             for base in bases:
                 inside = [held[b] for b in base.blocks]
@@ -157,7 +155,7 @@ class Problem:
                 for n, gain, _ in gains(gram, _numbered(base, used), free):
                     part = some[n - len(used)]
                     promised = base.log_evidence + gain + part.log_prior
-                    if promised > max(best + settings.BETTER, found.get(part, (-np.inf, base))[0]):
+                    if promised > max(best + inference.BETTER, found.get(part, (-np.inf, base))[0]):
                         found[part] = promised, base
         return [(part, base) for part, (_, base) in sorted(found.items(), key=lambda item: -item[1][0])]
 
@@ -166,7 +164,7 @@ class Problem:
         parts = [*inside, part]
         prior, start = sum(p.log_prior for p in parts), _numbered(base, base.blocks)
         try:
-            found = evidence(self.gram(parts), tuple(range(len(parts))), prior, start, wanted - settings.NEARLY)
+            found = evidence(self.gram(parts), tuple(range(len(parts))), prior, start, wanted - inference.NEARLY)
         except EstimationError:  # rounding hides what parts so nearly alike bring
             return -np.inf
         return found.log_evidence if found.exact else -np.inf
@@ -186,7 +184,7 @@ def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
     shared += [(place, tuple(inside)) for place, inside in places.items() if among]
     for k, (place, own) in enumerate(shared):
         yield place, own, everywhere, True, log_odds() + float(np.log(share_of_places(min(k, 1), among)))
-    odds = compare_settings.CHANGED / (1.0 - compare_settings.CHANGED)
+    odds = settings.CHANGED / (1.0 - settings.CHANGED)
     for place, own, share in _differing(item):
         tells = [one.tells(own) for one in said]
         prior = float(np.log(odds * share / len(some)))
@@ -199,8 +197,8 @@ def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
 def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]]:
     """Yield what of an effect may differ, with its share of the prior: all places, one, or one parameter there."""
     if len(item.places) > 1:
-        yield ("", ""), item.at, compare_settings.EVERYWHERE
-    each = (1.0 - compare_settings.EVERYWHERE) / len(item.places)
+        yield ("", ""), item.at, settings.EVERYWHERE
+    each = (1.0 - settings.EVERYWHERE) / len(item.places)
     for place, inside in item.places.items():
         several = len(inside) > 1
         yield place, tuple(inside), each / (2.0 if several else 1.0)
@@ -211,7 +209,7 @@ def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]
 def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
     """Return the sets of campaigns that may differ from the others: all, or of many those named in ``FEW``."""
     every = range(campaigns)
-    if campaigns <= compare_settings.FEW:
+    if campaigns <= settings.FEW:
         return tuple(s for size in range(1, campaigns) for s in combinations(every, size))
     steps = [tuple(range(k)) for k in range(1, campaigns)] + [tuple(range(k, campaigns)) for k in range(1, campaigns)]
     return tuple(dict.fromkeys([*((k,) for k in every), *steps]))
@@ -273,7 +271,7 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Sear
     All parts, where they are few. Of many, those that are shared first; others join while one of them, to first order,
     would better the best combination, beside it or in place of one of its blocks.
     """
-    few = len(problem.parts) <= compare_settings.AT_ONCE
+    few = len(problem.parts) <= settings.AT_ONCE
     held = [part for part in problem.parts if few or part.shared]
     # a search begins with nothing, and with the effects that a diagnosis names, shared
     begun = [k for k, p in enumerate(held) if p.shared and not p.place[1] and named[p.effect]]
@@ -305,7 +303,7 @@ def _standing(
     while True:
         changes = [_change(search, parts, best, b) for b in best.blocks if not parts[b].shared]
         weakest = max(changes, key=lambda c: c.p_value, default=None)
-        if weakest is None or weakest.p_value * looked_at < compare_settings.FALSE_CHANGE:
+        if weakest is None or weakest.p_value * looked_at < settings.FALSE_CHANGE:
             return best, tuple(sorted(changes, key=lambda c: -c.chi2))
         left = tuple(b for b in best.blocks if parts[b] is not weakest.part)
         shared = [k for k, p in enumerate(parts) if p.shared and p.effect == weakest.part.effect]

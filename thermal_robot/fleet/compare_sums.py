@@ -39,8 +39,8 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_words import called
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.files import is_file
-from thermal_robot.fleet import compare_settings
-from thermal_robot.inference import settings
+from thermal_robot.fleet import settings
+from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block, block, frame_columns, moved_by
 from thermal_robot.inference.fit import Fit
@@ -128,7 +128,7 @@ def is_model(path: object) -> bool:
 def poses(model: CorrectedModel, ranges: Ranges) -> Array:
     """(N, n) joint positions, uniform over the ranges that were measured, rad or m."""
     low, high = np.array([ranges[name] for name in model.robot.joint_names]).T
-    return np.asarray(np.random.default_rng(0).uniform(low, high, (compare_settings.POSES, model.robot.n)))
+    return np.asarray(np.random.default_rng(0).uniform(low, high, (settings.POSES, model.robot.n)))
 
 
 def observed(model: CorrectedModel, q: Array, ranges: Ranges) -> Observations:
@@ -216,7 +216,7 @@ def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tup
         for name, variants in fit.variants.items():
             if name in known or not variants or isinstance(variants[0], Discovered):
                 continue
-            if variants[0].told_inside or fit.probability(name) >= compare_settings.MAY_BE:
+            if variants[0].told_inside or fit.probability(name) >= settings.MAY_BE:
                 known[name] = (0, 0.0), variants[0]
     yield from ((name, replace(effect, places=(), excluded=())) for name, (_, effect) in known.items())
     for fit, campaign in zip(fits, names, strict=True):
@@ -260,7 +260,7 @@ class Sums:
     def inverse(self) -> tuple[Array, Array]:
         """(P, P) pseudo-inverse of G, and (P,) part of each parameter's direction that G sees."""
         value, axes = np.linalg.eigh(self.matrix)
-        seen = value > settings.INFORMATION_FLOOR
+        seen = value > inference.INFORMATION_FLOOR
         return (axes[:, seen] / value[seen]) @ axes[:, seen].T, np.asarray((axes[:, seen] ** 2).sum(axis=1))
 
     def some(self, kept: Sequence[int]) -> Sums:
@@ -269,7 +269,7 @@ class Sums:
 
     def tells(self, own: Sequence[int]) -> bool:
         """Whether it says anything of some parameters."""
-        return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > settings.INFORMATION_FLOOR)
+        return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > inference.INFORMATION_FLOOR)
 
 
 def sums(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate], number: int) -> Sums:
@@ -308,7 +308,7 @@ def _projected(full: Array, flat: int) -> tuple[Array, Array]:
     rest, before = full[flat:, flat:] - along.T @ along, np.diag(full)[flat:-1]
     matrix, vector = 0.5 * (rest + rest.T)[:-1, :-1], rest[:-1, -1]
     value, axes = np.linalg.eigh(matrix)
-    floor = max(compare_settings.SAYS, settings.PROJECTED_FLOOR * float(before.max(initial=0.0)))
+    floor = max(settings.SAYS, inference.PROJECTED_FLOOR * float(before.max(initial=0.0)))
     seen = value > floor
     return (axes[:, seen] * value[seen]) @ axes[:, seen].T, axes[:, seen] @ (axes[:, seen].T @ vector)
 
@@ -319,8 +319,8 @@ def told(said: Sequence[Sums]) -> list[int]:
     value, axes = np.linalg.eigh(together)
     root = (axes * np.sqrt(np.maximum(value, 0.0))).T
     length = np.sqrt(np.maximum(np.diag(together), 0.0))
-    seen = length > np.sqrt(settings.INFORMATION_FLOOR)
-    return distinct(root / np.where(seen, length, 1.0), seen, compare_settings.DISTINCT)
+    seen = length > np.sqrt(inference.INFORMATION_FLOOR)
+    return distinct(root / np.where(seen, length, 1.0), seen, settings.DISTINCT)
 
 
 def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: Sequence[Array]) -> Sums:
@@ -340,7 +340,7 @@ def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: S
     if not kept:
         return Sums(np.zeros((width, width)), np.zeros(width))
     information, said = _without_prior(known, np.array(kept), prior)
-    back = np.linalg.pinv(np.column_stack(across), rcond=compare_settings.SAME_PLACE)
+    back = np.linalg.pinv(np.column_stack(across), rcond=settings.SAME_PLACE)
     return Sums(back.T @ information @ back, back.T @ said)
 
 
@@ -360,11 +360,11 @@ def _expressed(
         used = np.isin(owner, chosen)
         every = np.column_stack([np.column_stack(columns)[:, used], frames])
         length = np.linalg.norm(every, axis=0)
-        seen = length > compare_settings.ROUNDING * length.max()
+        seen = length > settings.ROUNDING * length.max()
         found = np.zeros((len(length), own.shape[1]))
         found[seen] = np.linalg.lstsq(every[:, seen] / length[seen], own, rcond=None)[0] / length[seen, None]
         left = np.linalg.norm(own - every @ found, axis=0)
-        if (left <= compare_settings.DISTINCT * np.linalg.norm(own, axis=0)).all():
+        if (left <= settings.DISTINCT * np.linalg.norm(own, axis=0)).all():
             told = np.zeros((len(owner), own.shape[1]))
             told[used] = found[: used.sum()]
             return told
@@ -379,7 +379,7 @@ def _without_prior(known: Known, kept: NDArray[np.int64], prior: Array) -> tuple
     own = covariance[np.ix_(flat + kept, flat + kept)] / np.outer(prior[kept], prior[kept])
     # a parameter that is known as well as before has variance one, and the rows say nothing of it
     value, axes = np.linalg.eigh(0.5 * (own + own.T))
-    tight = 1.0 / np.maximum(value, settings.TINY)
-    seen = tight > 1.0 + compare_settings.SAYS
+    tight = 1.0 / np.maximum(value, inference.TINY)
+    seen = tight > 1.0 + settings.SAYS
     axes, tight = axes[:, seen], tight[seen]
     return (axes * (tight - 1.0)) @ axes.T, axes @ (tight * (axes.T @ values))

@@ -315,7 +315,9 @@ def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
         case = Case(row[ROBOT], row[CAMPAIGN], row["rms_before"], row["rms_after"])
         if row["at_work"]:
             others = () if row["alone"] or row["confounded_with"] is None else tuple(row["confounded_with"])
-            told = {name: None if row[name] != row[name] else row[name] for name in ("probability", "shrinkage")}
+            told: dict[str, Any] = {
+                name: None if row[name] != row[name] else row[name] for name in ("probability", "shrinkage")
+            }
             case = replace(case, **told, effect=row["effect"], place=row["place"], confounded_with=others)
         found.append(case)
     return tuple(found)

@@ -21,7 +21,7 @@ from thermal_robot.diagnosis.data_checks import as_counted, usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
 from thermal_robot.effects import RANDOM, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.wear_moves import Move, Moves, Series, State, chances, explanations, fieller, moves_of, scatter
 from thermal_robot.fleet.wear_problem import Problem, problem, require_alike
 from thermal_robot.fleet.wear_result import Crossing, Jump, Rate, Visit, Wear, Worn

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, logsumexp
 
 from thermal_robot.arrays import Array
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.inference.algebra import equations_of, whitener
 
 

@@ -25,7 +25,7 @@ from thermal_robot.effects import Effect, Parameter, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EffectError
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
@@ -98,7 +98,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
     keys, bare = tuple(listed), tuple(replace(parameter, responses=()) for parameter in listed.values())
     sizes, values = np.array([parameter.size for parameter in bare]), np.zeros(len(keys))
     visits = [_Visit.of(fit, keys, one) for fit, one in zip(fits, tellable, strict=True)]
-    for _ in range(settings.ROUNDS):
+    for _ in range(settings.LINEARISATIONS):
         parts = [visit.products(sizes, values) for visit in visits]
         matrices, vectors = (np.array(each) for each in zip(*parts, strict=True))
         total = matrices.sum(axis=0) + np.eye(len(keys)) / settings.WIDE**2

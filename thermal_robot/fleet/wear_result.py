@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from thermal_robot.files import write_text
+from thermal_robot.fleet import settings
 from thermal_robot.percents import percent
 
 SCHEMA = "thermal-robot/wear/1"
@@ -222,10 +223,6 @@ class Wear:
         return "\n".join(_lines(self))
 
 
-_LIKELY = 0.5
-"""Probability from which on a parameter that does not ring is named beside those that do."""
-
-
 def _lines(wear: Wear) -> Iterator[str]:
     first, last = wear.campaigns[0], wear.campaigns[-1]
     days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
@@ -238,13 +235,13 @@ def _lines(wear: Wear) -> Iterator[str]:
         yield ""
         yield from _of_one(wear, worn)
     quiet = [w for w in wear.parameters if w.comparable and not w.alarm]
-    if any(w.moved > _LIKELY for w in quiet):
+    if any(w.moved > settings.LIKELY for w in quiet):
         yield ""
     for w in quiet:
-        if w.moved > _LIKELY:
+        if w.moved > settings.LIKELY:
             yield f"perhaps      {_moves(wear, w)}: {percent(w.moved, 0)}, but no alarm"
     yield ""
-    stays = [w for w in quiet if w.moved <= _LIKELY]
+    stays = [w for w in quiet if w.moved <= settings.LIKELY]
     if stays:
         yield f"stays        {'; '.join(f'{w.parameter} (moved: {percent(w.moved)})' for w in stays)}"
     yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
