@@ -271,22 +271,6 @@ def test_groups_that_are_alike_are_said_to_be_apart_as_often_as_stated():
     assert np.mean(np.array(p_values) < 0.5) == pytest.approx(0.5, abs=0.12)
 
 
-def test_a_group_that_differs_is_told_with_its_mean():
-    rng = np.random.default_rng(7)
-    own, groups = np.ones(60), np.arange(60) % 3
-    found = population(scattered(rng, 0.0, 0.5, own) + 4.0 * (groups == 2), own, groups)
-    assert found.alike < 1e-9
-    assert found.means == pytest.approx([0.0, 0.0, 4.0], abs=3.0 * found.deviations.max())
-    assert found.counts.tolist() == [20, 20, 20]
-    assert (found.apart < 0.5).all()
-
-
-def test_a_mean_that_is_not_zero_is_told():
-    own, rng = np.ones(50), np.random.default_rng(8)
-    assert population(scattered(rng, 1.0, 0.3, own), own).nothing < 1e-4
-    assert population(scattered(rng, 0.0, 0.3, own), own).nothing > 1e-3
-
-
 def test_several_values_of_a_robot_are_one():
     who, values, std = combined(np.array([1.0, 3.0, 7.0]), np.array([1.0, 1.0, 2.0]), np.array([4, 4, 1]))
     assert who.tolist() == [1, 4]

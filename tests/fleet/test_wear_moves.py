@@ -190,14 +190,6 @@ def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_consta
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), deviation, rtol=1e-3)
 
 
-def test_a_jump_is_as_large_as_it_was_made():
-    state = State.of(jumping(size=1.0), (Move(1, "jump", 4),))
-    values, covariance = state.told(state.path(1))
-    std = np.sqrt(covariance[4, 4] + covariance[5, 5] - 2.0 * covariance[4, 5])
-    assert abs(values[5] - values[4] - 1.0) < 4.0 * std
-    assert np.ptp(values[:5]) == np.ptp(values[5:]) == 0.0
-
-
 COVARIANCE = np.array([[4e-4, 3e-6], [3e-6, 1e-7]])
 
 

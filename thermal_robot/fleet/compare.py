@@ -188,8 +188,8 @@ def _compared(
     return Comparison(
         campaigns=names,
         samples=tuple(d.samples for d in found),
-        robot=found[0].robot,
-        tool_frame=found[0].tool_frame,
+        robot=found[0].model.robot.name,
+        tool_frame=found[0].model.robot.tool_frame,
         effects=tuple(effects),
         changes=_changes(listed, together, names),
         predicted=tuple(_predicted(a, b, (first, second)) for (a, first), (b, second) in pairs),

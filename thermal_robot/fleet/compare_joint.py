@@ -231,14 +231,13 @@ class Joint:
     """The most probable joint explanation of K campaigns.
 
     ``parts`` are at work, of which ``changes`` differ between campaigns; ``values`` (K, P) are the parameters of each
-    campaign in expected sizes, ``covariance`` (K P, K P) is theirs; ``probability`` is, per effect, that it is at work
-    in any campaign; ``looked_at`` counts the places that were compared.
+    campaign in expected sizes; ``probability`` is, per effect, that it is at work in any campaign; ``looked_at`` counts
+    the places that were compared.
     """
 
     parts: tuple[Part, ...]
     changes: tuple[Change, ...]
     values: Array
-    covariance: Array
     probability: tuple[float, ...]
     looked_at: int
 
@@ -260,9 +259,12 @@ def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
 
     changes = tuple(replace(c, probability=probability(alike(c.part))) for c in changes)
     of_effects = ({k for k, p in enumerate(parts) if p.effect == e} for e in range(len(listed)))
-    at_work = tuple(parts[b] for b in best.blocks)
-    values, covariance = _values(at_work, best, len(said), len(said[0].vector))
-    return Joint(at_work, changes, values, covariance, tuple(map(probability, of_effects)), looked_at)
+    at_work, values, start = tuple(parts[b] for b in best.blocks), np.zeros((len(said), len(said[0].vector))), 0
+    for part in at_work:
+        end = start + part.basis.shape[1]
+        values[np.ix_(part.where, part.parameters)] += part.basis @ best.values[start:end]
+        start = end
+    return Joint(at_work, changes, values, tuple(map(probability, of_effects)), looked_at)
 
 
 def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Search, Combination]:
@@ -320,15 +322,3 @@ def _change(search: Search, parts: Sequence[Part], best: Combination, number: in
     score = tight @ best.values[own]
     chi2, degrees = float(score @ np.linalg.pinv(information) @ score), len(tight)
     return Change(parts[number], chi2, degrees, float(chdtrc(degrees, max(chi2, 0.0))), 0.0)
-
-
-def _values(at_work: Sequence[Part], best: Combination, campaigns: int, width: int) -> tuple[Array, Array]:
-    """(K, P) values of each campaign and (K P, K P) their covariance."""
-    across, start = np.zeros((campaigns, width, len(best.values))), 0
-    for part in at_work:
-        end = start + part.basis.shape[1]
-        for c in part.where:
-            across[c, list(part.parameters), start:end] += part.basis
-        start = end
-    flat = across.reshape(campaigns * width, len(best.values))
-    return across @ best.values, flat @ best.covariance @ flat.T

@@ -91,16 +91,6 @@ class Known:
         return self.model.effects
 
     @property
-    def robot(self) -> str:
-        """Name of the robot."""
-        return self.model.robot.name
-
-    @property
-    def tool_frame(self) -> str:
-        """Link that carries the target."""
-        return self.model.robot.tool_frame
-
-    @property
     def verdict(self) -> tuple[str, ...]:
         """Names of its effects."""
         return tuple(dict.fromkeys(effect.name for effect, _ in self.effects))
