@@ -62,21 +62,17 @@ def test_one_worker_writes_the_same_bytes(fleet, fleet_folder, tmp_path):
 
 
 def test_what_is_done_is_not_done_again(fleet, fleet_folder, tmp_path, monkeypatch):
-    shutil.copy(fleet.table.parent / DONE, tmp_path / DONE)
-    more = tmp_path / "campaigns"
-    shutil.copytree(fleet_folder, more)
-    (more / "hall_1" / "arm_03").rename(more / "hall_0" / "arm_03")
-
     def nobody(*_):
         raise AssertionError("somebody works")
 
     monkeypatch.setattr(many, "connected", nobody)
-    seen = []
+    out, seen = fleet.table.parent, []
     again = tr.diagnose_many(
-        fleet_folder, fleet.table.parent, labels=["hall", "robot"], only=ONLY, progress=lambda *s: seen.append(s)
+        fleet_folder, out, labels=["hall", "robot"], only=ONLY, progress=lambda *stage: seen.append(stage)
     )
     assert again.summary == fleet.summary
     assert [s for s in seen if s[0] == "campaigns"] == [("campaigns", k + 1, 8) for k in range(8)]
+    shutil.copy(out / DONE, tmp_path / DONE)
     with pytest.raises(AssertionError, match="somebody works"):
         tr.diagnose_many(fleet_folder, tmp_path, only=["backlash"])
 
@@ -93,7 +89,7 @@ def test_what_has_changed_is_done_anew(rv_m2, tmp_path):
 
 
 RUN = """
-import sys
+import sys, time
 import thermal_robot as tr
 
 def progress(stage, done, among):
@@ -121,15 +117,7 @@ def test_a_run_that_is_stopped_continues(fleet, fleet_folder, tmp_path, ending):
     run.stdout.close()
     assert run.wait(60) != 0
     assert not (tmp_path / "out" / TABLE).exists()
-    done = []
-    again = tr.diagnose_many(
-        fleet_folder,
-        tmp_path / "out",
-        labels=["hall", "robot"],
-        only=ONLY,
-        workers=2,
-        progress=lambda *s: done.append(s),
-    )
+    again = tr.diagnose_many(fleet_folder, tmp_path / "out", labels=["hall", "robot"], only=ONLY, workers=2)
     assert again.table.read_bytes() == fleet.table.read_bytes()
 
 
@@ -173,9 +161,6 @@ def test_what_makes_no_sense_is_said_before_anything_is_done(fleet_folder, tmp_p
     with pytest.raises(tr.ThermalRobotError, match=said):
         tr.diagnose_many(fleet_folder, tmp_path / "out", **options)
     assert not (tmp_path / "out" / TABLE).exists()
-
-
-def test_a_folder_that_cannot_be_made_is_an_error(tmp_path, fleet_folder):
     (tmp_path / "file").write_text("")
     with pytest.raises(tr.CampaignError, match="cannot be made"):
         tr.diagnose_many(fleet_folder, tmp_path / "file" / "out")
@@ -224,16 +209,13 @@ def test_what_was_put_is_there_in_the_next_run_in_the_order_of_its_list(tmp_path
         assert list(done.in_order()) == [(0, [{"effect": "backlash"}]), (1, ROWS), (2, [{"effect": "backlash"}])]
 
 
-def test_two_runs_in_one_folder_are_one_too_many(tmp_path):
+def test_two_runs_in_one_folder_are_one_too_many_and_a_file_of_another_kind_is_left_alone(tmp_path):
     with opened(tmp_path / "done"), pytest.raises(CampaignError, match="no other run"), opened(tmp_path / "done"):
         pass
-
-
-def test_a_file_of_another_kind_is_left_alone(tmp_path):
-    (tmp_path / "done").write_text("a diary, which is longer than the header of a database would be" * 20)
-    with pytest.raises(CampaignError, match="is not what a fleet has written"), opened(tmp_path / "done"):
+    (tmp_path / "other").write_text("a diary, which is longer than the header of a database would be" * 20)
+    with pytest.raises(CampaignError, match="is not what a fleet has written"), opened(tmp_path / "other"):
         pass
-    assert (tmp_path / "done").read_text().startswith("a diary")
+    assert (tmp_path / "other").read_text().startswith("a diary")
 
 
 KILLED = """
@@ -258,21 +240,23 @@ def test_a_process_that_is_killed_leaves_what_it_had_put(tmp_path):
         assert all(str(k) in done for k in range(5))
 
 
-def test_a_fingerprint_follows_content_and_options_and_nothing_else(rv_m2, tmp_path, monkeypatch):
-    folder = write_robot(rv_m2, tmp_path / "a")
-    known = fingerprint(str(folder), [["drift"], []])
-    assert fingerprint(str(folder / "campaign.toml"), [["drift"], []]) == known
-    assert fingerprint(str(folder), [[], ["drift"]]) != known
-    moved = tmp_path / "elsewhere"
-    moved.mkdir()
-    folder.rename(moved / "a")
-    os.utime(moved / "a" / "measurements.csv", (1e9, 1e9))
-    assert fingerprint(str(moved / "a"), [["drift"], []]) == known
+def test_a_fingerprint_follows_content_version_and_options_and_nothing_else(rv_m2, tmp_path, monkeypatch):
+    def of(folder, only=("drift",), without=()):
+        return fingerprint(str(folder), [list(only), list(without)])
+
+    folder, moved = write_robot(rv_m2, tmp_path / "a"), tmp_path / "elsewhere" / "a"
+    known = of(folder)
+    assert of(folder / "campaign.toml") == known
+    assert of(folder, (), ("drift",)) != known
+    moved.parent.mkdir()
+    folder.rename(moved)
+    os.utime(moved / "measurements.csv", (1e9, 1e9))
+    assert of(moved) == known
     for file in ("campaign.toml", "measurements.csv", "robot.urdf"):
-        before = (moved / "a" / file).read_bytes()
-        (moved / "a" / file).write_bytes(before + b"\n")
-        assert fingerprint(str(moved / "a"), [["drift"], []]) != known, file
-        (moved / "a" / file).write_bytes(before)
-    assert fingerprint(str(moved / "a"), [["drift"], []]) == known
+        before = (moved / file).read_bytes()
+        (moved / file).write_bytes(before + b"\n")
+        assert of(moved) != known, file
+        (moved / file).write_bytes(before)
+    assert of(moved) == known
     monkeypatch.setattr("importlib.metadata.version", lambda _: "99.0")  # another program may say something else
-    assert fingerprint(str(moved / "a"), [["drift"], []]) != known
+    assert of(moved) != known
