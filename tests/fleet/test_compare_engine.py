@@ -7,10 +7,9 @@ from scipy.linalg import lstsq
 from thermal_robot.effects import Parameter, library
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare import _equal, _judged, _parameters
-from thermal_robot.fleet.compare_joint import Problem, joint, some_of
+from thermal_robot.fleet.compare_joint import joint, some_of
 from thermal_robot.fleet.compare_sums import Candidate, Sums, told
 from thermal_robot.inference.algebra import solve
-from thermal_robot.inference.search import Search
 
 JOINTS = ("one", "two", "three", "four")
 TRUTH = np.array([1.0, -0.5, 0.3, 0.8])
@@ -99,31 +98,6 @@ def test_which_sets_of_campaigns_may_differ():
     assert (0, 1, 2) in many
     assert (5, 6, 7, 8) in many
     assert len(many) == len(set(many)) < 2**9 - 2
-
-
-def test_every_set_may_differ_in_all_places_and_in_each_and_products_of_some_are_those_of_all():
-    problem = Problem.of(listed(4), four())
-    differing = [p for p in problem.parts if not p.shared]
-    assert len(differing) == len(some_of(4)) * (1 + len(JOINTS))
-    assert {p.where for p in differing} == set(some_of(4))
-    assert [p.place for p in problem.parts if p.shared] == [("", ""), *(("joint", name) for name in JOINTS)]
-    which = [0, 7, 3, 40]
-    some, every = problem.gram([problem.parts[k] for k in which]), problem.gram(problem.parts).some(which)
-    for name in ("matrix", "vector", "total", "spreads", "equations"):
-        np.testing.assert_allclose(getattr(some, name), getattr(every, name), rtol=1e-12, atol=1e-9)
-    assert some.slices == every.slices
-
-
-def test_what_changed_is_found_among_all_and_what_is_there_already_is_not_offered():
-    problem = Problem.of(listed(4), four([((1, 3), 2, 0.6)]))
-    held = [problem.parts[0]]
-    search = Search(problem.gram(held), [held[0].log_prior])
-    best = search.evaluate([0])
-    found = problem.better(held, [best], best.log_evidence)
-    assert ("joint", "three") in [part.place for part in found]
-    assert not any(part.shared for part in found)
-    assert len({part.place for part in found}) == len(found)
-    assert set(found) <= set(problem.better(held, [best, search.evaluate([])], best.log_evidence))
 
 
 @pytest.mark.parametrize(
@@ -238,8 +212,3 @@ def test_a_parameter_that_repeats_another_is_told_once():
     columns = np.random.default_rng(0).normal(size=(30, 3))
     columns = np.column_stack([columns, columns[:, 0] + columns[:, 1], np.zeros(30)])
     assert told([Sums(columns.T @ columns, np.zeros(5))] * 2) == [0, 1, 2]
-
-
-def test_probabilities_are_probabilities():
-    for name in ("MAY_BE", "CHANGED", "EVERYWHERE", "FALSE_CHANGE", "AGREE", "MOST", "DISTINCT"):
-        assert 0.0 < getattr(settings, name) < 1.0, name
