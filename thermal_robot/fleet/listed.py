@@ -44,14 +44,10 @@ class Listed:
 def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
     """Find the campaigns of a fleet, in the order of the list, of a folder in that of the names.
 
-    Parameters
-    ----------
-    source
-        A folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels. Or a list:
-        CSV, or TOML with ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on,
-        and whose other columns are labels.
-    names
-        Of the levels of folders, from the top; ``level_1`` and so on where left out.
+    The source is a folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels,
+    whose levels ``names`` names from the top, ``level_1`` and so on where left out. Or it is a list: CSV, or TOML with
+    ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on, and whose other
+    columns are labels.
 
     Raises
     ------

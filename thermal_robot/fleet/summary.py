@@ -202,16 +202,9 @@ class Summary:
 def summarise(
     table: Path, labels: Sequence[str] = (), progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> Summary:
-    """Summarise the table of a fleet.
+    """Summarise the table of a fleet, as :func:`~thermal_robot.fleet.rows.write_rows` writes it, by its labels.
 
-    Parameters
-    ----------
-    table
-        As :func:`~thermal_robot.fleet.rows.write_rows` writes it.
-    labels
-        Names of its labels.
-    progress
-        Called with a stage, how many effects are compared, and how many there are.
+    ``progress`` is called with a stage, how many effects are compared, and how many there are.
     """
     campaigns = _campaigns(table, labels)
     groups = [name for name in (*labels, MODEL) if name != ROBOT]

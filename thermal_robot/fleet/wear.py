@@ -119,16 +119,9 @@ def of_fits(
     limits: Mapping[str, float] | None = None,
     false_alarm: float = settings.FALSE_ALARM,
 ) -> Wear:
-    """Say what moved between campaigns that were fitted already.
+    """Say what moved between K campaigns of one robot that were fitted already, in the order of time.
 
-    Parameters
-    ----------
-    fits
-        K of one robot, in the order of time.
-    moments
-        K dates, not falling; none where they are not known.
-    limits, false_alarm
-        As for :func:`wear`.
+    ``moments`` are K dates, none where they are not known; limits and false alarm are as for :func:`wear`.
 
     Raises
     ------
