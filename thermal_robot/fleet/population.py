@@ -1,4 +1,4 @@
-"""A quantity of many robots: its mean over the fleet, its spread between robots, and which robots stand out.
+"""Random-effects model by empirical Bayes: mean of a quantity over many robots, spread, and which robots stand out.
 
 Of robot i the value y_i is known with deviation s_i. The robots' own values scatter about the mean of their group,
 
