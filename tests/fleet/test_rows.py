@@ -119,10 +119,12 @@ def test_free_values_are_told_in_all_joints_and_of_nothing_that_the_data_do_not_
     """Else no robot could stand out by a fault of its own; the zero of joint 1 is the direction of the base."""
     found = diagnosed(rv_m2, {"backlash": {"joint_2": 6e-4}}, 4)
     assert {place.name for place in found.finding("backlash").locations if place.share > 0.0} == {"joint_2"}
-    told = free(found.fit)
+    told = free(found.fit, ["joint_gain"])
     zeros = [parameter["name"] for parameter in told["joint_offset"]]
     assert zeros
     assert "zero offset, joint_1" not in zeros
     assert len(told["backlash"]) >= 4
     for p in told["backlash"]:
         assert abs(p["value"] - 6e-4 * (p["name"] == "lost motion, joint_2")) < 4.0 * p["std"]
+    assert len(told["joint_gain"]) >= 2  # which the diagnosis was not asked for
+    assert all(abs(p["value"]) < 4.0 * p["std"] for p in told["joint_gain"])
