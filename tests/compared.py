@@ -5,9 +5,7 @@ from functools import cache
 import numpy as np
 
 import thermal_robot as tr
-from thermal_robot.effects import ThermalElongation, library
-from thermal_robot.effects.effect import Parameter
-from thermal_robot.fleet.compare_sums import Candidate, Sums
+from thermal_robot.effects import ThermalElongation
 from thermal_robot.kinematics import exp6
 from thermal_robot.observations import observe
 
@@ -37,25 +35,6 @@ def diagnosed(seed, offsets=OFFSETS, gains=0.0, frame="here", noise=NOISE, rows=
 def moved(by, joint=2):
     """The offsets with one changed."""
     return tuple(value + by * (k == joint) for k, value in enumerate(OFFSETS))
-
-
-JOINTS = ("one", "two", "three", "four")
-
-
-def listed(campaigns):
-    """One effect with a parameter in each of four joints, of unit size."""
-    told = tuple(Parameter("size", "rad", 1.0, "joint", name, ()) for name in JOINTS)
-    effect = library()["joint_offset"]
-    return [Candidate("own", "own", effect, told, np.ones(4), (told,) * campaigns, (True,) * campaigns)]
-
-
-def said(truths, rng, rows=60):
-    """What campaigns with these parameters say, noise one."""
-    result = []
-    for truth in truths:
-        columns = rng.normal(size=(rows, 4)) * 4.0
-        result.append(Sums(columns.T @ columns, columns.T @ (columns @ truth + rng.normal(size=rows))))
-    return result
 
 
 def lagging_days(strain=2e-5):

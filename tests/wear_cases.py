@@ -40,10 +40,8 @@ def worn(parameter, place, **other):
     """A parameter that stays, unless it is said otherwise."""
     stays = Worn(
         effect="joint_offset", title="joint zero offsets", parameter=parameter, place=place, unit="rad",
-        comparable=True, reason="", alarm=False, chance=1.0, moved=0.01, kind="constant",
-        kinds={"constant": 0.99, "jump": 0.01, "trend": 0.0, "walk": 0.0}, jump=None, rate=None, change=0.0,
-        change_std=0.0, values=(1e-3, 1.01e-3, 0.99e-3, 1e-3), stds=(1e-5,) * 4, fitted=(1e-3,) * 4, crossing=None,
-        confounded_with=(),
+        comparable=True, reason="", moved=0.01, kinds={"constant": 0.99, "jump": 0.01, "trend": 0.0, "walk": 0.0},
+        change=0.0, change_std=0.0, values=(1e-3, 1.01e-3, 0.99e-3, 1e-3), stds=(1e-5,) * 4, fitted=(1e-3,) * 4,
     )  # fmt: skip
     return replace(stays, **other)
 

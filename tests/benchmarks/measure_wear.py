@@ -112,7 +112,7 @@ class Series:
         if not own:  # play too small to be named in one campaign
             return 0.0
         held = known.matrices[0] + np.eye(len(known.keys))
-        return float(np.sqrt(np.linalg.inv(held)[own[0], own[0]]) * known.sizes[own[0]])
+        return float(np.sqrt(np.linalg.inv(held)[own[0], own[0]]) * known.parameters[own[0]].size)
 
 
 def one(seed):

@@ -62,16 +62,6 @@ def threads():
     return {pool["num_threads"] for pool in threadpool_info()}
 
 
-def scattered(rng, robots, mean, spread, deviations):
-    """(robots,) values as they would be measured: each robot's own, and the deviation of the measurement."""
-    own = rng.normal(mean, spread, robots)
-    return own + deviations * rng.normal(size=robots)
-
-
-def deviations(rng, robots):
-    return rng.uniform(0.5, 2.0, robots) * np.ones(robots)
-
-
 def told_rows(name, labels, effects, gap=1e-4, outcome="diagnosed", reason=""):
     """Rows as a campaign's diagnosis would give: effects by name with (found, places, {parameter: (value, std)})."""
     campaign = {"campaign": name, **labels, "model": "arm", "outcome": outcome, "reason": reason, "rms_before": gap}

@@ -1,4 +1,6 @@
-"""What a campaign says: against least squares over its rows, and what frames take up."""
+"""What a campaign or its model says: against least squares over its rows, and what frames take up."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from coupled import joint, link, urdf
 
 import thermal_robot as tr
 from thermal_robot.effects import named
-from thermal_robot.fleet.compare_sums import Sums, candidates, sums, told
+from thermal_robot.fleet.compare_sums import Known, candidates, sums, told
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 
@@ -71,15 +73,16 @@ def test_it_is_least_squares_with_free_frames(said, listed, days):
     np.testing.assert_allclose(spread, other, rtol=0.01)
 
 
-def test_twice_the_noise_says_a_quarter(said, listed):
-    own = names(listed).index("zero offset, joint_3")
-    assert np.diag(said[0].matrix)[own] / np.diag(said[1].matrix)[own] == pytest.approx(4.0, rel=0.5)
-
-
-def test_a_parameter_that_repeats_another_is_told_once():
-    columns = np.random.default_rng(0).normal(size=(30, 3))
-    columns = np.column_stack([columns, columns[:, 0] + columns[:, 1], np.zeros(30)])
-    assert told([Sums(columns.T @ columns, np.zeros(5))] * 2) == [0, 1, 2]
+def test_every_effect_is_compared_in_all_places_zeros_first():
+    days = [diagnosed(1), diagnosed(4, gains=2e-3)]
+    listed = candidates(days, [d.fit for d in days], ["a", "b"])
+    assert listed[0].effect.told_inside
+    own = {item.name: item for item in listed}
+    assert own["joint_gain"].named == ("joint_gain" in days[0].verdict, True)
+    zeros = own["joint_offset"]
+    assert [len(zeros.told), *map(len, zeros.parameters)] == [5, 5, 5]  # whichever places a diagnosis named
+    np.testing.assert_array_equal(zeros.sizes, np.full(5, 1e-3))
+    assert not any(p.responses for p in zeros.told)
 
 
 def lifted():
@@ -114,3 +117,61 @@ def test_a_base_that_rocks_does_not_tell_where_it_stands():
     # nothing is told to no better than some expected sizes, which rounding apart is told to none
     assert not ((told > 1e-9) & (told < 0.01)).any()
     assert (told > 1.0).sum() > 10
+
+
+def of_both(found, other):
+    """What a campaign, and the model of its diagnosis, say beside another one, by the parameters' names."""
+    fits, model = [found.fit, other.fit], Known.of(found.model, "a")
+    listed = candidates([found, other], fits, ["a", "b"])
+    of_model = {item.name: item for item in candidates([model, other], [model, other.fit], ["a", "b"])}
+    assert {*of_model} <= {item.name for item in listed}
+    same = [replace(i, parameters=of_model[i.name].parameters if i.name in of_model else ((), ())) for i in listed]
+    keys = [f"{item.name}: {p.name}" for item in listed for p in item.told]
+    return sums(found, found.fit, listed, 0), sums(model, model, same, 0), keys, listed
+
+
+@pytest.mark.parametrize("times", [1.0, 5.0])
+def test_a_model_says_what_the_rows_said_without_the_prior(times):
+    """Where the noise is large, what was expected beforehand is a part of all that is known."""
+    rows, model, keys, _ = of_both(diagnosed(1, noise=times * NOISE), diagnosed(2, frame="there", noise=2 * NOISE))
+    own = [k for k, key in enumerate(keys) if key.startswith("joint_offset")]
+    for name in ("matrix", "vector"):
+        true = getattr(rows.some(own), name)
+        np.testing.assert_allclose(getattr(model.some(own), name), true, atol=1e-4 * np.abs(true).max())
+
+
+def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_without_effects_nothing():
+    robot = load_robot("builtin:rv_m2", "tool0")
+    one = tr.diagnose(tr.simulate(robot, {"joint_gain": {"joint_3": 3e-3}}, rows=50, noise=NOISE, seed=1))
+    ((effect, _),) = one.model.effects
+    assert effect.places == ("joint_3",)
+    _, model, keys, listed = of_both(one, diagnosed(2))
+    told = dict(zip(keys, np.diag(model.matrix), strict=True))
+    own = told.pop("joint_gain: gain error, joint_3")
+    assert own > 100.0
+    assert max(value for key, value in told.items() if key.startswith("joint_gain")) < 1e-9 * own
+    # and its value is the model's own
+    k = keys.index("joint_gain: gain error, joint_3")
+    size = np.concatenate([item.sizes for item in listed])[k]
+    assert model.vector[k] / model.matrix[k, k] * size == pytest.approx(3e-3, rel=0.05)
+    sound = tr.diagnose(tr.simulate(robot, rows=40, noise=NOISE, seed=2), only="joint_gain")
+    assert sound.model.effects == ()
+    _, model, *_ = of_both(sound, diagnosed(1))
+    assert not model.matrix.any()
+    assert not model.vector.any()
+
+
+@pytest.mark.slow
+def test_geometry_is_told_in_the_parameters_of_a_diagnosis():
+    robot = load_robot("builtin:rv_m2", "tool0")
+    names = [
+        f"rotation {axis} of joint_{k}, {link}" for k, link in ((2, "shoulder"), (3, "upper_arm")) for axis in "xyz"
+    ]
+    bent = {"geometric": dict(zip(names, (4e-4, -6e-4, 5e-4, 3e-4, -5e-4, 6e-4), strict=True))}
+    found = tr.diagnose(tr.simulate(robot, bent, rows=80, noise=NOISE, seed=4), only=["geometric"])
+    assert found.verdict == ("geometric",)
+    both = tr.compare(found.model, found, names=["file", "rows"])
+    assert both.changes == ()
+    for p in both.effect("geometric").parameters:
+        if p.difference is not None:
+            assert abs(p.difference) < 0.02 * p.std

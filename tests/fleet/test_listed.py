@@ -25,19 +25,13 @@ def test_a_folder_holds_every_campaign_below_it_labelled_by_its_folders(root):
         ("hall_2/b/monday", ("hall_2", "b", "monday")),
     )
     assert found.folder("hall_1/c") == str(root / "hall_1" / "c")
-
-
-def test_levels_without_names_are_numbered(root):
     assert campaigns(root).names == ("level_1", "level_2", "level_3")
+    assert campaigns(root / "hall_1" / "c").campaigns == ((".", ()),)  # a folder that is a campaign
 
 
-def test_a_folder_that_is_a_campaign_is_a_fleet_of_one(root):
-    assert campaigns(root / "hall_1" / "c").campaigns == ((".", ()),)
-
-
-CSV = "campaign,hall,robot\nhall_1/a/monday,one,a\nhall_2/b/monday,two,b\n"
+CSV = "campaign,hall,robot\nhall_1/a/monday,one,a\nhall_2/b/monday,two,\n"
 TOML = '[[campaigns]]\ncampaign = "hall_1/a/monday"\nhall = "one"\nrobot = "a"\n'
-TOML += '[[campaigns]]\ncampaign = "hall_2/b/monday"\nhall = "two"\nrobot = "b"\n'
+TOML += '[[campaigns]]\ncampaign = "hall_2/b/monday"\nhall = "two"\n'
 
 
 @pytest.mark.parametrize(("name", "text"), [("list.csv", CSV), ("list.toml", TOML)])
@@ -45,8 +39,12 @@ def test_a_list_keeps_its_order_and_its_columns_are_labels(root, name, text):
     (root / name).write_text(text)
     found = campaigns(root / name)
     assert found.names == ("hall", "robot")
-    assert found.campaigns == (("hall_1/a/monday", ("one", "a")), ("hall_2/b/monday", ("two", "b")))
+    assert found.campaigns == (("hall_1/a/monday", ("one", "a")), ("hall_2/b/monday", ("two", "")))
     assert found.folder("hall_1/a/monday") == str(root / "hall_1" / "a" / "monday")
+    with pytest.raises(CampaignError, match="its columns"):
+        campaigns(root / name, ["hall"])
+    (root / name).write_text('[[campaigns]]\ncampaign = "a"\n' if name.endswith("toml") else "campaign\na\n")
+    assert campaigns(root / name).campaigns == (("a", ()),)
 
 
 @pytest.mark.parametrize(
@@ -57,6 +55,12 @@ def test_a_list_keeps_its_order_and_its_columns_are_labels(root, name, text):
         ("list.csv", "campaign,hall\na,one\nb,two\n./a,three\n", r"row 4, column 'campaign'.*stands in row 2"),
         ("list.csv", "campaign,hall\na,one\n,two\n", r"row 3, column 'campaign': no campaign is named"),
         ("list.toml", "[[campaigns]]\ncampaign = 3\n", r"campaigns\[0\].campaign"),
+        ("list.toml", "[[campaigns]]\ncampaign = 'a'\n' ' = 'b'\n", "a label has no name"),
+        ("list.toml", "[[campaigns]\n", r"row 1: not valid TOML"),
+        ("list.toml", "[[campaign]]\n", r"found campaign, expected \[\[campaigns\]\]"),
+        ("list.toml", "campaigns = []\n", "lists no campaign"),
+        ("list.toml", "campaigns = [3]\n", "no list of campaigns"),
+        ("list.toml", "", "found nothing"),
         ("list.txt", "campaign\na\n", r"no list of campaigns.*\.csv or \.toml"),
         ("campaign.toml", "", "no list of campaigns"),
     ],
@@ -67,15 +71,15 @@ def test_a_list_that_is_none_says_where(tmp_path, name, text, said):
         campaigns(tmp_path / name)
 
 
-def test_what_is_not_there_or_empty_says_so(tmp_path, root):
-    with pytest.raises(CampaignError, match="no such folder or list"):
-        campaigns(tmp_path / "nowhere")
-    with pytest.raises(CampaignError, match=r"no campaign\.toml lies below"):
-        campaigns(root / "notes")
-    with pytest.raises(CampaignError, match="fewer levels"):
-        campaigns(root, ["a", "b", "c", "d"])
-    with pytest.raises(CampaignError, match="stands twice"):
-        campaigns(root, ["hall", "hall"])
-    (root / "list.csv").write_text(CSV)
-    with pytest.raises(CampaignError, match="its columns"):
-        campaigns(root / "list.csv", ["hall"])
+@pytest.mark.parametrize(
+    ("below", "labels", "said"),
+    [
+        ("nowhere", [], "no such folder or list"),
+        ("notes", [], r"no campaign\.toml lies below"),
+        ("", ["a", "b", "c", "d"], "fewer levels"),
+        ("", ["hall", "hall"], "stands twice"),
+    ],
+)
+def test_what_is_not_there_or_empty_says_so(root, below, labels, said):
+    with pytest.raises(CampaignError, match=said):
+        campaigns(root / below, labels)

@@ -1,6 +1,5 @@
 """Many campaigns: what a loop would say, for any number of workers, after any stop; failures are rows."""
 
-import json
 import os
 import shutil
 import signal
@@ -14,23 +13,21 @@ import pytest
 from fleet.robots import ONLY, write_fleet, write_robot
 
 import thermal_robot as tr
+from thermal_robot.errors import CampaignError
 from thermal_robot.fleet import many
-from thermal_robot.fleet.many import DONE, TABLE, diagnosed
+from thermal_robot.fleet.many import DONE, TABLE, diagnosed, fingerprint, opened
 from thermal_robot.fleet.rows import rows_of
 
 pytestmark = pytest.mark.filterwarnings("default")
 BAD = "hall_1/arm_05"
 
 
-def plain(table):
-    """Rows as lists of plain values, nothing rounded."""
-    return json.loads(table.to_json(orient="records", double_precision=15))
-
-
 def test_it_says_what_a_loop_says_exactly(fleet, fleet_folder):
     table = fleet.to_frame()
     names = list(dict.fromkeys(table["campaign"]))
     assert names == sorted(f"hall_{k % 2}/arm_{k:02d}" for k in range(8))
+    labels = fleet.to_frame(["campaign", "hall", "robot"]).drop_duplicates()
+    assert list(labels["hall"] + "/" + labels["robot"]) == list(labels["campaign"])
     for name in names:
         if name == BAD:
             continue
@@ -42,13 +39,6 @@ def test_it_says_what_a_loop_says_exactly(fleet, fleet_folder):
                 assert got[key] == row[key], key
             for key in ("parameters", "free", "places"):
                 assert [dict(value) for value in got[key]] == row[key], key
-
-
-def test_the_labels_are_the_folders(fleet):
-    table = fleet.to_frame(["campaign", "hall", "robot"]).drop_duplicates()
-    assert [f"{hall}/{robot}" for hall, robot in zip(table["hall"], table["robot"], strict=True)] == list(
-        table["campaign"]
-    )
 
 
 def test_a_campaign_that_cannot_be_read_is_a_row_with_its_reason(fleet, fleet_folder):
@@ -72,21 +62,17 @@ def test_one_worker_writes_the_same_bytes(fleet, fleet_folder, tmp_path):
 
 
 def test_what_is_done_is_not_done_again(fleet, fleet_folder, tmp_path, monkeypatch):
-    shutil.copy(fleet.table.parent / DONE, tmp_path / DONE)
-    more = tmp_path / "campaigns"
-    shutil.copytree(fleet_folder, more)
-    (more / "hall_1" / "arm_03").rename(more / "hall_0" / "arm_03")
-
     def nobody(*_):
         raise AssertionError("somebody works")
 
-    monkeypatch.setattr(many, "_client", nobody)
-    seen = []
+    monkeypatch.setattr(many, "connected", nobody)
+    out, seen = fleet.table.parent, []
     again = tr.diagnose_many(
-        fleet_folder, fleet.table.parent, labels=["hall", "robot"], only=ONLY, progress=lambda *s: seen.append(s)
+        fleet_folder, out, labels=["hall", "robot"], only=ONLY, progress=lambda *stage: seen.append(stage)
     )
     assert again.summary == fleet.summary
     assert [s for s in seen if s[0] == "campaigns"] == [("campaigns", k + 1, 8) for k in range(8)]
+    shutil.copy(out / DONE, tmp_path / DONE)
     with pytest.raises(AssertionError, match="somebody works"):
         tr.diagnose_many(fleet_folder, tmp_path, only=["backlash"])
 
@@ -103,7 +89,7 @@ def test_what_has_changed_is_done_anew(rv_m2, tmp_path):
 
 
 RUN = """
-import sys
+import sys, time
 import thermal_robot as tr
 
 def progress(stage, done, among):
@@ -131,19 +117,14 @@ def test_a_run_that_is_stopped_continues(fleet, fleet_folder, tmp_path, ending):
     run.stdout.close()
     assert run.wait(60) != 0
     assert not (tmp_path / "out" / TABLE).exists()
-    done = []
-    again = tr.diagnose_many(
-        fleet_folder,
-        tmp_path / "out",
-        labels=["hall", "robot"],
-        only=ONLY,
-        workers=2,
-        progress=lambda *s: done.append(s),
-    )
+    again = tr.diagnose_many(fleet_folder, tmp_path / "out", labels=["hall", "robot"], only=ONLY, workers=2)
     assert again.table.read_bytes() == fleet.table.read_bytes()
 
 
-def test_a_program_that_fails_is_a_row_that_is_tried_again(rv_m2, tmp_path, monkeypatch):
+def test_only_what_the_program_failed_at_is_tried_again(rv_m2, tmp_path, monkeypatch):
+    rows, again = diagnosed(str(write_robot(rv_m2, tmp_path / "few", rows=3)), [], [])
+    assert not again
+    assert "too few" in rows[0]["reason"]
     folder = write_robot(rv_m2, tmp_path / "a")
 
     def broken(*_, **__):
@@ -152,9 +133,7 @@ def test_a_program_that_fails_is_a_row_that_is_tried_again(rv_m2, tmp_path, monk
     monkeypatch.setattr(many, "diagnose", broken)
     rows, again = diagnosed(str(folder), [], [])
     assert again
-    assert json.loads(rows) == [
-        {"outcome": "failed", "reason": "the program failed: ZeroDivisionError: in measurements.csv"}
-    ]
+    assert rows == [{"outcome": "failed", "reason": "the program failed: ZeroDivisionError: in measurements.csv"}]
 
 
 def test_a_campaign_that_takes_too_long_is_a_row_that_is_tried_again(rv_m2, tmp_path):
@@ -165,13 +144,6 @@ def test_a_campaign_that_takes_too_long_is_a_row_that_is_tried_again(rv_m2, tmp_
     assert "time limit" in why
     fleet = tr.diagnose_many(tmp_path / "in", tmp_path / "out", only=ONLY, workers=1)
     assert not fleet.summary.failures
-
-
-def test_what_a_campaign_says_of_itself_is_not_tried_again(rv_m2, tmp_path):
-    folder = write_robot(rv_m2, tmp_path / "a", rows=3)
-    rows, again = diagnosed(str(folder), [], [])
-    assert not again
-    assert "too few" in json.loads(rows)[0]["reason"]
 
 
 @pytest.mark.parametrize(
@@ -189,12 +161,6 @@ def test_what_makes_no_sense_is_said_before_anything_is_done(fleet_folder, tmp_p
     with pytest.raises(tr.ThermalRobotError, match=said):
         tr.diagnose_many(fleet_folder, tmp_path / "out", **options)
     assert not (tmp_path / "out" / TABLE).exists()
-
-
-def test_an_empty_folder_and_one_that_cannot_be_made_are_errors(tmp_path, fleet_folder):
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(tr.CampaignError, match=r"no campaign\.toml lies below"):
-        tr.diagnose_many(tmp_path / "empty", tmp_path / "out")
     (tmp_path / "file").write_text("")
     with pytest.raises(tr.CampaignError, match="cannot be made"):
         tr.diagnose_many(fleet_folder, tmp_path / "file" / "out")
@@ -223,3 +189,74 @@ def test_a_fleet_with_a_fault_of_all_and_one_of_a_hall_is_told_so(rv_m2, tmp_pat
     assert (of_hall.label, of_hall.groups[0].group) == ("hall", "hall_1")
     assert of_hall.groups[0].mean == pytest.approx(shift, abs=3.0 * of_hall.groups[0].mean_std)
     assert [(a.robot, a.parameter) for a in found.apart] == [("arm_06", "lost motion, joint_4")]
+
+
+ROWS = [{"outcome": "diagnosed", "rms_before": 0.1 + 0.2, "summary": "µm – \ud800"}, {"effect": "drift"}]
+
+
+def test_what_was_put_is_there_in_the_next_run_in_the_order_of_its_list(tmp_path):
+    with opened(tmp_path / "done") as done:
+        done.put("a", ROWS)
+        done.put("b", [{"effect": "backlash"}])
+        done.put("again", ROWS, again=True)
+        done.name(0, "again")
+        assert list(done.in_order()) == [(0, ROWS)]
+    with opened(tmp_path / "done") as done:
+        assert [key in done for key in ("a", "c", "again")] == [True, False, False]
+        assert list(done.in_order()) == []
+        for number, key in enumerate("bab"):
+            done.name(number, key)
+        assert list(done.in_order()) == [(0, [{"effect": "backlash"}]), (1, ROWS), (2, [{"effect": "backlash"}])]
+
+
+def test_two_runs_in_one_folder_are_one_too_many_and_a_file_of_another_kind_is_left_alone(tmp_path):
+    with opened(tmp_path / "done"), pytest.raises(CampaignError, match="no other run"), opened(tmp_path / "done"):
+        pass
+    (tmp_path / "other").write_text("a diary, which is longer than the header of a database would be" * 20)
+    with pytest.raises(CampaignError, match="is not what a fleet has written"), opened(tmp_path / "other"):
+        pass
+    assert (tmp_path / "other").read_text().startswith("a diary")
+
+
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from thermal_robot.fleet import many
+from thermal_robot.fleet import settings
+settings.WRITTEN_EVERY = 0.0
+with many.opened(Path(sys.argv[1])) as known:
+    for k in range(5):
+        known.put(str(k), [{"effect": str(k)}])
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_process_that_is_killed_leaves_what_it_had_put(tmp_path):
+    root = Path(__file__).parents[2]
+    run = [sys.executable, "-c", KILLED, str(tmp_path / "done")]
+    ended = subprocess.run(run, env={**os.environ, "PYTHONPATH": str(root)}, check=False)
+    assert ended.returncode == -signal.SIGKILL
+    with opened(tmp_path / "done") as done:
+        assert all(str(k) in done for k in range(5))
+
+
+def test_a_fingerprint_follows_content_version_and_options_and_nothing_else(rv_m2, tmp_path, monkeypatch):
+    def of(folder, only=("drift",), without=()):
+        return fingerprint(str(folder), [list(only), list(without)])
+
+    folder, moved = write_robot(rv_m2, tmp_path / "a"), tmp_path / "elsewhere" / "a"
+    known = of(folder)
+    assert of(folder / "campaign.toml") == known
+    assert of(folder, (), ("drift",)) != known
+    moved.parent.mkdir()
+    folder.rename(moved)
+    os.utime(moved / "measurements.csv", (1e9, 1e9))
+    assert of(moved) == known
+    for file in ("campaign.toml", "measurements.csv", "robot.urdf"):
+        before = (moved / file).read_bytes()
+        (moved / file).write_bytes(before + b"\n")
+        assert of(moved) != known, file
+        (moved / file).write_bytes(before)
+    assert of(moved) == known
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "99.0")  # another program may say something else
+    assert of(moved) != known

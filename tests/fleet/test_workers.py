@@ -14,7 +14,7 @@ import pytest
 from fleet.robots import samples_kept, square, square_in_time, threads
 
 from thermal_robot.errors import ThermalRobotError
-from thermal_robot.fleet.many import _answers, _client
+from thermal_robot.fleet.many import answers, connected
 
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -30,7 +30,7 @@ def importable():
 
 @pytest.fixture(scope="module")
 def cluster(importable):
-    with _client(2) as found:
+    with connected(2) as found:
         yield found
 
 
@@ -38,57 +38,60 @@ def tasks(numbers, *more):
     return iter([(str(k), (k, *more)) for k in numbers])
 
 
+def done(client, work, given):
+    """Answer and reason of each number, which stands for its task once."""
+    found = [(int(key), (reply, why)) for key, reply, why in answers(client, work, given)]
+    assert len(dict(found)) == len(found)
+    return dict(found)
+
+
+def squares(numbers):
+    return {k: (k * k, "") for k in numbers}
+
+
 def workers():
     """The processes that work, without nannies and helpers: those in which Python runs a worker."""
     return [p for p in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
 
 
-def test_every_task_is_answered_once(cluster):
-    found = list(_answers(cluster, square, tasks(range(30), 0.0)))
-    assert sorted((int(key), reply, why) for key, reply, why in found) == [(k, k * k, "") for k in range(30)]
-
-
-def test_tasks_are_taken_as_they_are_worked_on(cluster):
-    taken = []
+def test_every_task_is_answered_once_and_taken_as_it_is_worked_on(cluster):
+    taken, found, ahead = [], {}, []
 
     def counting():
-        for task in tasks(range(20), 0.0):
+        for task in tasks(range(30), 0.0):
             taken.append(task[0])
             yield task
 
-    ahead = [len(taken) - done for done, _ in enumerate(_answers(cluster, square, counting()))]
+    for key, *answer in answers(cluster, square, counting()):
+        ahead.append(len(taken) - len(found))
+        found[int(key)] = tuple(answer)
+    assert (found, len(taken)) == (squares(range(30)), 30)
     assert max(ahead) <= 4
 
 
 def test_work_that_fails_is_told_and_the_rest_goes_on(cluster):
-    found = {key: (reply, why) for key, reply, why in _answers(cluster, square, tasks([1, "two", 3], 0.0))}
-    assert found["1"] == (1, "")
-    assert found["3"] == (9, "")
-    assert found["two"][0] is None
-    assert "TypeError" in found["two"][1]
+    found = done(cluster, square, iter([("1", (1, 0.0)), ("2", ("two", 0.0)), ("3", (3, 0.0))]))
+    reply, why = found.pop(2)
+    assert reply is None
+    assert "TypeError" in why
+    assert found == squares((1, 3))
 
 
-def test_processes_keep_nothing_of_where_they_were(cluster):
-    ((_, kept, _),) = list(_answers(cluster, samples_kept, iter([("kept", ())])))
-    assert kept == 0
+def test_processes_keep_nothing_of_where_they_were_and_have_one_thread_for_matrices(cluster):
+    assert done(cluster, samples_kept, iter([("0", ())])) == {0: (0, "")}
+    assert set().union(*cluster.run(threads).values()) == {1}
 
 
-def test_work_that_takes_too_long_is_ended_and_the_rest_goes_on(cluster):
-    every = _answers(cluster, square_in_time, tasks(range(6), 30.0, 1.0))
-    found = {int(key): (reply, why) for key, reply, why in every}
-    assert found.pop(3)[0] is None
-    assert found == {k: (k * k, "") for k in (0, 1, 2, 4, 5)}
-
-
-def test_work_that_ends_its_process_is_the_only_one_that_has_no_answer(cluster):
-    found = list(_answers(cluster, square, tasks(range(12), 0.05, (3, 4))))
-    assert sorted(int(key) for key, *_ in found) == list(range(12))
-    for key, reply, why in found:
-        if key in "34":
-            assert reply is None
-            assert "was ended twice" in why
-        else:
-            assert (reply, why) == (int(key) ** 2, "")
+@pytest.mark.parametrize(
+    ("work", "more", "ended"), [(square_in_time, (30.0, 1.0), {3}), (square, (0.05, (3, 4)), {3, 4})]
+)
+def test_work_that_ends_its_process_or_takes_too_long_is_the_only_one_without_an_answer(cluster, work, more, ended):
+    found = done(cluster, work, tasks(range(12), *more))
+    for number in ended:
+        reply, why = found.pop(number)
+        assert reply is None
+        assert "was ended twice" in why
+    assert found == squares({*range(12)} - ended)
 
 
 def test_a_process_that_is_killed_in_the_middle_loses_nothing_and_does_nothing_twice(cluster):
@@ -98,10 +101,9 @@ def test_a_process_that_is_killed_in_the_middle_loses_nothing_and_does_nothing_t
     victim = workers()[0]
     ended = threading.Timer(1.0, lambda: os.kill(victim.pid, signal.SIGKILL))
     ended.start()
-    found = list(_answers(cluster, square, tasks(range(40), 0.1)))
+    assert done(cluster, square, tasks(range(40), 0.1)) == squares(range(40))
     ended.join()
     assert not victim.is_running() or victim.status() == psutil.STATUS_ZOMBIE
-    assert sorted((int(key), reply, why) for key, reply, why in found) == [(k, k * k, "") for k in range(40)]
 
 
 @pytest.mark.skipif(sys.platform == "darwin", reason="connections of other processes are not told there")
@@ -115,31 +117,6 @@ def test_nobody_else_can_reach_it(cluster):
     ]
     assert listening
     assert set(listening) == {"127.0.0.1"}
-
-
-def test_each_process_has_one_thread_for_matrices(cluster):
-    assert set().union(*cluster.run(threads).values()) == {1}
-
-
-def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
-    monkeypatch.setattr("thermal_robot.fleet.settings.ANSWERS_WITHIN", 0.5)
-    with (
-        pytest.raises(ThermalRobotError, match=r"scheduler tcp://127.0.0.1:9 does not answer"),
-        _client(1, "tcp://127.0.0.1:9"),
-    ):
-        pass
-
-
-def test_a_scheduler_that_runs_is_used():
-    import distributed
-
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
-        ) as running,
-        _client(1, running.scheduler_address) as found,
-    ):
-        assert [reply for _, reply, _ in _answers(found, square, tasks([5], 0.0))] == [25]
 
 
 @pytest.fixture
@@ -174,8 +151,10 @@ def test_a_scheduler_behind_tls_takes_who_has_its_files_and_nobody_else(secured,
 
     address, tls = secured
     assert address.startswith("tls://")
-    with dask.config.set(tls), _client(1, address) as found:
-        assert sorted(reply for _, reply, _ in _answers(found, square, tasks(range(5), 0.0))) == [0, 1, 4, 9, 16]
+    with dask.config.set(tls), connected(1, address) as found:
+        assert done(found, square, tasks(range(5), 0.0)) == squares(range(5))
     monkeypatch.setattr("thermal_robot.fleet.settings.ANSWERS_WITHIN", 3.0)
-    with pytest.raises(ThermalRobotError, match=r"does not answer.*distributed\.comm\.tls"), _client(1, address):
-        pass
+    for place in (address, "tcp://127.0.0.1:9"):
+        said = rf"scheduler {place} does not answer.*distributed\.comm\.tls"
+        with pytest.raises(ThermalRobotError, match=said), connected(1, place):
+            pass

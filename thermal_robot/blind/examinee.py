@@ -257,7 +257,7 @@ def _rows(listed: Listed, only: Sequence[str]) -> Iterator[Plain]:
     for name, labels in listed.campaigns:
         rows, _ = diagnosed(listed.folder(name), only, ())
         named = {"campaign": name, **dict(zip(listed.names, labels, strict=True))}
-        yield from ({**named, **row} for row in json.loads(rows))
+        yield from ({**named, **row} for row in rows)
 
 
 ANSWERS = {"comparison": comparison, "wear": followed, "fleet": fleet}

@@ -1,4 +1,4 @@
-"""One verb: campaigns of one robot go in, what they share and what changed comes out.
+"""Tests of equality between campaigns of one robot: what they share and what changed.
 
 Names. A wrong name fits one campaign, and takes another size in the next. So an effect keeps its name if two campaigns
 agree on most of it: the same size within half of the larger, which wear and re-adjustment leave alike.
@@ -37,37 +37,34 @@ from thermal_robot.campaign.settings import STILL
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import Effect
-from thermal_robot.effects import Parameter as Told
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare_joint import Change as Differs
 from thermal_robot.fleet.compare_joint import Joint, joint
 from thermal_robot.fleet.compare_sums import (
     Candidate,
     Known,
+    Ranges,
     Sums,
     candidates,
     is_model,
-    known,
     observed,
     poses,
     sums,
-    sums_of_model,
     told,
 )
 from thermal_robot.fleet.comparison import Change, Comparison, Parameter, Predicted, Status
 from thermal_robot.fleet.comparison import Effect as Compared
-from thermal_robot.inference import settings
+from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import equations_of, orthonormal
 from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
-from thermal_robot.prediction import sensitivity
+from thermal_robot.prediction import Spread, sensitivity
 from thermal_robot.robot import Robot, joint_range
 
 CALL = "compare()"
 _ORDER = ("shared", "changed", "contradicts", "not_needed", "not_compared", "absent")
-Owners = Sequence[tuple[int, int]]
 
 
 def compare(
@@ -127,15 +124,15 @@ def compare(
             CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more"
         )
     found: list[Diagnosis | Known] = []
-    for number, campaign in enumerate(campaigns):
-        told_on = _after(f"campaign {number + 1} of {len(campaigns)}: ", progress)
+    for number, campaign in enumerate(campaigns, 1):
+        told_on = _after(f"campaign {number} of {len(campaigns)}: ", progress)
         opened = _opened(campaign, effects)
         if not isinstance(opened, (Diagnosis, Known)):
             opened = diagnose(opened, only=only, without=without, effects=effects, progress=told_on)
         found.append(opened)
     called = _called(found, names)
     found = [replace(d, campaign=name) if isinstance(d, Known) else d for d, name in zip(found, called, strict=True)]
-    fits = _usable(found, called)
+    fits = [_usable(diagnosis, name) for diagnosis, name in zip(found, called, strict=True)]
     _require_same_robot([one.model.robot for one in found], called)
     with threadpool_limits(1):
         return _compared(found, fits, called, progress)
@@ -144,8 +141,8 @@ def compare(
 def _opened(given: Any, effects: Sequence[Effect]) -> Any:
     """Return a model as something to compare, and anything else as it is."""
     if is_model(given):
-        return known(CorrectedModel.load(given, effects), Path(given).name)
-    return known(given, given.robot.name) if isinstance(given, CorrectedModel) else given
+        return Known.of(CorrectedModel.load(given, effects), Path(given).name)
+    return Known.of(given, given.robot.name) if isinstance(given, CorrectedModel) else given
 
 
 def _after(stage: str, progress: Callable[[str], None]) -> Callable[[str], None]:
@@ -160,25 +157,17 @@ def _called(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[s
             f"{CALL}, names", "one is needed for each campaign", found=f"{len(names)}", expected=f"{len(found)}"
         )
     own = [str(name) for name in names] or [diagnosis.campaign for diagnosis in found]
-    if len(set(own)) == len(own):
-        return tuple(own)
-    return tuple(f"{name} ({k + 1})" if own.count(name) > 1 else name for k, name in enumerate(own))
+    return tuple(f"{name} ({k})" if own.count(name) > 1 else name for k, name in enumerate(own, 1))
 
 
-def _usable(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> list[Fit | Known]:
-    fits: list[Fit | Known] = []
-    for diagnosis, name in zip(found, names, strict=True):
-        if isinstance(diagnosis, Known):
-            fits.append(diagnosis)
-            continue
-        if not diagnosis.usable:
-            raise CampaignError(
-                name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable"
-            )
-        if diagnosis.fit is None:
-            raise CampaignError(name, "this diagnosis was made without its fit", expected="one made by diagnose()")
-        fits.append(diagnosis.fit)
-    return fits
+def _usable(diagnosis: Diagnosis | Known, name: str) -> Fit | Known:
+    if isinstance(diagnosis, Known):
+        return diagnosis
+    if not diagnosis.usable:
+        raise CampaignError(name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable")
+    if diagnosis.fit is None:
+        raise CampaignError(name, "this diagnosis was made without its fit", expected="one made by diagnose()")
+    return diagnosis.fit
 
 
 def _compared(
@@ -188,191 +177,152 @@ def _compared(
     progress: Callable[[str], None],
 ) -> Comparison:
     progress("what each campaign says")
-    listed = candidates(found, fits, names)
-    every = [(effect, k) for effect, item in enumerate(listed) for k in range(len(item.told))]
-    said = [_said(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
-    kept = told(said)
-    owners, said = [every[k] for k in kept], [one.some(kept) for one in said]
+    listed: Sequence[Candidate] = candidates(found, fits, names)
+    said = [sums(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
+    listed, said, not_told = _kept(listed, said)
     progress("what is shared, what differs")
-    together = joint(listed, owners, said)
+    together = joint(listed, said)
     progress("predictions")
-    effects = sorted(_effects(listed, owners, together, said, names), key=lambda e: (_ORDER.index(e.status), e.name))
+    effects = sorted(_effects(listed, together, said, names), key=lambda e: (_ORDER.index(e.status), e.name))
+    pairs = combinations(zip(found, names, strict=True), 2)
     return Comparison(
         campaigns=names,
         samples=tuple(d.samples for d in found),
-        robot=found[0].robot,
-        tool_frame=found[0].tool_frame,
+        robot=found[0].model.robot.name,
+        tool_frame=found[0].model.robot.tool_frame,
         effects=tuple(effects),
-        changes=_changes(listed, owners, together, names),
-        predicted=_predicted(found, names),
-        not_told=tuple(
-            f"{listed[effect].name}: {listed[effect].told[k].name}"
-            for number, (effect, k) in enumerate(every)
-            if number not in set(kept)
-        ),
+        changes=_changes(listed, together, names),
+        predicted=tuple(_predicted(a, b, (first, second)) for (a, first), (b, second) in pairs),
+        not_told=not_told,
         looked_at=together.looked_at,
         diagnoses=tuple(found),
     )
 
 
-def _said(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate], number: int) -> Sums:
-    if isinstance(found, Diagnosis) and isinstance(fit, Fit):
-        return sums(found, fit, listed, number)
-    assert isinstance(found, Known)
-    return sums_of_model(found, listed, number)
+def _kept(listed: Sequence[Candidate], said: Sequence[Sums]) -> tuple[Sequence[Candidate], list[Sums], tuple[str, ...]]:
+    """Keep the parameters that the campaigns tell, numbered; return the names of the others, too."""
+    kept = told(said)
+    start, left, result = 0, [], []
+    for item in listed:
+        own = [k for k in range(len(item.told)) if start + k in kept]
+        left += [f"{item.name}: {p.name}" for k, p in enumerate(item.told) if k not in own]
+        at = tuple(kept.index(start + k) for k in own)
+        result.append(replace(item, told=tuple(item.told[k] for k in own), sizes=item.sizes[own], at=at))
+        start += len(item.told)
+    return result, [one.some(kept) for one in said], tuple(left)
 
 
 def _effects(
-    listed: Sequence[Candidate], owners: Owners, together: Joint, said: Sequence[Sums], names: Sequence[str]
+    listed: Sequence[Candidate], together: Joint, said: Sequence[Sums], names: Sequence[str]
 ) -> list[Compared]:
     """Return what is compared of each effect, beside those at work or named."""
-    status = {n: _judged(n, item, owners, together, said, names) for n, item in enumerate(listed)}
-    beside = {n for n in status if status[n][0] != "absent"}
+    status = [_judged(n, item, together, said, names) for n, item in enumerate(listed)]
     result = []
     for number, item in enumerate(listed):
-        kept = [k for k, (effect, _) in enumerate(owners) if effect in beside | {number}]
-        some, own = [one.some(kept) for one in said], [k for k, at in enumerate(kept) if owners[at][0] == number]
-        which = [owners[kept[k]][1] for k in own]
+        beside = [i for i, (word, _) in zip(listed, status, strict=True) if word != "absent" or i is item]
+        kept = sorted(k for i in beside for k in i.at)
+        some, own = [one.some(kept) for one in said], [kept.index(k) for k in item.at]
         chi2, degrees, p_value = _equal(some, own) if own else (0.0, 0, 1.0)
-        one_by_one = _parameters([item.told[p] for p in which], item.sizes[which], some, own, names)
-        named = tuple(name for name, yes in zip(names, item.named, strict=True) if yes)
+        word, reason = status[number]
         result.append(
             Compared(
-                item.name,
-                item.title,
-                *status[number],
-                together.probability[number],
-                named,
-                chi2,
-                degrees,
-                p_value,
-                one_by_one if number in beside else (),
+                name=item.name,
+                title=item.title,
+                status=word,
+                reason=reason,
+                probability=together.probability[number],
+                named=tuple(name for name, yes in zip(names, item.named, strict=True) if yes),
+                chi2=chi2,
+                degrees=degrees,
+                p_value=p_value,
+                parameters=() if word == "absent" else _parameters(item, some, own, names),
             )
         )
     return result
 
 
-def _changes(listed: Sequence[Candidate], owners: Owners, together: Joint, names: Sequence[str]) -> tuple[Change, ...]:
+def _changes(listed: Sequence[Candidate], together: Joint, names: Sequence[str]) -> tuple[Change, ...]:
     """Return what differs: parts of one effect at one place are one change."""
-    result = []
     by_place = sorted(together.changes, key=lambda c: (c.part.effect, c.part.place))
-    for (effect, (kind, place)), some in groupby(by_place, key=lambda c: (c.part.effect, c.part.place)):
-        differing: list[Differs] = list(some)
-        item, groups = listed[effect], _groups([c.part.where for c in differing], len(names))
-        own = sorted({k for c in differing for k in c.part.parameters})
-        told_here, best = [item.told[owners[k][1]] for k in own], max(differing, key=lambda c: c.chi2)
-        single = together.values[:, own[0]] * item.sizes[owners[own[0]][1]] if len(own) == 1 else np.zeros(0)
-        result.append(
-            Change(
-                item.name,
-                item.title,
-                kind,
-                place,
-                tuple(p.name for p in told_here),
-                tuple(tuple(names[c] for c in group) for group in groups),
-                _since(groups, names),
-                tuple(single.tolist()),
-                told_here[0].unit if len(own) == 1 else "",
-                sum(c.chi2 for c in differing),
-                sum(c.degrees for c in differing),
-                min(1.0, best.p_value * together.looked_at),
-                best.probability,
-            )
-        )
-    return tuple(sorted(result, key=lambda c: -c.chi2))
+    found = (list(some) for _, some in groupby(by_place, key=lambda c: (c.part.effect, c.part.place)))
+    changes = (_change(listed[some[0].part.effect], some, together, names) for some in found)
+    return tuple(sorted(changes, key=lambda c: -c.chi2))
 
 
-def _groups(where: Sequence[Sequence[int]], campaigns: int) -> list[list[int]]:
-    """Return the campaigns in groups that have one value."""
-    kinds: dict[Any, list[int]] = {}
-    for c in range(campaigns):
-        kinds.setdefault(tuple(c in own for own in where), []).append(c)
-    return list(kinds.values())
-
-
-def _since(groups: Sequence[Sequence[int]], names: Sequence[str]) -> str:
-    """Return the campaign from which on there is a new value; empty where groups are not one before and one after."""
-    if len(groups) != 2 or max(groups[0]) > min(groups[1]):
-        return ""
-    return names[min(groups[1])]
+def _change(item: Candidate, some: Sequence[Differs], together: Joint, names: Sequence[str]) -> Change:
+    kinds: dict[Any, list[int]] = {}  # campaigns in groups that have one value
+    for c in range(len(names)):
+        kinds.setdefault(tuple(c in differs.part.where for differs in some), []).append(c)
+    groups = list(kinds.values())
+    steps = len(groups) == 2 and max(groups[0]) < min(groups[1])
+    own = [item.at.index(k) for k in sorted({k for differs in some for k in differs.part.parameters})]
+    single = together.values[:, item.at[own[0]]] * item.sizes[own[0]] if len(own) == 1 else np.zeros(0)
+    best = max(some, key=lambda differs: differs.chi2)
+    kind, place = best.part.place
+    return Change(
+        effect=item.name,
+        title=item.title,
+        kind=kind,
+        place=place,
+        parameters=tuple(item.told[k].name for k in own),
+        groups=tuple(tuple(names[c] for c in group) for group in groups),
+        since=names[min(groups[1])] if steps else "",
+        values=tuple(single.tolist()),
+        unit=item.told[own[0]].unit if len(own) == 1 else "",
+        chi2=sum(differs.chi2 for differs in some),
+        degrees=sum(differs.degrees for differs in some),
+        p_value=min(1.0, best.p_value * together.looked_at),
+        probability=best.probability,
+    )
 
 
 def _judged(
-    number: int,
-    item: Candidate,
-    owners: Sequence[tuple[int, int]],
-    found: Joint,
-    said: Sequence[Sums],
-    names: Sequence[str],
+    number: int, item: Candidate, found: Joint, said: Sequence[Sums], names: Sequence[str]
 ) -> tuple[Status, str]:
     """Return the status of an effect, and the reason where it loses its name or is not compared."""
-    own = [k for k, (effect, _) in enumerate(owners) if effect == number]
-    tell = [c for c, one in enumerate(said) if np.diag(one.matrix)[own].max(initial=0.0) > settings.INFORMATION_FLOOR]
+    tell = [c for c, one in enumerate(said) if one.tells(item.at)]
+    at_work = any(part.effect == number for part in found.parts)
+    if not any(item.named) and (len(tell) < 2 or not at_work):
+        return "absent", ""
     if len(tell) < 2:
-        if not any(item.named):
-            return "absent", ""
-        return (
-            "not_compared",
-            f"{names[tell[0]]} alone can tell it" if tell else "no campaign tells it beside the frames",
-        )
-    if not any(part.effect == number for part in found.parts):
-        if not any(item.named):
-            return "absent", ""
+        alone = f"{names[tell[0]]} alone can tell it" if tell else "no campaign tells it beside the frames"
+        return "not_compared", alone
+    if not at_work:
         return "not_needed", "the campaigns together do not need it"
-    changed = any(change.part.effect == number for change in found.changes)
-    if not changed:
+    if not any(change.part.effect == number for change in found.changes):
         return "shared", ""
-    sizes = _strengths(own, item, owners, found, said, tell)
-    if _agreed(sizes) >= compare_settings.MOST:
-        return "changed", ""
-    needed = [c for c in tell if max(size[c] for size, _ in sizes) > 0.0]
-    if len(tell) == 2 and len(needed) == 1:
-        return "changed", ""  # a fault that began or was mended: two campaigns cannot say more
-    return "contradicts", _why([names[c] for c in needed], [names[c] for c in tell if c not in needed])
+    whole, agreed, needed = 0.0, 0.0, set()
+    for own in item.places.values():
+        metric = np.sum([said[c].some(own).matrix for c in tell], axis=0)
+        values = {c: found.values[c, own] for c in tell}
+        size = {c: _length(value, metric) for c, value in values.items()}
+        needed |= {c for c in tell if size[c] > 0.0}
+        whole += max(size.values()) ** 2
+        agreed += max(size.values()) ** 2 * _agree(values, size, metric)
+    if whole == 0.0 or agreed / whole >= settings.MOST or (len(tell) == 2 and len(needed) == 1):
+        return "changed", ""  # of two campaigns one alone needs it: a fault that began or was mended
+    return "contradicts", _why([names[c] for c in sorted(needed)], [names[c] for c in tell if c not in needed])
 
 
-def _strengths(
-    own: Sequence[int],
-    item: Candidate,
-    owners: Sequence[tuple[int, int]],
-    found: Joint,
-    said: Sequence[Sums],
-    tell: Sequence[int],
-) -> list[tuple[dict[int, float], dict[tuple[int, int], float]]]:
-    """Return for each place the size in each campaign, and that of the difference between any two, in deviations."""
-    result = []
-    for place in dict.fromkeys((p.kind, p.place) for p in item.told):
-        inside = [k for k in own if (item.told[owners[k][1]].kind, item.told[owners[k][1]].place) == place]
-        metric = np.sum([said[c].matrix[np.ix_(inside, inside)] for c in tell], axis=0) if inside else np.zeros((0, 0))
-        values = {c: found.values[c, inside] for c in tell}
-        size = {c: _length(values[c], metric) for c in tell}
-        apart = {(a, b): _length(values[a] - values[b], metric) for a, b in combinations(tell, 2)}
-        result.append((size, apart))
-    return result
+def _agree(values: dict[int, Array], size: dict[int, float], metric: Array) -> bool:
+    """Whether any two campaigns need an effect at one place in the same size, or in sizes that are near."""
+    for a, b in combinations(values, 2):
+        left = _length(values[a] - values[b], metric)
+        if size[a] > 0.0 if left == 0.0 else left <= settings.AGREE * max(size[a], size[b]):
+            return True
+    return False
 
 
 def _length(vector: Array, metric: Array) -> float:
     return float(np.sqrt(max(float(vector @ metric @ vector), 0.0)))
 
 
-def _agreed(sizes: Sequence[tuple[dict[int, float], dict[tuple[int, int], float]]]) -> float:
-    """Return the share of the strength on which two campaigns agree."""
-    whole, agreed = 0.0, 0.0
-    for size, apart in sizes:
-        strength = max(size.values()) ** 2
-        alike = any(0.0 < left <= compare_settings.AGREE * max(size[a], size[b]) for (a, b), left in apart.items())
-        same = any(left == 0.0 and size[a] > 0.0 for (a, _), left in apart.items())
-        whole, agreed = whole + strength, agreed + strength * (alike or same)
-    return agreed / whole if whole else 1.0
-
-
 def _why(needed: Sequence[str], others: Sequence[str]) -> str:
+    excluded = f"and {_listed(others)} {'excludes' if len(others) == 1 else 'exclude'} it" if others else ""
     if len(needed) == 1:
-        verb = "excludes" if len(others) == 1 else "exclude"
-        return f"{needed[0]} alone needs it, and {_listed(others)} {verb} it"
+        return f"{needed[0]} alone needs it, {excluded}"
     if others:
-        verb = "excludes" if len(others) == 1 else "exclude"
-        return f"{_listed(needed)} need it in different sizes, and {_listed(others)} {verb} it"
+        return f"{_listed(needed)} need it in different sizes, {excluded}"
     return f"{_listed(needed)} each need another size, with none in common"
 
 
@@ -380,63 +330,58 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _parameters(
-    told: Sequence[Told], sizes: Array, said: Sequence[Sums], numbers: Sequence[int], names: Sequence[str]
-) -> tuple[Parameter, ...]:
-    """Return parameters as each campaign alone has them; ``numbers`` says where they stand in ``said``."""
-    values, stds = np.full((len(said), len(told)), np.nan), np.full((len(said), len(told)), np.nan)
+def _parameters(item: Candidate, said: Sequence[Sums], own: list[int], names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Return an effect's parameters as each campaign alone has them; ``own`` says where they stand in ``said``."""
+    values, stds = np.full((2, len(said), len(own)), np.nan)
     for c, one in enumerate(said):
         covariance, seen = one.inverse
-        spread = np.sqrt(np.maximum(np.diag(covariance)[list(numbers)], 0.0))
-        known = (seen[list(numbers)] > compare_settings.SEEN) & (spread < compare_settings.TOLD)
-        values[c, known] = (covariance @ one.vector)[list(numbers)][known] * sizes[known]
-        stds[c, known] = spread[known] * sizes[known]
-    return tuple(_parameter(p, values[:, k], stds[:, k], names) for k, p in enumerate(told))
+        spread = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
+        known = (seen[own] > settings.SEEN) & (spread < settings.TOLD)
+        values[c, known] = ((covariance @ one.vector)[own] * item.sizes)[known]
+        stds[c, known] = (spread * item.sizes)[known]
+    found = []
+    for k, p in enumerate(item.told):
+        plain = [tuple(None if np.isnan(v) else float(v) for v in column[:, k]) for column in (values, stds)]
+        tests = _differ(values[:, k], stds[:, k], names)
+        found.append(Parameter(p.name, p.kind, p.place, p.unit, plain[0], plain[1], **tests))
+    return tuple(found)
 
 
-def _parameter(told: Told, values: Array, stds: Array, names: Sequence[str]) -> Parameter:
+def _differ(values: Array, stds: Array, names: Sequence[str]) -> dict[str, Any]:
+    """Compare one parameter between campaigns: the two that differ most, and the chi-square of one value in all."""
     known = np.flatnonzero(np.isfinite(values)).tolist()
-    plain = [tuple(None if np.isnan(v) else float(v) for v in column) for column in (values, stds)]
-    own = Parameter(told.name, told.kind, told.place, told.unit, plain[0], plain[1])
     if len(known) < 2:
-        return own
-    pairs = list(combinations(known, 2))
-    spread = [float(np.hypot(stds[a], stds[b])) for a, b in pairs]
-    most = max(range(len(pairs)), key=lambda k: abs(values[pairs[k][1]] - values[pairs[k][0]]) / spread[k])
-    a, b = pairs[most]
+        return {}
+    spread = {(a, b): float(np.hypot(stds[a], stds[b])) for a, b in combinations(known, 2)}
+    a, b = max(spread, key=lambda pair: abs(values[pair[1]] - values[pair[0]]) / spread[pair])
     weight = stds[known] ** -2.0
     mean = float(weight @ values[known] / weight.sum())
     chi2, degrees = float(weight @ (values[known] - mean) ** 2), len(known) - 1
-    return Parameter(
-        told.name,
-        told.kind,
-        told.place,
-        told.unit,
-        plain[0],
-        plain[1],
-        (names[a], names[b]),
-        float(values[b] - values[a]),
-        spread[most],
-        chi2,
-        degrees,
-        float(chdtrc(degrees, chi2)),
-    )
+    return {
+        "between": (names[a], names[b]),
+        "difference": float(values[b] - values[a]),
+        "std": spread[a, b],
+        "chi2": chi2,
+        "degrees": degrees,
+        "p_value": float(chdtrc(degrees, chi2)),
+    }
 
 
-def _equal(said: Sequence[Sums], numbers: Sequence[int]) -> tuple[float, int, float]:
-    """Return χ², degrees of freedom and probability by chance of some parameters being the same in all campaigns."""
-    own = list(numbers)
+def _equal(said: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]:
+    """Return χ², degrees of freedom and p value of some parameters being the same in all campaigns."""
     others = [k for k in range(len(said[0].vector)) if k not in set(own)]
-    chi2, degrees = 0.0, 0
+    chi2, degrees, longest = 0.0, 0, 0.0
     together, score = np.zeros((len(own),) * 2), np.zeros(len(own))
     for one in said:
         inverse, _ = one.some(others).inverse
         cross = one.matrix[np.ix_(own, others)] @ inverse
         left = one.matrix[np.ix_(own, own)] - cross @ one.matrix[np.ix_(others, own)]
-        what = one.vector[own] - cross @ one.vector[others]
-        quadratic, rank = _quadratic(left, what, float(np.diag(one.matrix)[own].max(initial=0.0)))
-        chi2, degrees, together, score = chi2 + quadratic, degrees + rank, together + left, score + what
-    quadratic, rank = _quadratic(together, score, float(max(np.diag(one.matrix)[own].max(initial=0.0) for one in said)))
+        what = one.vector[list(own)] - cross @ one.vector[others]
+        length = float(np.diag(one.matrix)[list(own)].max(initial=0.0))
+        quadratic, rank = _quadratic(left, what, length)
+        chi2, degrees, longest = chi2 + quadratic, degrees + rank, max(longest, length)
+        together, score = together + left, score + what
+    quadratic, rank = _quadratic(together, score, longest)
     chi2, degrees = max(chi2 - quadratic, 0.0), degrees - rank
     return chi2, degrees, float(chdtrc(degrees, chi2)) if degrees > 0 else 1.0
 
@@ -444,57 +389,53 @@ def _equal(said: Sequence[Sums], numbers: Sequence[int]) -> tuple[float, int, fl
 def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int]:
     """Return vᵀ M⁺ v and the rank of M; what is left of columns of this square by rounding is none."""
     value, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * longest)
+    seen = value > max(inference.INFORMATION_FLOOR, inference.PROJECTED_FLOOR * longest)
     along = axes[:, seen].T @ vector
     return float((along**2 / value[seen]).sum()), int(seen.sum())
 
 
-def _predicted(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[Predicted, ...]:
-    """Cross-validate the models of every two campaigns."""
-    pairs = combinations(range(len(found)), 2)
-    return tuple(_pair(found[a], found[b], (names[a], names[b])) for a, b in pairs)
-
-
-def _pair(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) -> Predicted:
+def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) -> Predicted:
+    """Cross-validate the models of two campaigns."""
     nothing = Predicted(names, 0, 0.0, 0.0, 0.0, True)
     if a.model.simulated or b.model.simulated:
         return replace(nothing, note="predictions of a simulator stand in the place of the model's own")
-    if a.model.spread is None or b.model.spread is None:
+    spreads = [spread for spread in (a.model.spread, b.model.spread) if spread is not None]
+    if len(spreads) < 2:
         return replace(nothing, note="a model does not state how far its predictions may be off")
-    common = _common(a.model, b.model)
-    low, high = np.array([common[name] for name in a.model.robot.joint_names]).T
+    joints = a.model.robot.joint_names
+    common = _common(joints, *(spread.ranges for spread in spreads))
+    low, high = np.array([common[name] for name in joints]).T
     rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, Known)]
     q = np.concatenate(rows) if rows else np.zeros((0, len(low)))
     if not rows and (low <= high).all():  # neither has its rows
-        q = poses(a.model.robot, common)
+        q = poses(a.model, common)
     q = q[((q >= low - STILL) & (q <= high + STILL)).all(axis=1)]
-    if len(q) < compare_settings.TRIED:
+    if len(q) < settings.TRIED:
         return replace(nothing, note="the two did not measure a common part of the workspace")
     at = [observed(found.model, q, common) for found in (a, b)]
     gauge = _gauge(a.model, b.model, at[0])
     gap = _left(_points(a.model, at[0]) - _points(b.model, at[1]), gauge)
-    variance = sum(_variance(found.model, one, gauge) for found, one in zip((a, b), at, strict=True))
+    variance = sum(_variance(d.model, s, one, gauge) for d, s, one in zip((a, b), spreads, at, strict=True))
     distance, stated = np.sqrt((gap**2).sum(axis=1)), np.sqrt(np.asarray(variance).sum(axis=1))
     rms, deviation = float(np.sqrt((distance**2).mean())), float(np.sqrt((stated**2).mean()))
-    far = float((distance > compare_settings.TWICE * stated).mean())
-    return Predicted(names, len(q), rms, deviation, far, rms <= compare_settings.TWICE * deviation)
+    far = float((distance > settings.TWICE * stated).mean())
+    return Predicted(names, len(q), rms, deviation, far, rms <= settings.TWICE * deviation)
 
 
 def _some(q: Array) -> Array:
     """Return rows spread evenly over all."""
-    count = min(len(q), compare_settings.POSES)
+    count = min(len(q), settings.POSES)
     return np.asarray(q[np.linspace(0, len(q) - 1, count).astype(int)])
 
 
-def _common(a: CorrectedModel, b: CorrectedModel) -> dict[str, tuple[float, float]]:
+def _common(joints: Sequence[str], first: Ranges, second: Ranges) -> Ranges:
     """Return the range that both measured of each joint and column; where one alone has the column, its own."""
-    first, second = (model.spread.ranges if model.spread else {} for model in (a, b))
     found = {}
-    for name in (*a.robot.joint_names, *dict.fromkeys((*first, *second))):
-        ends = [ranges[name] for ranges in (first, second) if name in ranges]
-        low, high = max(low for low, _ in ends), min(high for _, high in ends)
-        held = name in a.robot.joint_names and high < low <= high + STILL
-        found[name] = (high, low) if held else (low, high)
+    for name in dict.fromkeys((*joints, *first, *second)):
+        low, high = np.array([ranges[name] for ranges in (first, second) if name in ranges]).T
+        ends = float(low.max()), float(high.min())
+        held = name in joints and ends[1] < ends[0] <= ends[1] + STILL
+        found[name] = ends[::-1] if held else ends
     return found
 
 
@@ -507,15 +448,12 @@ def _points(model: CorrectedModel, at: Observations) -> Array:
 
 def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
     """(3 N, g) orthonormal columns of what aligning the unknown frames of either does."""
-    parts = []
+    columns = np.zeros((len(at.q), 3, 0))
     if not (a.settings.base_known and b.settings.base_known):
-        parts.append(at.base_sensitivity[:, :3, :])
+        columns = np.concatenate([columns, at.base_sensitivity[:, :3, :]], axis=2)
     if not (a.settings.tool_known and b.settings.tool_known):
-        parts.append(at.tool_sensitivity[:, :3, :3])
-    if not parts:
-        return np.zeros((3 * len(at.q), 0))
-    columns = np.concatenate(parts, axis=2)
-    return orthonormal(equations_of(columns))
+        columns = np.concatenate([columns, at.tool_sensitivity[:, :3, :3]], axis=2)
+    return orthonormal(equations_of(columns)) if columns.shape[2] else equations_of(columns)
 
 
 def _left(values: Array, gauge: Array) -> Array:
@@ -524,35 +462,27 @@ def _left(values: Array, gauge: Array) -> Array:
     return np.asarray(flat - gauge @ (gauge.T @ flat)).reshape(values.shape)
 
 
-def _variance(model: CorrectedModel, at: Observations, gauge: Array) -> Array:
+def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Array) -> Array:
     """(N, 3) stated variance per axis of the prediction, root frame, m²."""
-    spread = model.spread
-    assert spread is not None
     turned = model.frames.base[:3, :3]
     moved = sensitivity(at, [effect for effect, _ in model.effects])
     moved = _left(np.einsum("ji,njk->nik", turned, moved), gauge)
     told = ((moved @ spread.covariance) * moved).sum(axis=2)
-    beyond = (turned.T**2) @ spread.beyond**2
-    return np.asarray(np.maximum(told, 0.0) + beyond)
+    return np.asarray(np.maximum(told, 0.0) + (turned.T**2) @ spread.beyond**2)
 
 
 def _require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
     """Refuse to compare campaigns whose joints differ, or whose same joints put the tool frame elsewhere."""
-    first = robots[0]
-    low, high = (
-        np.where(np.isfinite(end), end, sign) for end, sign in zip(joint_range(first), (-1.0, 1.0), strict=True)
-    )
-    q = np.random.default_rng(0).uniform(low, high, (compare_settings.TRIED, first.n))
+    first, (low, high) = robots[0], joint_range(robots[0])
+    low, high = np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
+    q = np.random.default_rng(0).uniform(low, high, (settings.TRIED, first.n))
     for robot, name in zip(robots[1:], names[1:], strict=True):
         if robot.joint_names != first.joint_names:
-            raise CampaignError(
-                name,
-                f"is of another robot than {names[0]}: their joints differ",
-                found=", ".join(robot.joint_names),
-                expected=", ".join(first.joint_names),
-            )
+            problem = f"is of another robot than {names[0]}: their joints differ"
+            joints = ", ".join(robot.joint_names), ", ".join(first.joint_names)
+            raise CampaignError(name, problem, found=joints[0], expected=joints[1])
         apart = float(np.abs(robot.forward(q) - first.forward(q)).max())
-        if apart > compare_settings.SAME_PLACE:
+        if apart > settings.SAME_PLACE:
             raise CampaignError(
                 name,
                 f"is described by another nominal model than {names[0]}: the same joint positions put "

@@ -1,25 +1,21 @@
-"""What each campaign says of the parameters that are compared: its sums of products, frames projected out.
+"""Normal equations of each campaign: what it says of the parameters that are compared, its frames projected out.
 
 With y the gap, X the columns of all parameters and F those of the unknown frames, whitened by the campaign's own noise,
 
     G = Xᵀ(1 − F F⁺)X,   b = Xᵀ(1 − F F⁺)y.
 
-What an unknown frame takes up, such as the first joint's zero, is not in G: campaigns are compared without it. Where
-what remains is no noise, rows say less than they seem to: along each axis of G the information is divided by as much as
-the variance of the parameters exceeds what independent rows would give (:mod:`thermal_robot.diagnosis.uncertainty`).
+What an unknown frame takes up, such as the first joint's zero, is not in G. Where what remains is no noise, the
+information along each axis of G is divided by the variance inflation of :mod:`thermal_robot.diagnosis.uncertainty`.
 
-A model file may stand in the place of a campaign. It holds the effects that were found with their values, the
-covariance C of frames and parameters, the deviation π that each parameter was expected to have, and the ranges that
-were measured. The frames marginalised, the rows alone say of its parameters θ, by Bayes' theorem for a linear model
-with normal errors,
+A model file may stand in the place of a campaign. It holds the values θ of the effects that were found, the covariance
+C of frames and parameters, the deviation π that was expected of each parameter, and the ranges that were measured. The
+rows alone say of θ, by Bayes' theorem for a linear model with normal errors,
 
     G = C⁻¹ − π⁻²,   b = C⁻¹ θ.
 
-Of all that the model does not hold the file says nothing: neither that it is there, nor that it is not.
-
-Its parameters are those of its effects in its own setting and places. They become those that are compared by
-what they do to the target: X_M = X A + F B over poses within the measured ranges, F the unknown frames, so that
-θ = A θ_M. An effect that does what the compared parameters cannot do stays free: it is marginalised with the frames.
+Its parameters θ_M become those that are compared by what they do to the target: X_M = X A + F B over poses within the
+measured ranges, so that θ = A θ_M. An effect that does what the compared parameters cannot do is marginalised with the
+frames. Of all that a model does not hold it says nothing.
 """
 
 from __future__ import annotations
@@ -43,8 +39,8 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_words import called
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.files import is_file
-from thermal_robot.fleet import compare_settings
-from thermal_robot.inference import settings
+from thermal_robot.fleet import settings
+from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block, block, frame_columns, moved_by
 from thermal_robot.inference.fit import Fit
@@ -52,60 +48,47 @@ from thermal_robot.inference.inside import distinct
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Observations, observe
 from thermal_robot.prediction import Spread
-from thermal_robot.robot import Robot
 
 Ranges = Mapping[str, tuple[float, float]]
-
-_SUFFIX = ".json"
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A model file; what a comparison reads of a diagnosis and of its fit.
+    """A model file in the place of a diagnosis and of its fit, under the name ``campaign``.
 
-    Attributes
-    ----------
-    campaign
-        What it is called.
-    model
-        The model.
-    q
-        (N, n) poses within the ranges that were measured: the rows themselves are gone.
-    corrected
-        Observations of the corrected model there.
-    variants
-        None: which other effects were compared the file does not say.
-    samples
-        None.
+    ``corrected`` are observations of the corrected model at poses within the ranges that were measured, for the rows
+    are gone. There are neither samples nor variants: which other effects were compared the file does not say.
     """
 
     campaign: str
     model: CorrectedModel
-    q: Array
+    spread: Spread
     corrected: Observations
     variants: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
     samples: int = 0
 
-    @property
-    def spread(self) -> Spread:
-        """How far its predictions may be off."""
-        assert self.model.spread is not None  # known() refuses others
-        return self.model.spread
+    @classmethod
+    def of(cls, model: CorrectedModel, name: str) -> Known:
+        """Return a model under a name.
+
+        Raises
+        ------
+        CampaignError
+            If it rests on a simulator, or does not say how sure it is.
+        """
+        if model.simulated:
+            problem = "this model corrects a simulator's predictions, which it does not hold"
+            raise CampaignError(name, problem, expected="its campaign")
+        spread = model.spread
+        if spread is None or spread.prior is None or not {*model.robot.joint_names} <= {*spread.ranges}:
+            problem = "this model does not say how sure it is: it was written by an older program"
+            raise CampaignError(name, problem, expected="its campaign, or a model that `diagnose --model` writes today")
+        return cls(name, model, spread, observed(model, poses(model, spread.ranges), spread.ranges))
 
     @property
     def effects(self) -> tuple[tuple[Effect, Array], ...]:
         """Its effects with their values, SI."""
         return self.model.effects
-
-    @property
-    def robot(self) -> str:
-        """Name of the robot."""
-        return self.model.robot.name
-
-    @property
-    def tool_frame(self) -> str:
-        """Link that carries the target."""
-        return self.model.robot.tool_frame
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -119,60 +102,30 @@ class Known:
         return f"A model file; it holds {held or 'no effect'}."
 
     def odds(self, name: str) -> float:
-        """Odds of an effect, of which the file says no more than that it was found: those of a coin."""
+        """Even odds of an effect: the file says no more than that it was found."""
         return 1.0
 
     def probability(self, name: str) -> float:
-        """Return whether it holds an effect."""
+        """Whether it holds an effect, 0 or 1."""
         return float(name in self.verdict)
 
 
 def is_model(path: object) -> bool:
     """Whether this is the path of a file that may be a model."""
-    return isinstance(path, (str, Path)) and Path(path).suffix.lower() == _SUFFIX and is_file(Path(path))
+    return isinstance(path, (str, Path)) and Path(path).suffix.lower() == ".json" and is_file(Path(path))
 
 
-def known(model: CorrectedModel, name: str) -> Known:
-    """Return a model as something to compare.
-
-    Parameters
-    ----------
-    model
-        From a file.
-    name
-        What to call it.
-
-    Raises
-    ------
-    CampaignError
-        If it rests on a simulator, or does not say how sure it is.
-    """
-    if model.simulated:
-        raise CampaignError(
-            name, "this model corrects a simulator's predictions, which it does not hold", expected="its campaign"
-        )
-    spread = model.spread
-    if spread is None or spread.prior is None or any(joint not in spread.ranges for joint in model.robot.joint_names):
-        raise CampaignError(
-            name,
-            "this model does not say how sure it is: it was written by an older program",
-            expected="its campaign, or a model that `diagnose --model` writes today",
-        )
-    q = poses(model.robot, spread.ranges)
-    return Known(name, model, q, observed(model, q, spread.ranges))
+def poses(model: CorrectedModel, ranges: Ranges) -> Array:
+    """(N, n) joint positions, uniform over the ranges that were measured, rad or m."""
+    low, high = np.array([ranges[name] for name in model.robot.joint_names]).T
+    return np.asarray(np.random.default_rng(0).uniform(low, high, (settings.POSES, model.robot.n)))
 
 
-def poses(robot: Robot, ranges: Ranges) -> Array:
-    """(N, n) joint positions spread evenly over the ranges that were measured."""
-    low, high = (np.array([ranges[name][end] for name in robot.joint_names]) for end in (0, 1))
-    return np.asarray(np.random.default_rng(0).uniform(low, high, (compare_settings.POSES, robot.n)))
-
-
-def observed(model: CorrectedModel, q: Array, common: Ranges) -> Observations:
-    """Return the corrected model at (N, n) poses, every condition going once through its range."""
+def observed(model: CorrectedModel, q: Array, ranges: Ranges) -> Observations:
+    """Observations of the corrected model at (N, n) poses, every condition going once through its range."""
     covariates = {}
     for k, name in enumerate(model.needs):
-        low, high = common.get(name, (0.0, 0.0))
+        low, high = ranges.get(name, (0.0, 0.0))
         if high < low:  # none in common: halfway between the two
             low = high = 0.5 * (low + high)
         # a golden step for each, so that conditions do not run together
@@ -186,22 +139,12 @@ def observed(model: CorrectedModel, q: Array, common: Ranges) -> Observations:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that is compared, in all its places.
+    """An effect that is compared, in all its places and in one setting.
 
-    Attributes
-    ----------
-    name, title
-        Of the effect; a law that was found in one campaign has that campaign's name with it.
-    effect
-        The effect in one setting.
-    told
-        Its P parameters without responses, as a comparison tells them.
-    sizes
-        (P,) their expected sizes.
-    parameters
-        Per campaign: the P parameters with their responses there; empty where the campaign lacks what it needs.
-    named
-        Per campaign: whether its diagnosis names the effect.
+    ``told`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
+    among all that are compared. Of each campaign ``parameters`` are the same with their responses there, empty where it
+    lacks what they need; ``named`` tells whether its diagnosis names the effect. The name and title of a law that was
+    found in one campaign have that campaign's name with it.
     """
 
     name: str
@@ -211,11 +154,15 @@ class Candidate:
     sizes: Array
     parameters: tuple[tuple[Parameter, ...], ...]
     named: tuple[bool, ...]
+    at: tuple[int, ...] = ()
 
     @property
-    def law(self) -> bool:
-        """Whether nobody wrote it down before it was found."""
-        return isinstance(self.effect, Discovered)
+    def places(self) -> dict[tuple[str, str], list[int]]:
+        """Numbers of the compared parameters by kind and name of their place."""
+        found: dict[tuple[str, str], list[int]] = {}
+        for number, parameter in zip(self.at, self.told, strict=True):
+            found.setdefault((parameter.kind, parameter.place), []).append(number)
+        return found
 
 
 def candidates(
@@ -223,38 +170,25 @@ def candidates(
 ) -> tuple[Candidate, ...]:
     """List the effects that are compared, those that can be set anew first.
 
-    Every effect of a diagnosis is; every one that is probable enough in any of them; and those that somebody could set
-    anew between campaigns, such as a joint's zero.
-
-    Parameters
-    ----------
-    found, fits
-        The diagnoses, and the fits behind them; a model file is both.
-    names
-        What the campaigns are called.
+    Every effect of a diagnosis, every one that is probable enough in any of them, and those that somebody could set
+    anew between campaigns, such as a joint's zero. A model file is both a diagnosis (``found``) and its fit.
     """
-    listed = []
+    listed: list[Candidate] = []
     for key, effect in _settings(fits, names):
-        parameters = tuple(_parameters(effect, fit) for fit in fits)
+        law = isinstance(effect, Discovered)
+        if law:  # a diagnosis names a law only as it is
+            named = tuple(any(own == effect for own, _ in fit.effects) for fit in fits)
+        else:
+            named = tuple(effect.name in diagnosis.verdict for diagnosis in found)
+        parameters = [_parameters(effect, fit) for fit in fits]
         known = next((c for c, own in enumerate(parameters) if own), None)
-        if known is None:
+        if known is None or (law and not any(named)):
             continue
         told = tuple(replace(p, responses=()) for p in parameters[known])
         kept = tuple(own if [p.name for p in own] == [p.name for p in told] else () for own in parameters)
-        law = isinstance(effect, Discovered)
-        named = tuple(_names(effect, diagnosis, fit) for diagnosis, fit in zip(found, fits, strict=True))
         title = f"{called(effect)} ({key.split(' of ')[1]})" if isinstance(effect, Discovered) else effect.title
         listed.append(Candidate(key, title, effect, told, _sizes(effect, fits[known], told), kept, named))
-        if law and not any(named):
-            listed.pop()
-    return tuple(sorted(listed, key=lambda c: (c.law, not c.effect.told_inside, c.name)))
-
-
-def _names(effect: Effect, diagnosis: Diagnosis | Known, fit: Fit | Known) -> bool:
-    """Whether a diagnosis names an effect; a law it names only as it is."""
-    if isinstance(effect, Discovered):
-        return any(own == effect for own, _ in fit.effects)
-    return effect.name in diagnosis.verdict
+    return tuple(sorted(listed, key=lambda c: (isinstance(c.effect, Discovered), not c.effect.told_inside, c.name)))
 
 
 def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
@@ -270,11 +204,10 @@ def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tup
                 known[effect.name] = sure, effect
     for fit in fits:
         for name, variants in fit.variants.items():
-            first = variants[0] if variants else None
-            if first is None or name in known or isinstance(first, Discovered):
+            if name in known or not variants or isinstance(variants[0], Discovered):
                 continue
-            if first.told_inside or fit.probability(name) >= compare_settings.MAY_BE:
-                known[name] = (0, 0.0), first
+            if variants[0].told_inside or fit.probability(name) >= settings.MAY_BE:
+                known[name] = (0, 0.0), variants[0]
     yield from ((name, replace(effect, places=(), excluded=())) for name, (_, effect) in known.items())
     for fit, campaign in zip(fits, names, strict=True):
         yield from ((f"{e.name} of {campaign}", e) for e, _ in fit.effects if isinstance(e, Discovered))
@@ -308,13 +241,7 @@ def _sizes(effect: Effect, fit: Fit | Known, told: Sequence[Parameter]) -> Array
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """What one campaign says, in units of its noise and of the expected sizes.
-
-    Attributes
-    ----------
-    matrix, vector
-        G (P, P) and b (P,).
-    """
+    """Normal equations of one campaign, in units of its noise and of the expected sizes: G (P, P) and b (P,)."""
 
     matrix: Array
     vector: Array
@@ -323,34 +250,27 @@ class Sums:
     def inverse(self) -> tuple[Array, Array]:
         """(P, P) pseudo-inverse of G, and (P,) part of each parameter's direction that G sees."""
         value, axes = np.linalg.eigh(self.matrix)
-        seen = value > settings.INFORMATION_FLOOR
+        seen = value > inference.INFORMATION_FLOOR
         return (axes[:, seen] / value[seen]) @ axes[:, seen].T, np.asarray((axes[:, seen] ** 2).sum(axis=1))
 
     def some(self, kept: Sequence[int]) -> Sums:
         """Return what it says with the other parameters at zero."""
         return Sums(self.matrix[np.ix_(kept, kept)], self.vector[list(kept)])
 
+    def tells(self, own: Sequence[int]) -> bool:
+        """Whether it says anything of some parameters."""
+        return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > inference.INFORMATION_FLOOR)
 
-def sums(found: Diagnosis, fit: Fit, listed: Sequence[Candidate], number: int) -> Sums:
-    """Return what a campaign says of the listed effects.
 
-    Parameters
-    ----------
-    found, fit
-        Its diagnosis, and the fit behind it.
-    listed
-        Effects that are compared.
-    number
-        Which of the campaigns it is.
-    """
+def sums(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate], number: int) -> Sums:
+    """Return the normal equations of campaign ``number`` in the parameters of the listed effects."""
+    columns = [_columns(fit.corrected, item, number) for item in listed]
+    if isinstance(found, Known) or isinstance(fit, Known):
+        assert isinstance(fit, Known)
+        return _of_model(fit, listed, number, [equations_of(own) for own in columns])
     at, e = fit.corrected, fit.explanation
     gap = at.gap + sum((block(at, effect).columns @ values for effect, values in fit.effects), np.zeros_like(at.gap))
-    measures = gap.shape[1]
-    blocks = []
-    for item in listed:
-        own = item.parameters[number]
-        columns = moved_by(at, own) if own else np.zeros((len(gap), measures, len(item.told)))
-        blocks.append(Block(item.effect, item.told, columns * item.sizes, np.ones(len(item.told))))
+    blocks = (Block(i.effect, i.told, own, np.ones(len(i.told))) for i, own in zip(listed, columns, strict=True))
     linear = Linear(gap, frame_columns(at)[0], tuple(blocks))
     stack = whitened(linear, e.whitening)
     matrix, vector = _projected(stack.T @ stack / e.best.noise**2, linear.frames.shape[2])
@@ -359,6 +279,13 @@ def sums(found: Diagnosis, fit: Fit, listed: Sequence[Candidate], number: int) -
     value = np.maximum(value, 0.0)
     times = exceeding(fit, linear, value, axes) if left.flagged else np.ones(len(value))
     return Sums((axes * (value / times)) @ axes.T, axes @ ((axes.T @ vector) / times))
+
+
+def _columns(at: Observations, item: Candidate, number: int) -> Array:
+    """(N, m, P) columns of an effect, in expected sizes; zeros where the campaign lacks what it needs."""
+    if not item.parameters[number]:
+        return np.zeros((*moved_by(at, ()).shape[:2], len(item.told)))
+    return moved_by(at, item.parameters[number]) * item.sizes
 
 
 def _projected(full: Array, flat: int) -> tuple[Array, Array]:
@@ -371,7 +298,7 @@ def _projected(full: Array, flat: int) -> tuple[Array, Array]:
     rest, before = full[flat:, flat:] - along.T @ along, np.diag(full)[flat:-1]
     matrix, vector = 0.5 * (rest + rest.T)[:-1, :-1], rest[:-1, -1]
     value, axes = np.linalg.eigh(matrix)
-    floor = max(compare_settings.SAYS, settings.PROJECTED_FLOOR * float(before.max(initial=0.0)))
+    floor = max(settings.SAYS, inference.PROJECTED_FLOOR * float(before.max(initial=0.0)))
     seen = value > floor
     return (axes[:, seen] * value[seen]) @ axes[:, seen].T, axes[:, seen] @ (axes[:, seen].T @ vector)
 
@@ -382,99 +309,67 @@ def told(said: Sequence[Sums]) -> list[int]:
     value, axes = np.linalg.eigh(together)
     root = (axes * np.sqrt(np.maximum(value, 0.0))).T
     length = np.sqrt(np.maximum(np.diag(together), 0.0))
-    seen = length > np.sqrt(settings.INFORMATION_FLOOR)
-    return distinct(root / np.where(seen, length, 1.0), seen, compare_settings.DISTINCT)
+    seen = length > np.sqrt(inference.INFORMATION_FLOOR)
+    return distinct(root / np.where(seen, length, 1.0), seen, settings.DISTINCT)
 
 
-def sums_of_model(known: Known, listed: Sequence[Candidate], number: int) -> Sums:
-    """Return what a model file says of the listed effects.
-
-    Parameters
-    ----------
-    known
-        The model.
-    listed
-        Effects that are compared.
-    number
-        Which of the campaigns it is.
-    """
-    ends = np.cumsum([0, *(len(item.told) for item in listed)])
-    matrix, vector = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
-    if not known.effects:
-        return Sums(matrix, vector)
-    prior = np.asarray(known.spread.prior)
-    starts = np.cumsum([0, *(len(values) for _, values in known.effects)])
-    flat = _columns(known, listed, number)
+def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: Sequence[Array]) -> Sums:
+    """Return what a model file says, with the (3N, P) columns of each listed effect at its poses."""
+    width = sum(own.shape[1] for own in columns)
+    prior, start = np.asarray(known.spread.prior), 0
     kept: list[int] = []
     across: list[Array] = []
-    for (effect, _), start in zip(known.effects, starts, strict=False):
-        own = block(known.corrected, effect).columns
-        own = equations_of(own) * prior[start : start + own.shape[2]]
-        told = _expressed(known, effect, own, listed, flat, number)
+    for effect, values in known.effects:
+        which = range(start, start + len(values))
+        start += len(values)
+        own = equations_of(block(known.corrected, effect).columns) * prior[which]
+        told = _expressed(known, effect, own, listed, columns, number)
         if told is not None:
-            kept += range(start, start + own.shape[1])
+            kept += which
             across.append(told)
     if not kept:
-        return Sums(matrix, vector)
-    information, said = _alone(known, np.array(kept), prior)
-    back = np.linalg.pinv(np.column_stack(across), rcond=compare_settings.SAME_PLACE)
+        return Sums(np.zeros((width, width)), np.zeros(width))
+    information, said = _without_prior(known, np.array(kept), prior)
+    back = np.linalg.pinv(np.column_stack(across), rcond=settings.SAME_PLACE)
     return Sums(back.T @ information @ back, back.T @ said)
 
 
-def _columns(known: Known, listed: Sequence[Candidate], number: int) -> list[Array]:
-    """Return (3N, P) columns of each listed effect, in expected sizes; zeros where the model lacks what it needs."""
-    found = []
-    for item in listed:
-        own = item.parameters[number]
-        columns = moved_by(known.corrected, own) * item.sizes if own else np.zeros((len(known.q), 3, len(item.told)))
-        found.append(equations_of(columns))
-    return found
-
-
 def _expressed(
-    known: Known, effect: Effect, own: Array, listed: Sequence[Candidate], flat: Sequence[Array], number: int
+    known: Known, effect: Effect, own: Array, listed: Sequence[Candidate], columns: Sequence[Array], number: int
 ) -> Array | None:
     """(P, K) listed parameters for one prior deviation of each of an effect's K; ``None`` if they cannot do the same.
 
     Its own parameters first; then, of what contains joints' zeros, with those beside them.
     """
     name = f"{effect.name} of {known.campaign}" if isinstance(effect, Discovered) else effect.name
+    owner = np.repeat(np.arange(len(listed)), [c.shape[1] for c in columns])
     alike = [k for k, item in enumerate(listed) if item.name == name and item.parameters[number]]
     inside = [k for k, item in enumerate(listed) if item.effect.told_inside and item.parameters[number]]
     frames = equations_of(frame_columns(known.corrected)[0])
-    for chosen in (alike, sorted({*alike, *inside})) if alike else ():
-        every = np.column_stack([*(flat[k] for k in chosen), frames])
+    for chosen in (alike, [*alike, *inside]) if alike else ():
+        used = np.isin(owner, chosen)
+        every = np.column_stack([np.column_stack(columns)[:, used], frames])
         length = np.linalg.norm(every, axis=0)
-        seen = length > compare_settings.ROUNDING * length.max()
-        told = np.zeros((len(length), own.shape[1]))
-        told[seen] = np.linalg.lstsq(every[:, seen] / length[seen], own, rcond=None)[0] / length[seen, None]
-        left = np.linalg.norm(own - every @ told, axis=0)
-        if (left <= compare_settings.DISTINCT * np.linalg.norm(own, axis=0)).all():
-            return _among(told, chosen, [columns.shape[1] for columns in flat])
+        seen = length > settings.ROUNDING * length.max()
+        found = np.zeros((len(length), own.shape[1]))
+        found[seen] = np.linalg.lstsq(every[:, seen] / length[seen], own, rcond=None)[0] / length[seen, None]
+        left = np.linalg.norm(own - every @ found, axis=0)
+        if (left <= settings.DISTINCT * np.linalg.norm(own, axis=0)).all():
+            told = np.zeros((len(owner), own.shape[1]))
+            told[used] = found[: used.sum()]
+            return told
     return None
 
 
-def _among(told: Array, chosen: Sequence[int], widths: Sequence[int]) -> Array:
-    """(P, K) of all listed parameters, zero where an effect was not chosen; what the frames do is left out."""
-    rows = [np.zeros((width, told.shape[1])) for width in widths]
-    start = 0
-    for k in chosen:
-        rows[k] = told[start : start + widths[k]]
-        start += widths[k]
-    return np.concatenate(rows)
-
-
-def _alone(known: Known, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
+def _without_prior(known: Known, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
     """Return G and b of some of the model's parameters, in prior deviations: what rows say without the prior."""
-    spread = known.spread
-    covariance = spread.covariance if spread.wider is None else spread.wider
+    covariance = known.spread.covariance if known.spread.wider is None else known.spread.wider
     flat = len(covariance) - len(prior)
     values = np.concatenate([values for _, values in known.effects])[kept] / prior[kept]
     own = covariance[np.ix_(flat + kept, flat + kept)] / np.outer(prior[kept], prior[kept])
     # a parameter that is known as well as before has variance one, and the rows say nothing of it
     value, axes = np.linalg.eigh(0.5 * (own + own.T))
-    tight = 1.0 / np.maximum(value, settings.TINY)
-    seen = tight > 1.0 + compare_settings.SAYS
-    return (axes[:, seen] * (tight[seen] - 1.0)) @ axes[:, seen].T, axes[:, seen] @ (
-        tight[seen] * (axes[:, seen].T @ values)
-    )
+    tight = 1.0 / np.maximum(value, inference.TINY)
+    seen = tight > 1.0 + settings.SAYS
+    axes, tight = axes[:, seen], tight[seen]
+    return (axes * (tight - 1.0)) @ axes.T, axes @ (tight * (axes.T @ values))

@@ -1,4 +1,4 @@
-"""The result of a comparison: one frozen value, its JSON, and the port through which it is put into words and drawn."""
+"""Equality tests between campaigns as one frozen value, its JSON, and the port through which it is put into words."""
 
 from __future__ import annotations
 

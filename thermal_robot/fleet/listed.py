@@ -1,11 +1,11 @@
-"""Which campaigns a fleet consists of, and what each is labelled with: a folder of them, or a list in a file."""
+"""Campaigns of a fleet with their labels: those below a folder, or those of a list in CSV or TOML."""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,23 +24,13 @@ else:
     import tomli as tomllib
 
 
-LEVEL = "level_"
+_SECTION = "campaigns"
 _LISTS = (".csv", ".toml")
 
 
 @dataclass(frozen=True)
 class Listed:
-    """The campaigns of a fleet.
-
-    Attributes
-    ----------
-    root
-        Folder that their names start from.
-    names
-        Of the labels.
-    campaigns
-        Per campaign: its name, which is its path from the root, and its labels, empty where it has none.
-    """
+    """The campaigns of a fleet: by name, which is the path from ``root``, with a label for each of ``names``."""
 
     root: Path
     names: tuple[str, ...]
@@ -52,22 +42,12 @@ class Listed:
 
 
 def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
-    """Find the campaigns of a fleet.
+    """Find the campaigns of a fleet, in the order of the list, of a folder in that of the names.
 
-    Parameters
-    ----------
-    source
-        A folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels. Or a list:
-        CSV, or TOML with ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on,
-        and whose other columns are labels.
-    names
-        Of the levels of folders, from the top; ``level_1`` and so on where left out. Campaigns with an equal ``robot``
-        are of the same robot.
-
-    Returns
-    -------
-    Listed
-        In the order of the list, of a folder in that of the names.
+    The source is a folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels,
+    whose levels ``names`` names from the top, ``level_1`` and so on where left out. Or it is a list: CSV, or TOML with
+    ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on, and whose other
+    columns are labels.
 
     Raises
     ------
@@ -89,50 +69,42 @@ def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
 
 
 def _below(root: Path, names: Sequence[str]) -> Listed:
-    found = sorted(_folders(root))
+    """List every folder below with a campaign, labelled by the folders on the way; ``.`` is the root itself."""
+    found = sorted(file.parent.relative_to(root).as_posix() for file in root.rglob(FILE_NAME) if file.is_file())
     if not found:
         raise CampaignError(str(root), f"no {FILE_NAME} lies below this folder", expected="a folder of campaigns")
     parts = [Path(name).parts for name in found]
     depth = max(len(levels) for levels in parts)
     if len(names) > depth:
-        raise CampaignError(
-            str(root), "has fewer levels of folders than labels", found=str(depth), expected=str(len(names))
-        )
-    labels = _checked(str(root), [*names, *(f"{LEVEL}{k + 1}" for k in range(len(names), depth))])
+        problem = "has fewer levels of folders than labels"
+        raise CampaignError(str(root), problem, found=str(depth), expected=str(len(names)))
+    labels = _checked(str(root), [*names, *(f"level_{k + 1}" for k in range(len(names), depth))])
     padded = ((*levels, *[""] * (depth - len(levels))) for levels in parts)
     return Listed(root, labels, tuple(zip(found, padded, strict=True)))
 
 
-def _folders(root: Path) -> Iterator[str]:
-    """Yield the folders with a campaign, from the root on; ``.`` is the root itself."""
-    for folder, inner, files in os.walk(root):
-        inner.sort()
-        if FILE_NAME in files:
-            yield Path(os.path.relpath(folder, root)).as_posix()
-
-
 def _of_list(path: Path) -> Listed:
-    """Read a list: rows of text by column, and where each stands."""
-    columns, rows = _read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
+    """Read a list: columns of text, and where each campaign stands."""
+    if path.suffix.lower() == ".toml":
+        columns, rows = _read_toml(path)
+    else:
+        table = read_table(path)
+        columns, rows = {name: table.text(name) for name in table.columns}, [int(row) for row in table.rows]
     if CAMPAIGN not in columns:
         problem = f"has no column {CAMPAIGN!r}{did_you_mean(CAMPAIGN, columns)}"
         raise CampaignError(str(path), problem, expected="the paths of the campaigns in it, labels in the others")
-    labels = _checked(str(path), [name for name in columns if name != CAMPAIGN])
+    names = columns.pop(CAMPAIGN)
+    labels = _checked(str(path), columns)
     seen: dict[str, int] = {}
-    for name, row in zip(columns[CAMPAIGN], rows, strict=True):
+    for name, row in zip(names, rows, strict=True):
         if not name.strip():
             raise CampaignError(str(path), "no campaign is named", row=row, column=CAMPAIGN, expected="a path")
         first = seen.setdefault(os.path.normpath(name), row)
         if first != row:
             problem = f"this campaign stands in row {first}, too"
             raise CampaignError(str(path), problem, row=row, column=CAMPAIGN, found=name, expected="each once")
-    of_each = zip(*(columns[name] for name in labels), strict=True) if labels else (() for _ in rows)
-    return Listed(path.parent, labels, tuple(zip(columns[CAMPAIGN], map(tuple, of_each), strict=True)))
-
-
-def _csv(path: Path) -> tuple[dict[str, list[str]], list[int]]:
-    table = read_table(path)
-    return {name: table.text(name) for name in table.columns}, [int(row) for row in table.rows]
+    of_each = zip(*columns.values(), strict=True) if labels else (() for _ in rows)
+    return Listed(path.parent, labels, tuple(zip(names, of_each, strict=True)))
 
 
 def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
@@ -147,9 +119,6 @@ def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
-SECTION = "campaigns"
-
-
 def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     """Return columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
     try:
@@ -159,18 +128,15 @@ def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         line = re.search(r"at line (\d+)", str(error))
         raise CampaignError(str(path), f"not valid TOML: {error}", row=int(line[1]) if line else None) from error
-    items = data.get(SECTION)
-    if set(data) != {SECTION} or not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
-        found = ", ".join(data) or "nothing"
-        raise CampaignError(
-            str(path), "is no list of campaigns", found=found, expected=f"[[{SECTION}]] and nothing else"
-        )
+    items = data.get(_SECTION)
+    if set(data) != {_SECTION} or not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
+        found, expected = ", ".join(data) or "nothing", f"[[{_SECTION}]] and nothing else"
+        raise CampaignError(str(path), "is no list of campaigns", found=found, expected=expected)
     if not items:
-        raise CampaignError(str(path), "lists no campaign", expected=f"a [[{SECTION}]] for each")
-    names = dict.fromkeys(name for item in items for name in item)
+        raise CampaignError(str(path), "lists no campaign", expected=f"a [[{_SECTION}]] for each")
     word = text(empty=True)
     columns = {
-        name: [fitted(word, item.get(name, ""), str(path), f"{SECTION}[{k}].{name}") for k, item in enumerate(items)]
-        for name in names
+        name: [fitted(word, item.get(name, ""), str(path), f"{_SECTION}[{k}].{name}") for k, item in enumerate(items)]
+        for name in dict.fromkeys(name for item in items for name in item)
     }
     return columns, list(range(1, len(items) + 1))

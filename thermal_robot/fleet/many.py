@@ -1,9 +1,7 @@
-"""Many campaigns go in; a table, and what they have in common, come out.
+"""Parallel diagnosis of many campaigns by processes of Dask, on this machine or behind the scheduler of a cluster.
 
 What is done already, the rows of each campaign by its fingerprint, is a database of SQLite: a process that is killed
 leaves what it has written, and nothing half. Only the process that runs the fleet opens it; a second one is refused.
-
-Who does the work: processes of Dask, on this machine or behind the scheduler of a cluster. No engine of our own.
 
 On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
 share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
@@ -27,10 +25,10 @@ import sqlite3
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +39,7 @@ from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import checksum, is_file, write_one
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.listed import Listed, campaigns
-from thermal_robot.fleet.rows import failed, needed, rows_of, write_rows
+from thermal_robot.fleet.rows import CAMPAIGN, Plain, failed, needed, rows_of, write_rows
 from thermal_robot.fleet.summary import Summary, summarise
 from thermal_robot.teller import registered
 
@@ -50,6 +48,11 @@ if TYPE_CHECKING:
 
 
 TABLE, DONE = "fleet.parquet", "done.sqlite"
+_LOCAL = "127.0.0.1"
+_KILLED = "the process that diagnosed it was ended twice, the second time with nothing else to do: by the system, for \
+memory, by a crash, or because it took longer than the time limit"
+Task = tuple[str, tuple[Any, ...]]
+"""Key, and the arguments of the work."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,7 +158,10 @@ def diagnose_many(
     >>> [finding.robot for finding in fleet.summary.found]
     ['hall_3', 'hall_3']
     """
-    options = _options(only, without)
+    chosen = [[names] if isinstance(names, str) else list(names) for names in (only or (), without)]
+    if only is not None and not chosen[0]:
+        raise CampaignError("diagnose_many(), only", "names no effect", expected="at least one, or left out for all")
+    choose(tuple(chosen[0]), tuple(chosen[1]), ())
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise CampaignError("diagnose_many(), workers", "no such number", found=repr(workers), expected="at least 1")
     if isinstance(time_limit, bool) or not isinstance(time_limit, (int, float)) or not 0.0 < time_limit < math.inf:
@@ -163,89 +169,70 @@ def diagnose_many(
         raise CampaignError(where, "no such time", found=repr(time_limit), expected="seconds above 0")
     for module in ("pyarrow", "distributed"):
         needed(module)
-    found, folder = campaigns(source, labels), _made(out)
-    table = folder / TABLE
-    with _opened(folder / DONE) as done:
+    found, folder = campaigns(source, labels), Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise CampaignError(str(out), "cannot be made", found=str(error), expected="a folder to write to") from None
+    table, options = folder / TABLE, [sorted(names) for names in chosen]
+    with opened(folder / DONE) as done:
         _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, time_limit, progress)
         write_one(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))
     return Fleet(table, summarise(table, found.names, progress))
 
 
-def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple[str, bool]:
-    """Diagnose one campaign in a process of its own.
-
-    Parameters
-    ----------
-    folder
-        Absolute path.
-    only, without
-        Names of effects.
-
-    Returns
-    -------
-    tuple
-        Its rows as JSON, and whether another run may give others: the program failed, and not the campaign.
-    """
+def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple[list[Plain], bool]:
+    """Diagnose the campaign in a folder; its rows, and whether another run may give others: the program failed."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what is worth a word stands in the rows
-            rows, again = rows_of(diagnose(folder, only=only or None, without=without)), False
+            return rows_of(diagnose(folder, only=only or None, without=without)), False
     except ThermalRobotError as error:
-        rows, again = failed(_without_place(str(error), folder)), False
+        return failed(_without_place(str(error), folder)), False
     except Exception as error:
-        rows, again = failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
-    return json.dumps(rows), again
-
-
-def _options(only: Iterable[str] | None, without: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return the names of effects, sorted, all of them known."""
-    chosen = [[names] if isinstance(names, str) else list(names) for names in (only or (), without)]
-    if only is not None and not chosen[0]:
-        raise CampaignError("diagnose_many(), only", "names no effect", expected="at least one, or left out for all")
-    choose(tuple(chosen[0]), tuple(chosen[1]), ())
-    return sorted(chosen[0]), sorted(chosen[1])
-
-
-def _made(out: str | Path) -> Path:
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        raise CampaignError(str(out), "cannot be made", found=str(error), expected="a folder to write to") from None
-    return folder
+        return failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
 
 
 def _diagnosed(
     found: Listed,
-    options: tuple[list[str], list[str]],
+    options: Sequence[list[str]],
     done: Done,
     workers: int,
     scheduler: str | None,
     time_limit: float,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Diagnose what is not done yet."""
-    total, finished = len(found.campaigns), 0
-
-    def told(more: int) -> None:
-        nonlocal finished
-        finished += more
-        progress("campaigns", finished, total)
-
+    """Diagnose what is not done yet, in the order of the list; what is alike is done once."""
     under_way: set[str] = set()
-    tasks = _tasks(found, options, done, time_limit, told, under_way)
-    first = next(tasks, None)
+    finished, total = count(1), len(found.campaigns)
+
+    def tasks() -> Iterator[Task]:
+        for number, (name, _) in enumerate(found.campaigns):
+            folder = found.folder(name)
+            try:
+                key = fingerprint(folder, options)
+            except (ThermalRobotError, OSError) as error:
+                key = f"unread {number}"
+                done.put(key, failed(_without_place(str(error), folder)), again=True)
+            done.name(number, key)
+            if key in under_way or key in done:
+                progress("campaigns", next(finished), total)
+            else:
+                under_way.add(key)
+                yield key, (time_limit, folder, *options)
+
+    waiting = tasks()
+    first = next(waiting, None)
     if first is None:
         return
-    with _client(min(workers, total), scheduler) as cluster:
-        for key, reply, reason in _answers(cluster, _in_time, chain([first], tasks)):
-            rows, again = (json.loads(reply[0]), reply[1]) if reply is not None else (failed(reason), True)
-            done.put(key, rows, again)
+    with connected(min(workers, total), scheduler) as client:
+        for key, reply, reason in answers(client, _in_time, chain([first], waiting)):
+            done.put(key, *(reply or (failed(reason), True)))
             under_way.discard(key)
-            told(1)
+            progress("campaigns", next(finished), total)
 
 
-def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
+def _in_time(time_limit: float, *campaign: Any) -> tuple[list[Plain], bool]:
     """Diagnose a campaign, or end the process.
 
     What a diagnosis leaves refers to itself, and would stay for hundreds of campaigns; what was there after the first,
@@ -259,35 +246,22 @@ def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
     return found
 
 
-def _tasks(
-    found: Listed,
-    options: tuple[list[str], list[str]],
-    done: Done,
-    time_limit: float,
-    told: Callable[[int], None],
-    under_way: set[str],
-) -> Iterator[Task]:
-    """Yield what :func:`_in_time` is to do, in the order of the list; what is alike is done once."""
-    for number, (name, _) in enumerate(found.campaigns):
-        folder = found.folder(name)
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """End this whole process where what is done within takes longer, even where it hangs outside Python."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
         try:
-            key = _fingerprint(folder, options)
-        except (ThermalRobotError, OSError) as error:
-            key = f"unread {number}"
-            done.put(key, failed(_without_place(str(error), folder)), again=True)
-        done.name(number, key)
-        if key in under_way or key in done:
-            told(1)
-        else:
-            under_way.add(key)
-            yield key, (time_limit, folder, *options)
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
 
-def _whole(found: Listed, done: Done) -> Iterator[dict[str, Any]]:
+def _whole(found: Listed, done: Done) -> Iterator[Plain]:
     """Yield every row of the table, with names and labels."""
     for number, rows in done.in_order():
         name, labels = found.campaigns[number]
-        named = {"campaign": name, **dict(zip(found.names, labels, strict=True))}
+        named = {CAMPAIGN: name, **dict(zip(found.names, labels, strict=True))}
         yield from ({**named, **row} for row in rows)
 
 
@@ -297,10 +271,7 @@ def _without_place(message: str, folder: str) -> str:
     return " ".join(message.replace(place + os.sep, "").split())
 
 
-Rows = list[dict[str, Any]]
-
-
-def _fingerprint(folder: str, options: Sequence[object]) -> str:
+def fingerprint(folder: str, options: Sequence[object]) -> str:
     """Return what the rows of a campaign follow from: name, content of its files, version of the program, options."""
     from importlib.metadata import version
 
@@ -325,7 +296,7 @@ class Done:
         """Say which fingerprint a campaign has, by its number in the list."""
         self._database.execute("INSERT INTO listed VALUES (?, ?)", (number, key))
 
-    def put(self, key: str, rows: Rows, again: bool = False) -> None:
+    def put(self, key: str, rows: list[Plain], again: bool = False) -> None:
         """Keep the rows of a campaign, on disk within a second; ``again`` until the next run, which does it again."""
         packed = zlib.compress(json.dumps(rows).encode())
         self._database.execute("INSERT OR REPLACE INTO done VALUES (?, ?, ?)", (key, packed, again))
@@ -333,33 +304,43 @@ class Done:
             self._database.commit()
             self._written = time.monotonic()
 
-    def in_order(self) -> Iterator[tuple[int, Rows]]:
+    def in_order(self) -> Iterator[tuple[int, list[Plain]]]:
         """Yield number and rows of every campaign, in the order of the list, one at a time."""
         found = self._database.execute("SELECT number, rows FROM listed JOIN done USING (key) ORDER BY number")
-        for number, packed in found:
-            yield number, json.loads(zlib.decompress(packed))
+        yield from ((number, json.loads(zlib.decompress(packed))) for number, packed in found)
+
+
+_BEGIN = """
+    PRAGMA locking_mode = EXCLUSIVE;
+    BEGIN EXCLUSIVE;
+    CREATE TABLE IF NOT EXISTS done (key TEXT PRIMARY KEY, rows BLOB, again INTEGER);
+    CREATE TABLE IF NOT EXISTS listed (number INTEGER PRIMARY KEY, key TEXT);
+    DELETE FROM listed;
+    DELETE FROM done WHERE again;
+    COMMIT;
+"""
 
 
 @contextmanager
-def _opened(file: Path) -> Iterator[Done]:
-    """Open what is done, or begin it; whatever happens, what was put there is on disk afterwards."""
+def opened(file: Path) -> Iterator[Done]:
+    """Open what is done, or begin it; whatever happens, what was put there is on disk afterwards.
+
+    Raises
+    ------
+    CampaignError
+        If another run has it, or it is another file.
+    """
     database = sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)
     try:
-        database.execute("PRAGMA locking_mode = EXCLUSIVE")
-        database.execute("BEGIN EXCLUSIVE")
-        database.execute("CREATE TABLE IF NOT EXISTS done (key TEXT PRIMARY KEY, rows BLOB, again INTEGER)")
-        database.execute("CREATE TABLE IF NOT EXISTS listed (number INTEGER PRIMARY KEY, key TEXT)")
-        database.execute("DELETE FROM listed")
-        database.execute("DELETE FROM done WHERE again")
-        database.commit()
-    except sqlite3.OperationalError as error:
-        database.close()
-        raise CampaignError(str(file), "cannot be used", found=str(error), expected="no other run with it") from error
+        database.executescript(_BEGIN)
     except sqlite3.DatabaseError as error:
         database.close()
-        raise CampaignError(
-            str(file), "is not what a fleet has written", expected="another folder for --out"
-        ) from error
+        if isinstance(error, sqlite3.OperationalError):
+            raise CampaignError(
+                str(file), "cannot be used", found=str(error), expected="no other run with it"
+            ) from error
+        problem = "is not what a fleet has written"
+        raise CampaignError(str(file), problem, expected="another folder for --out") from error
     try:
         yield Done(database)
     finally:
@@ -367,16 +348,19 @@ def _opened(file: Path) -> Iterator[Done]:
         database.close()
 
 
-LOCAL = "127.0.0.1"
-KILLED = "the process that diagnosed it was ended twice, the second time with nothing else to do: by the system, for \
-memory, by a crash, or because it took longer than the time limit"
-
-Task = tuple[str, tuple[Any, ...]]
-"""Key, and the arguments of the work."""
+_UNSERVED = {
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+}
+"""Nothing is served beside the work itself, nor kept of how it goes on, which grows by a megabyte a campaign; and a
+campaign whose process was killed comes back at once."""
 
 
 @contextmanager
-def _client(workers: int, scheduler: str | None = None) -> Iterator[Any]:
+def connected(workers: int, scheduler: str | None = None) -> Iterator[Any]:
     """Give a Dask client: of so many processes that are started on this machine, or of the scheduler at an address."""
     dask, distributed = needed("dask"), needed("distributed")
     if scheduler is None:
@@ -394,102 +378,68 @@ def _client(workers: int, scheduler: str | None = None) -> Iterator[Any]:
         yield found
 
 
-_UNSERVED = {
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-    "distributed.worker.profile.enabled": False,
-    "distributed.scheduler.allowed-failures": 0,
-    "distributed.admin.large-graph-warning-threshold": "1GB",
-}
-"""Nothing is served beside the work itself, nor kept of how it goes on, which grows by a megabyte a campaign; and a
-campaign whose process was killed comes back at once."""
-
-
-@contextmanager
-def _local(distributed: Any, workers: int) -> Iterator[Any]:
+def _local(distributed: Any, workers: int) -> Any:
     needed("cryptography")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a port that is taken, of a page that cannot be served
-        cluster = distributed.LocalCluster(
+        return distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            host=LOCAL,
-            dashboard_address=f"{LOCAL}:0",
-            worker_dashboard_address=f"{LOCAL}:0",
+            host=_LOCAL,
+            dashboard_address=f"{_LOCAL}:0",
+            worker_dashboard_address=f"{_LOCAL}:0",
             security=distributed.Security.temporary(),
             silence_logs=50,
         )
-    with cluster:
-        yield cluster
 
 
-def _answers(
-    client: Any, work: Callable[..., Any], tasks: Iterator[Task]
-) -> Generator[tuple[str, Any, str], None, None]:
-    """Have tasks worked on, a few at a time: yield each key once, with its answer, or with why there is none."""
+def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Iterator[tuple[str, Any, str]]:
+    """Have tasks worked on, a few at a time: yield each key once, with its answer, or with why there is none.
+
+    Raises
+    ------
+    ThermalRobotError
+        If the scheduler is lost.
+    """
     distributed = needed("distributed")
     ended: list[Task] = []
     try:
-        for task, reply, error in _flow(client, work, tasks, distributed, _threads(client)):
-            if isinstance(error, distributed.KilledWorker):
-                ended.append(task)
-            else:
-                yield task[0], reply, _said(error)
-        for task, reply, error in _flow(client, work, iter(ended), distributed, lambda: 1):
-            killed = isinstance(error, distributed.KilledWorker)
-            yield task[0], reply, KILLED if killed else _said(error)
+        for alone in (False, True):
+            for task, reply, error in _flow(client, work, iter(ended) if alone else tasks, alone):
+                if not isinstance(error, distributed.KilledWorker):
+                    yield task[0], reply, "" if error is None else f"{type(error).__name__}: {error}"
+                elif alone:
+                    yield task[0], None, _KILLED
+                else:
+                    ended.append(task)
     except (distributed.comm.core.CommClosedError, distributed.CancelledError, OSError) as error:
         raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
 
 
-@contextmanager
-def limited(seconds: float) -> Iterator[None]:
-    """End this whole process where what is done within takes longer, even where it hangs outside Python."""
-    with open(os.devnull, "w", encoding="utf-8") as nowhere:
-        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
-        try:
-            yield
-        finally:
-            faulthandler.cancel_dump_traceback_later()
-
-
-def _threads(client: Any) -> Callable[[], int]:
-    """Return what tells how many threads there are, asked again now and then: workers come and go."""
-    known = [-math.inf, 1.0]
-
-    def threads() -> int:
-        if time.monotonic() - known[0] > settings.ASKED_EVERY:
-            known[:] = time.monotonic(), max(sum(client.nthreads().values()), 1)
-        return int(known[1])
-
-    return threads
-
-
-def _said(error: BaseException | None) -> str:
-    return "" if error is None else f"{type(error).__name__}: {error}"
-
-
 def _flow(
-    client: Any, work: Callable[..., Any], tasks: Iterator[Task], distributed: Any, most: Callable[[], int]
+    client: Any, work: Callable[..., Any], tasks: Iterator[Task], alone: bool
 ) -> Iterator[tuple[Task, Any, BaseException | None]]:
-    """Yield each task with its answer or its error; so many are under way at a time."""
+    """Yield each task with its answer or its error; as many are under way at a time as there are threads, or one."""
+    distributed = needed("distributed")
     under_way: dict[Any, Task] = {}
     finished = distributed.as_completed(with_results=True, raise_errors=False)
-
-    def begin() -> None:
-        while len(under_way) < most() and (task := next(tasks, None)) is not None:
+    told: list[tuple[Task, Any, BaseException | None]] = []
+    asked, threads = -math.inf, 1
+    while True:
+        if not alone and time.monotonic() - asked > settings.ASKED_EVERY:  # workers come and go
+            asked, threads = time.monotonic(), max(sum(client.nthreads().values()), 1)
+        while len(under_way) < threads and (task := next(tasks, None)) is not None:
             future = client.submit(work, *task[1], key=f"thermal-robot-{task[0]}", pure=False)
             under_way[future.key] = task
             finished.add(future)
-
-    begin()
-    while under_way:
+        yield from told  # once others are under way
+        if not under_way:
+            return
         future, reply = next(finished)
         task = under_way.pop(future.key)
         if future.status == "cancelled":
             raise distributed.CancelledError(task[0])
         error = reply[1] if future.status == "error" else None
         future.release()
-        begin()
-        yield task, None if error is not None else reply, error
+        told = [(task, None if error is not None else reply, error)]

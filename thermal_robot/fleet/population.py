@@ -1,4 +1,4 @@
-"""A quantity of many robots: its mean over the fleet, its spread between robots, and which robots stand out.
+"""Random-effects model by empirical Bayes: mean of a quantity over many robots, spread, and which robots stand out.
 
 Of robot i the value y_i is known with deviation s_i. The robots' own values scatter about the mean of their group,
 
@@ -27,18 +27,10 @@ Codes = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """What a fleet says of one quantity.
+    """Posterior of one quantity over n robots in G groups.
 
-    Attributes
-    ----------
-    means, deviations
-        (G,) mean of each group, and its one sigma.
-    spread, spread_std
-        Between robots of a group, one sigma, and how well that is known.
-    apart
-        (n,) probability that a robot is unlike its group.
-    counts
-        (G,) robots.
+    ``means`` and their ``deviations`` (G,); ``spread`` between robots of a group, one sigma, and how well it is known;
+    ``apart`` (n,) the probability that a robot is unlike its group; ``counts`` (G,) robots.
     """
 
     means: Array
@@ -63,15 +55,7 @@ class Population:
 
 
 def population(values: Array, deviations: Array, groups: Codes | None = None) -> Population:
-    """Fit a population.
-
-    Parameters
-    ----------
-    values, deviations
-        (n,) of each robot, and one sigma of it.
-    groups
-        (n,) number of its group, 0 to G − 1, none empty; all in one where left out.
-    """
+    """Fit a population to (n,) values with their deviations; ``groups`` (n,) numbers 0 to G − 1, none empty, or one."""
     codes = np.zeros(len(values), dtype=np.int64) if groups is None else groups
     order = np.argsort(codes, kind="stable")
     unit = _unit(values, deviations, codes)
@@ -135,12 +119,7 @@ def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Ar
     """Combine several values of the same robot, weighted by their precision.
 
     Where they differ by more than their deviations, that of the mean grows in proportion (Birge, *Phys. Rev.* 40,
-    1932).
-
-    Returns
-    -------
-    tuple
-        (n,) numbers of the robots, their values, and one sigma of each.
+    1932). Returns numbers of the n robots, and (n,) values and deviations.
     """
     robots, which = np.unique(owners, return_inverse=True)
     weight = deviations**-2.0

@@ -1,27 +1,29 @@
-"""What is wrong with which robot of a fleet, and what several share.
+"""Empirical Bayes summary of a fleet: what is wrong with which robot, and what several share.
 
 Each parameter of each effect is a :func:`~thermal_robot.fleet.population.population` of its own, of values that every
-campaign tells whether the effect was found there or not (:mod:`thermal_robot.fleet.rows`).
+campaign tells whether the effect was found there or not (:mod:`thermal_robot.fleet.rows`). The table is read in pieces,
+and of parameters those of one effect at a time.
 """
 
 from __future__ import annotations
 
-import heapq
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from itertools import groupby
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.population import Population, combined, population
-from thermal_robot.fleet.rows import CAMPAIGN, Overview, Told, findings, overview, told
+from thermal_robot.fleet.population import Codes, combined, population
+from thermal_robot.fleet.rows import CAMPAIGN, MODEL, ROBOT, needed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 _FOUND = ("found", "contained", "confounded")
 
@@ -88,103 +90,6 @@ class Case:
     confounded_with: tuple[str, ...] = ()
 
 
-@dataclass
-class _Tally:
-    """Of one effect: the robots in which it can be tested, was found, and found beyond doubt, and the places."""
-
-    robots: int
-    testable: NDArray[np.bool_] = field(init=False)
-    found: NDArray[np.bool_] = field(init=False)
-    alone: NDArray[np.bool_] = field(init=False)
-    places: Counter[str] = field(default_factory=Counter)
-    known: bool = True
-
-    def __post_init__(self) -> None:
-        self.testable, self.found, self.alone = (np.zeros(self.robots, dtype=bool) for _ in range(3))
-
-
-def _counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gathered, ...], tuple[Case, ...]]:
-    """Return how often each effect was found, what gathers in a group, and the campaigns with the largest gaps."""
-    names, robot_of = list(known.robots.values), known.robot_of()
-    tallies: dict[str, _Tally] = {}
-    worst: list[tuple[float, int, int, Case]] = []
-    for name, rows in groupby(findings(table), key=lambda row: row[CAMPAIGN]):
-        campaign, told = known.numbers[name], []
-        robot = robot_of[campaign]
-        for row in rows:
-            effect = row["effect"] if row["quantity"] is None else f"a law of {row['quantity']}"
-            tally = tallies.setdefault(effect, _Tally(len(names), known=row["quantity"] is None))
-            tally.testable[robot] |= row["status"] != "not_testable"
-            if _at_work(row):
-                told.append(_case(names[robot], effect, row))
-                if not tally.found[robot] and told[-1].place:
-                    tally.places[told[-1].place] += 1
-                tally.found[robot] = True
-                tally.alone[robot] |= row["status"] != "confounded"
-        if not told and row["unexplained"]:
-            told = [Case(names[robot], name, row["rms_before"], row["rms_after"])]
-        for number, case in enumerate(told):
-            (heapq.heappush if len(worst) < settings.MOST_LISTED else heapq.heappushpop)(
-                worst, (case.rms_before, -campaign, -number, case)
-            )
-    found = tuple(case for *_, case in sorted(worst, key=lambda w: (-w[0], -w[1], -w[2])))
-    return _counts(tallies), _gathered(tallies, known), found
-
-
-def _at_work(row: dict[str, Any]) -> bool:
-    """Whether an effect explains the gap, or a part of it: of two that are confounded only the one that was fitted."""
-    return row["status"] in _FOUND and (row["status"] != "confounded" or bool(row["places"]))
-
-
-def _case(robot: str, effect: str, row: dict[str, Any]) -> Case:
-    told = {name: row[name] for name in ("rms_before", "rms_after", "probability", "shrinkage")}
-    place = row["places"][0]["name"] if row["places"] else ""
-    others = tuple(row["confounded_with"] or ()) if row["status"] == "confounded" else ()
-    return Case(robot=robot, campaign=row[CAMPAIGN], effect=effect, place=place, confounded_with=others, **told)
-
-
-def _counts(tallies: dict[str, _Tally]) -> tuple[Count, ...]:
-    counts = [
-        Count(
-            effect,
-            int(t.found.sum()),
-            int((t.testable | t.found).sum()),
-            int((t.found & ~t.alone).sum()),
-            dict(t.places.most_common()),
-            t.known,
-        )
-        for effect, t in tallies.items()
-    ]
-    return tuple(sorted(counts, key=lambda c: (-c.found, c.effect)))
-
-
-def _gathered(tallies: dict[str, _Tally], known: Overview) -> tuple[Gathered, ...]:
-    """Return what was found more often in a group than chance allows, however many groups were looked at."""
-    from scipy.stats import hypergeom
-
-    looked, tests = [], 0
-    for label, of in known.labels.items():
-        code, groups = known.label_of(label), list(of.values)
-        for effect, tally in tallies.items():
-            tried = tally.testable | tally.found
-            robots = np.bincount(code[tried], minlength=len(groups))
-            found = np.bincount(code[tally.found], minlength=len(groups))
-            asked = np.flatnonzero((robots >= settings.FEWEST_IN_GROUP) & (robots < robots.sum()))
-            tests += len(asked)
-            chance = hypergeom.sf(found[asked] - 1, robots.sum(), found.sum(), robots[asked])
-            for k, p in zip(asked.tolist(), chance.tolist(), strict=True):
-                if p < settings.STRIKING:
-                    own = int(found[k]), int(robots[k])
-                    rest = int(found.sum()) - own[0], int(robots.sum()) - own[1]
-                    looked.append(Gathered(effect, label, groups[k], *own, *rest, p))
-    striking = [replace(g, p_value=min(g.p_value * tests, 1.0)) for g in looked]
-    kept = [g for g in striking if g.p_value < settings.STRIKING]
-    return tuple(sorted(kept, key=lambda g: (g.p_value, g.effect, g.label, g.group))[: settings.MOST_LISTED])
-
-
-Codes = NDArray[np.int64]
-
-
 @dataclass(frozen=True)
 class Group:
     """A group of robots and its mean, SI, with one sigma."""
@@ -246,77 +151,6 @@ class Apart:
     probability: float
 
 
-def _shared(
-    table: Path, known: Overview, effects: Sequence[str], progress: Callable[[str, int, int], None] = lambda *_: None
-) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
-    """Return what robots share, who stands out, the surest first each, and how many parameters were compared."""
-    robots, labels = known.robot_of(), {name: known.label_of(name) for name in known.labels}
-    together, apart = [], []
-    for k, effect in enumerate(effects):
-        for parameter in told(table, effect, known.numbers):
-            found = _compared(parameter, robots, labels, known)
-            if found is not None:
-                together.append(found[0])
-                apart += found[1]
-        progress("effects compared", k + 1, len(effects))
-    tests = len(together) * (1 + len(labels))
-    fair = [replace(s, p_mean=min(s.p_mean * tests, 1.0), p_label=min(s.p_label * tests, 1.0)) for s in together]
-    fair = [s if s.p_label < settings.STRIKING else replace(s, label="", p_label=1.0, groups=()) for s in fair]
-    kept = [s for s in fair if s.label or s.p_mean < settings.STRIKING]
-    kept.sort(key=lambda s: (min(s.p_mean, s.p_label), -abs(s.mean) / s.mean_std, s.effect, s.parameter))
-    apart.sort(key=lambda a: (-a.probability, -abs(a.value - a.usual) / a.std, a.robot, a.effect, a.parameter))
-    return tuple(kept), tuple(apart[: settings.MOST_LISTED]), len(together)
-
-
-def _compared(
-    item: Told, robots: Codes, labels: dict[str, Codes], known: Overview
-) -> tuple[Shared, list[Apart]] | None:
-    """Fit the population of a parameter, as one and by each label; ``None`` where too few robots tell it."""
-    who, values, deviations = combined(item.values, item.deviations, robots[item.campaigns])
-    if len(who) < settings.FEWEST_ROBOTS:
-        return None
-    whole = population(values, deviations)
-    mean, std = float(whole.means[0]), float(whole.deviations[0])
-    spread = whole.spread, whole.spread_std
-    found = Shared(item.effect, item.parameter, item.unit, len(who), mean, std, *spread, whole.nothing)
-    usual, unlike = np.full(len(who), mean), whole.apart
-    splits = ((name, _split(values, deviations, codes[who])) for name, codes in labels.items())
-    known_splits = [(name, split) for name, split in splits if split is not None]
-    if known_splits:
-        name, (by, kept, groups, own) = min(known_splits, key=lambda item: item[1][0].alike)
-        told_by = _groups(by, groups, list(known.labels[name].values), mean)
-        found = replace(found, label=name, p_label=by.alike, groups=told_by)
-        if by.alike < settings.STRIKING:
-            found = replace(found, spread=by.spread, spread_std=by.spread_std)
-            unlike = np.where(kept, 0.0, unlike)
-            usual[kept], unlike[kept] = by.means[own], by.apart
-    named = np.flatnonzero(unlike >= settings.NAMED).tolist()
-    names = list(known.robots.values) if named else []
-    what = item.effect, item.parameter, item.unit
-    return found, [
-        Apart(names[who[k]], *what, float(values[k]), float(deviations[k]), float(usual[k]), float(unlike[k]))
-        for k in named
-    ]
-
-
-def _groups(by: Population, groups: Codes, names: Sequence[str], mean: float) -> tuple[Group, ...]:
-    """Return the groups of a population, the most different from the mean of all first."""
-    rows = zip(groups.tolist(), by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
-    found = [Group(names[g], robots, own, std) for g, robots, own, std in rows]
-    found.sort(key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group))
-    return tuple(found[: settings.MOST_GROUPS])
-
-
-def _split(values: Array, deviations: Array, codes: Codes) -> tuple[Population, NDArray[np.bool_], Codes, Codes] | None:
-    """Fit a population by groups, those too small left out: with who is in it, which groups, and the number of each."""
-    counts = np.bincount(codes)
-    kept = counts[codes] >= settings.FEWEST_IN_GROUP
-    groups, own = np.unique(codes[kept], return_inverse=True)
-    if len(groups) < 2:
-        return None
-    return population(values[kept], deviations[kept], own), kept, groups, own
-
-
 SCHEMA = "thermal-robot/fleet/1"
 
 
@@ -368,30 +202,214 @@ class Summary:
 def summarise(
     table: Path, labels: Sequence[str] = (), progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> Summary:
-    """Summarise the table of a fleet.
+    """Summarise the table of a fleet, as :func:`~thermal_robot.fleet.rows.write_rows` writes it, by its labels.
 
-    Parameters
-    ----------
-    table
-        As :func:`~thermal_robot.fleet.rows.write_rows` writes it.
-    labels
-        Names of its labels.
-    progress
-        Called with a stage, how many effects are compared, and how many there are.
+    ``progress`` is called with a stage, how many effects are compared, and how many there are.
     """
-    known = overview(table, labels)
-    effects, gathered, found = _counted(table, known)
-    together, apart, parameters = _shared(table, known, [e.effect for e in effects if e.parameters], progress)
+    campaigns = _campaigns(table, labels)
+    groups = [name for name in (*labels, MODEL) if name != ROBOT]
+    robots = campaigns.drop_duplicates(ROBOT).set_index(ROBOT)[groups]
+    findings, cases = _findings(table, campaigns)
+    effects = _counts(findings)
+    known = [e.effect for e in effects if e.parameters]
+    shared, apart, parameters = _shared(table, campaigns, robots, known, progress)
+    excused = campaigns[campaigns["reason"] != ""].head(settings.MOST_LISTED)
     return Summary(
-        campaigns=len(known.numbers),
-        robots=len(known.robots.values),
-        labels=tuple(known.labels),
-        outcomes=dict(sorted(known.outcomes.items())),
-        failures=tuple(known.excused),
+        campaigns=len(campaigns),
+        robots=len(robots),
+        labels=tuple(groups),
+        outcomes=dict(sorted(Counter(campaigns["outcome"]).items())),
+        failures=tuple(excused[[CAMPAIGN, "outcome", "reason"]].itertuples(index=False, name=None)),
         effects=effects,
-        gathered=gathered,
-        shared=together,
+        gathered=_gathered(findings, robots),
+        shared=shared,
         apart=apart,
-        found=found,
+        found=_largest(cases),
         parameters=parameters,
     )
+
+
+def _frames(table: Path, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
+    """Yield some columns of the table, a few thousand rows at a time."""
+    with needed("pyarrow.parquet").ParquetFile(table) as file:
+        for batch in file.iter_batches(settings.ROWS_AT_ONCE, columns=list(dict.fromkeys(columns))):
+            yield batch.to_pandas()
+
+
+def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
+    """Return the campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
+    import pandas as pd
+
+    columns = [CAMPAIGN, *labels, MODEL, "outcome", "reason"]
+    first = pd.concat(frame.drop_duplicates(CAMPAIGN) for frame in _frames(table, columns))
+    found = first.drop_duplicates(CAMPAIGN).reset_index(drop=True).astype(object)
+    found = found.where(found.notna(), "")
+    robot = found.get(ROBOT, "")
+    found[ROBOT] = np.where(robot == "", found[CAMPAIGN], robot)
+    return found
+
+
+def _findings(table: Path, campaigns: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return every effect of every robot: where it can be tested, is at work, is there beyond doubt; and all cases.
+
+    A case is an effect that is at work in a campaign, or a campaign whose gap no effect explains.
+    """
+    import pandas as pd
+
+    number = pd.Series(np.arange(len(campaigns)), index=campaigns[CAMPAIGN])
+    robots = campaigns[ROBOT].to_numpy()
+    columns = [CAMPAIGN, "rms_before", "rms_after", "effect", "status", "probability", "shrinkage", "quantity"]
+    findings, cases = [], []
+    for frame in _frames(table, [*columns, "places", "confounded_with", "unexplained"]):
+        part = frame[frame["effect"].notna()].copy()
+        part[ROBOT] = robots[number[part[CAMPAIGN]]]
+        part["known"] = part["quantity"].isna()
+        part["effect"] = part["effect"].where(part["known"], "a law of " + part["quantity"].fillna(""))
+        first = [None if places is None or not len(places) else places[0]["name"] for places in part["places"]]
+        placed = np.array([name is not None for name in first], dtype=bool)
+        part["place"] = [name or "" for name in first]
+        part["alone"] = part["status"] != "confounded"
+        part["testable"] = part["status"] != "not_testable"
+        # of two that are confounded only the one that was fitted has a place
+        part["at_work"] = part["status"].isin(_FOUND) & (part["alone"] | placed)
+        findings.append(part[["effect", ROBOT, "known", "place", "alone", "testable", "at_work"]])
+        doubtful = part["unexplained"].eq(True)
+        cases.append(part.loc[part["at_work"] | doubtful].drop(columns=["unexplained", "quantity", "places", "status"]))
+    every = pd.concat(cases, ignore_index=True)
+    unexplained = ~every.groupby(CAMPAIGN)["at_work"].transform("any") & ~every[CAMPAIGN].duplicated()
+    return pd.concat(findings, ignore_index=True), every[every["at_work"] | unexplained]
+
+
+def _counts(findings: pd.DataFrame) -> tuple[Count, ...]:
+    counts = []
+    for effect, rows in findings.groupby("effect", sort=False):
+        at_work = rows[rows["at_work"]]
+        found = at_work.drop_duplicates(ROBOT)
+        places = Counter(place for place in found["place"] if place)
+        beyond_doubt = at_work.loc[at_work["alone"], ROBOT].nunique()
+        counts.append(
+            Count(
+                effect=str(effect),
+                found=len(found),
+                testable=rows.loc[rows["testable"] | rows["at_work"], ROBOT].nunique(),
+                confounded=len(found) - beyond_doubt,
+                places=dict(places.most_common()),
+                parameters=bool(rows["known"].all()),
+            )
+        )
+    return tuple(sorted(counts, key=lambda c: (-c.found, c.effect)))
+
+
+def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
+    """Return the largest gaps: what explains each, or that nothing does."""
+    found = []
+    largest = cases.sort_values("rms_before", ascending=False, kind="stable").head(settings.MOST_LISTED)
+    for row in largest.to_dict("records"):
+        case = Case(row[ROBOT], row[CAMPAIGN], row["rms_before"], row["rms_after"])
+        if row["at_work"]:
+            others = () if row["alone"] or row["confounded_with"] is None else tuple(row["confounded_with"])
+            told: dict[str, Any] = {
+                name: None if row[name] != row[name] else row[name] for name in ("probability", "shrinkage")
+            }
+            case = replace(case, **told, effect=row["effect"], place=row["place"], confounded_with=others)
+        found.append(case)
+    return tuple(found)
+
+
+def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, ...]:
+    """Return what was found more often in a group than chance allows, however many groups were looked at."""
+    from scipy.stats import hypergeom
+
+    striking, tests = [], 0
+    for label in robots.columns:
+        for effect, rows in findings.groupby("effect", sort=False):
+            tried = rows.loc[rows["testable"] | rows["at_work"], ROBOT].unique()
+            in_group = robots.loc[tried, label].value_counts()
+            found = robots.loc[rows.loc[rows["at_work"], ROBOT].unique(), label].value_counts()
+            found, (every, all_found) = found.reindex(in_group.index, fill_value=0), (len(tried), int(found.sum()))
+            asked = in_group[(in_group >= settings.FEWEST_IN_GROUP) & (in_group < every)]
+            tests += len(asked)
+            for group, own in asked.items():
+                p = float(hypergeom.sf(found[group] - 1, every, all_found, own))
+                counts = int(found[group]), int(own), all_found - int(found[group]), every - int(own)
+                striking.append(Gathered(str(effect), label, str(group), *counts, p))
+    fair = [replace(g, p_value=min(g.p_value * tests, 1.0)) for g in striking]
+    kept = sorted((g.p_value, g.effect, g.label, g.group, g) for g in fair if g.p_value < settings.STRIKING)
+    return tuple(g for *_, g in kept[: settings.MOST_LISTED])
+
+
+def _told(table: Path, effect: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Yield name and unit of each parameter of one effect, with values and deviations by campaign."""
+    pa, compute = needed("pyarrow"), needed("pyarrow.compute")
+    of_effect = [("effect", "==", effect)]
+    read = needed("pyarrow.parquet").read_table(table, columns=[CAMPAIGN, "free"], filters=of_effect).combine_chunks()
+    told = pa.Table.from_struct_array(compute.list_flatten(read["free"])).to_pandas()
+    told[CAMPAIGN] = read[CAMPAIGN].take(compute.list_parent_indices(read["free"])).to_pandas()
+    for (name, unit), rows in told.groupby(["name", "unit"], sort=False):
+        yield name, unit, rows
+
+
+def _shared(
+    table: Path,
+    campaigns: pd.DataFrame,
+    robots: pd.DataFrame,
+    effects: Sequence[str],
+    progress: Callable[[str, int, int], None],
+) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
+    """Return what robots share, who stands out, the surest first each, and how many parameters were compared."""
+    import pandas as pd
+
+    codes, names = pd.factorize(campaigns[ROBOT])
+    robot_of = pd.Series(codes, index=campaigns[CAMPAIGN])
+    labels = {name: pd.factorize(robots[name]) for name in robots.columns}
+    together: list[Shared] = []
+    apart: list[Apart] = []
+    for k, effect in enumerate(effects, 1):
+        for name, unit, rows in _told(table, effect):
+            owners = robot_of[rows[CAMPAIGN]].to_numpy()
+            who, values, deviations = combined(rows["value"].to_numpy(), rows["std"].to_numpy(), owners)
+            if len(who) >= settings.FEWEST_ROBOTS:
+                found, usual, unlike = _compared((effect, name, unit), values, deviations, who, labels)
+                together.append(found)
+                told = zip(names[who], values, deviations, usual, unlike, strict=True)
+                some = ((robot, *map(float, rest)) for robot, *rest in told if rest[-1] >= settings.NAMED)
+                apart += [Apart(robot, effect, name, unit, *rest) for robot, *rest in some]
+        progress("effects compared", k, len(effects))
+    tests = len(together) * (1 + len(labels))
+    fair = [replace(s, p_mean=min(s.p_mean * tests, 1.0), p_label=min(s.p_label * tests, 1.0)) for s in together]
+    fair = [s if s.p_label < settings.STRIKING else replace(s, label="", p_label=1.0, groups=()) for s in fair]
+    kept = [s for s in fair if s.label or s.p_mean < settings.STRIKING]
+    kept.sort(key=lambda s: (min(s.p_mean, s.p_label), -abs(s.mean) / s.mean_std, s.effect, s.parameter))
+    apart.sort(key=lambda a: (-a.probability, -abs(a.value - a.usual) / a.std, a.robot, a.effect, a.parameter))
+    return tuple(kept), tuple(apart[: settings.MOST_LISTED]), len(together)
+
+
+def _compared(
+    what: tuple[str, str, str],
+    values: Array,
+    deviations: Array,
+    who: Codes,
+    labels: dict[str, tuple[Codes, Any]],
+) -> tuple[Shared, Array, Array]:
+    """Fit the population of a parameter, as one and by each label; what is usual for each robot, how it is unlike."""
+    whole = population(values, deviations)
+    mean, std = float(whole.means[0]), float(whole.deviations[0])
+    found = Shared(*what, len(who), mean, std, whole.spread, whole.spread_std, whole.nothing)
+    usual, unlike = np.full(len(who), mean), whole.apart
+    splits = []
+    for label, (codes, names) in labels.items():
+        kept = np.bincount(codes[who])[codes[who]] >= settings.FEWEST_IN_GROUP
+        groups, own = np.unique(codes[who][kept], return_inverse=True)
+        if len(groups) > 1:
+            splits.append((label, population(values[kept], deviations[kept], own), kept, own, names[groups]))
+    if not splits:
+        return found, usual, unlike
+    label, by, kept, own, names = min(splits, key=lambda split: split[1].alike)
+    told = zip(names, by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
+    groups_told = sorted((Group(*group) for group in told), key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group))
+    found = replace(found, label=label, p_label=by.alike, groups=tuple(groups_told[: settings.MOST_GROUPS]))
+    if by.alike < settings.STRIKING:
+        found = replace(found, spread=by.spread, spread_std=by.spread_std)
+        unlike = np.where(kept, 0.0, unlike)
+        usual[kept], unlike[kept] = by.means[own], by.apart
+    return found, usual, unlike

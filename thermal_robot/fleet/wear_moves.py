@@ -1,4 +1,4 @@
-"""What may have moved between campaigns, and the evidence for any combination of moves, from products alone.
+"""Bayesian change-point analysis: the evidence for any combination of moves between campaigns, from products alone.
 
 In campaign k the parameters are θ_k = θ + Σ_i a_i s_i(k) e_i: a constant for all campaigns, and moves. Of a move i,
 parameter e_i changes with a shape s_i over time: a step after campaign j (a jump), or a straight line (a trend). A walk
@@ -25,7 +25,7 @@ correlations, and for small chances not much less.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc, logsumexp
 
 from thermal_robot.arrays import Array
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.inference.algebra import equations_of, whitener
 
 
@@ -47,18 +47,28 @@ class Move(NamedTuple):
     after: int = -1
 
 
+Moves = tuple[Move, ...]
+
+
+class Grid(NamedTuple):
+    """Points at which scales and scatter are tried.
+
+    (H,) each: prior variance of moves, in expected sizes squared; φ²; log prior with the log likelihood if nothing
+    moves.
+    """
+
+    variance: Array
+    inflation: Array
+    log_base: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """K campaigns in the order of time, as products in units of the P parameters' expected sizes.
 
-    Attributes
-    ----------
-    matrices, vectors
-        (K, P, P) and (K, P): whitened, frames projected out. A parameter that a campaign does not have is zero in it.
-    times
-        (K,) not falling: days, or numbers.
-    followed
-        (P,) which parameters may move.
+    ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, frames projected out, zero for a parameter that a
+    campaign does not have; ``times`` (K,) are days or numbers, not falling; ``followed`` (P,) tells which parameters
+    may move.
     """
 
     matrices: Array
@@ -81,8 +91,7 @@ class Series:
         """(K, K) a step after each campaign but the last, of length 1, then the straight line, which rises by 1."""
         k = np.arange(self.count)
         steps = (k[None, :] > k[:-1, None]).astype(float)
-        middle = self.times.mean()
-        return np.vstack([steps, (self.times - middle)[None] / self.span])
+        return np.vstack([steps, (self.times - self.times.mean())[None] / self.span])
 
     @cached_property
     def constants(self) -> Array:
@@ -93,8 +102,7 @@ class Series:
     @cached_property
     def crossed(self) -> Array:
         """(P K, P) B: products of moves, parameter after parameter, with constants."""
-        found = np.einsum("ik,kpq->piq", self.shapes, self.matrices)
-        return equations_of(found)
+        return equations_of(np.einsum("ik,kpq->piq", self.shapes, self.matrices))
 
     @cached_property
     def information(self) -> Array:
@@ -111,61 +119,84 @@ class Series:
 
     @cached_property
     def scattered(self) -> tuple[float, float]:
-        """Squared distance of the campaigns from what is common to all, in deviations, and its degrees of freedom."""
-        distance, degrees = 0.0, 0
-        for matrix, vector in zip(self.matrices, self.vectors, strict=True):
-            root = whitener(matrix)
-            distance += float(((root.T @ vector) ** 2).sum())
-            degrees += root.shape[1]
-        total = self.vectors.sum(axis=0)
-        shared = whitener(self.matrices.sum(axis=0)).shape[1]
-        return max(distance - float(total @ self.constants @ total), 0.0), float(max(degrees - shared, 1))
+        """Chi-square of the campaigns about what is common to all, and its degrees of freedom."""
+        roots = [whitener(matrix) for matrix in self.matrices]
+        distance = sum(float(((r.T @ b) ** 2).sum()) for r, b in zip(roots, self.vectors, strict=True))
+        total, shared = self.vectors.sum(axis=0), whitener(self.matrices.sum(axis=0)).shape[1]
+        degrees = sum(root.shape[1] for root in roots) - shared
+        return max(distance - float(total @ self.constants @ total), 0.0), float(max(degrees, 1))
+
+    @cached_property
+    def grid(self) -> Grid:
+        """All scales of moves with all factors of scatter."""
+        scale, factor = np.array(settings.SCALES), np.array(settings.SCATTER)
+        distance, degrees = self.scattered
+        prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))
+        base = prior - logsumexp(prior) - 0.5 * distance / factor**2 - degrees * np.log(factor)
+        variance, inflation = np.meshgrid(scale**2, factor**2, indexing="ij")
+        log_base = np.broadcast_to(base - np.log(len(scale)), variance.shape)
+        return Grid(variance.ravel(), inflation.ravel(), log_base.ravel())
+
+    @property
+    def loose(self) -> Grid:
+        """The one point at which moves are held least, and campaigns scatter as they say."""
+        return Grid(self.grid.variance.max(keepdims=True), np.ones(1), np.zeros(1))
 
     @cached_property
     def columns(self) -> NDArray[np.int64]:
         """(C,) numbers of the single moves that are weighed: steps and the line of each parameter that is followed."""
         return np.flatnonzero(np.repeat(self.followed, self.count))
 
-    def spans(self, move: Move) -> list[int]:
-        """Return the columns that a move is made of."""
-        first = move.parameter * self.count
-        if move.kind == "walk":
-            return list(range(first, first + self.count - 1))
-        return [first + (move.after if move.kind == "jump" else self.count - 1)]
+    @property
+    def middle(self) -> NDArray[np.int64]:
+        """(P,) numbers of each parameter's step in the middle of the series."""
+        return np.arange(len(self.followed)) * self.count + (self.count - 2) // 2
 
-    def made_of(self, moves: Sequence[Move]) -> tuple[list[int], Array]:
-        """Return the columns of some moves, and the prior variance of each over the common one."""
-        walk = np.maximum(np.diff(self.times) / self.span, 1e-6)
-        shares = [walk if move.kind == "walk" else np.ones(1) for move in moves]
-        return [c for move in moves for c in self.spans(move)], np.concatenate([*shares, np.zeros(0)])
+    def made_of(self, moves: Sequence[Move]) -> tuple[NDArray[np.int64], Array]:
+        """(D,) columns of some moves, and the prior variance of each over the common one."""
+        columns: list[int] = []
+        shares: list[float] = []
+        for move in moves:
+            first = move.parameter * self.count
+            if move.kind == "walk":
+                columns += range(first, first + self.count - 1)
+                shares += np.maximum(np.diff(self.times) / self.span, 1e-6).tolist()
+            else:
+                columns.append(first + (move.after if move.kind == "jump" else self.count - 1))
+                shares.append(1.0)
+        return np.array(columns, dtype=np.int64), np.array(shares)
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Scales of moves and factors of scatter, each with its prior and what the base of all explanations is worth.
+class Beside(NamedTuple):
+    """Posterior of some moves at every point of a grid.
 
-    Attributes
-    ----------
-    variance, inflation
-        (H,) common prior variance of moves, in expected sizes squared, and φ².
-    log_base
-        (H,) log prior, and log likelihood if nothing moves.
+    (H,) log likelihood with the base, (H, D) mean, (H, D, D) covariance, and (D,) numbers of the moves' columns.
     """
 
-    variance: Array
-    inflation: Array
-    log_base: Array
+    log_likelihood: Array
+    mean: Array
+    covariance: Array
+    columns: NDArray[np.int64]
 
     @classmethod
-    def of(cls, series: Series) -> Grid:
-        """Return the grid of a series."""
-        scale, factor = (np.array(each) for each in (settings.SCALES, settings.SCATTER))
-        distance, degrees = series.scattered
-        prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))
-        base = prior - logsumexp(prior) - 0.5 * distance / factor**2 - degrees * np.log(factor)
-        variance, inflation = np.meshgrid(scale**2, factor**2, indexing="ij")
-        alike = np.broadcast_to(base - np.log(len(scale)), variance.shape)
-        return cls(variance.ravel(), inflation.ravel(), alike.ravel())
+    def of(cls, series: Series, moves: Sequence[Move], grid: Grid) -> Beside:
+        """Solve for some moves."""
+        columns, share = series.made_of(moves)
+        own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
+        deviation = np.sqrt(grid.variance[:, None] * share)
+        inside = own * deviation[:, :, None] * deviation[:, None, :] / grid.inflation[:, None, None]
+        tight = np.eye(len(columns)) + inside
+        covariance = deviation[:, :, None] * np.linalg.inv(tight) * deviation[:, None, :]
+        mean = covariance @ pull / grid.inflation[:, None]
+        gain = 0.5 * (mean @ pull) / grid.inflation - 0.5 * np.linalg.slogdet(tight)[1]
+        return cls(grid.log_base + gain, mean, covariance, columns)
+
+    def left(self, series: Series, others: NDArray[np.int64], grid: Grid) -> tuple[Array, Array]:
+        """Return (H, C) information on other columns beside these, and their pull; φ² = 1 in its units."""
+        cross = series.information[np.ix_(others, self.columns)]
+        along = cross @ self.covariance
+        own = series.information[others, others] - (along * cross).sum(axis=2) / grid.inflation[:, None]
+        return np.maximum(own, 0.0), series.pull[others] - self.mean @ cross.T
 
 
 def log_prior(move: Move, series: Series) -> float:
@@ -176,111 +207,42 @@ def log_prior(move: Move, series: Series) -> float:
     return float(np.log(one / (1.0 - one)) + np.log(settings.KINDS[move.kind] / days))
 
 
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """Some moves at every point of the grid, and what is left of the others beside them.
+def explanations(series: Series) -> dict[Moves, float]:
+    """Return combinations of moves with their posterior probabilities, the most probable first; ``()`` is no move.
 
-    Attributes
-    ----------
-    log_likelihood
-        (H,) with the base.
-    mean, covariance
-        (H, D) and (H, D, D) of the moves' columns.
-    columns
-        Their numbers.
+    Every single move is compared, then each more beside those that are likeliest so far (beam search).
     """
-
-    log_likelihood: Array
-    mean: Array
-    covariance: Array
-    columns: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, series: Series, grid: Grid, moves: Sequence[Move]) -> Beside:
-        """Solve for some moves."""
-        listed, share = series.made_of(moves)
-        columns = np.array(listed, dtype=np.int64)
-        own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
-        deviation = np.sqrt(grid.variance[:, None] * share)
-        inside = own * deviation[:, :, None] * deviation[:, None, :] / grid.inflation[:, None, None]
-        tight = np.eye(len(columns)) + inside
-        whole = deviation[:, :, None] * np.linalg.inv(tight) * deviation[:, None, :]
-        mean = whole @ pull / grid.inflation[:, None]
-        gain = 0.5 * (mean @ pull) / grid.inflation - 0.5 * np.linalg.slogdet(tight)[1]
-        return cls(grid.log_base + gain, mean, whole, columns)
-
-    def left(self, series: Series, grid: Grid, others: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Return (H, C) information on other columns beside these, and their pull; φ² = 1 in its units."""
-        cross = series.information[np.ix_(others, self.columns)]
-        along = cross @ self.covariance
-        own = series.information[others, others] - (along * cross).sum(axis=2) / grid.inflation[:, None]
-        return np.maximum(own, 0.0), series.pull[others] - self.mean @ cross.T
-
-
-Moves = tuple[Move, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Explanations:
-    """All combinations of moves that were compared.
-
-    Attributes
-    ----------
-    series, grid
-        Of what.
-    moves, probabilities
-        Most probable first; an empty combination says that nothing moves.
-    """
-
-    series: Series
-    grid: Grid
-    moves: tuple[Moves, ...]
-    probabilities: Array
-
-    @property
-    def best(self) -> Moves:
-        """The most probable combination."""
-        return self.moves[0]
-
-    def of_parameter(self, parameter: int) -> dict[Move, float]:
-        """Return the probability of each move of one parameter; what is left to 1 is that it stays."""
-        found: dict[Move, float] = {}
-        for moves, probability in zip(self.moves, self.probabilities, strict=True):
-            for move in moves:
-                if move.parameter == parameter:
-                    found[move] = found.get(move, 0.0) + float(probability)
-        return found
-
-
-def explanations(series: Series) -> Explanations:
-    """Compare combinations of moves: every single one, then each more beside those that are likeliest so far."""
-    grid, known = Grid.of(series), {}
-    nothing: Moves = ()
-    known[frozenset(nothing)] = float(logsumexp(grid.log_base))
-    beam: list[Moves] = [nothing]
+    known: dict[Moves, float] = {(): float(logsumexp(series.grid.log_base))}
+    beam: list[Moves] = [()]
     for _ in range(settings.MOST_MOVING):
-        wider: dict[frozenset[Move], float] = {}
+        wider: dict[Moves, float] = {}
         for moves in beam:
-            wider |= {frozenset((*moves, move)): value for move, value in _one_more(series, grid, moves).items()}
+            wider |= _one_more(series, moves)
         known |= wider
         top = max(known.values())
-        likely = sorted((v, sorted(m)) for m, v in wider.items() if v > top - settings.NEGLIGIBLE)
-        beam = [tuple(moves) for _, moves in likely[::-1][: settings.BEAM]]
-        if not beam:
-            break
-    ranked = sorted(known.items(), key=lambda item: (-item[1], sorted(item[0])))
-    values = np.array([value for _, value in ranked])
-    return Explanations(series, grid, tuple(tuple(sorted(m)) for m, _ in ranked), np.exp(values - logsumexp(values)))
+        likely = sorted((v, m) for m, v in wider.items() if v > top - settings.NEGLIGIBLE)
+        beam = [moves for _, moves in likely[::-1][: settings.BEAM]]
+    ranked = sorted(known.items(), key=lambda item: (-item[1], item[0]))
+    weights = np.exp(np.array([value for _, value in ranked]) - logsumexp(list(known.values())))
+    return {moves: float(weight) for (moves, _), weight in zip(ranked, weights, strict=True)}
 
 
-def _one_more(series: Series, grid: Grid, moves: Moves) -> dict[Move, float]:
+def moves_of(found: Mapping[Moves, float], parameter: int) -> dict[Move, float]:
+    """Return the posterior probability of each move of one parameter; what is left to 1 is that it stays."""
+    own: dict[Move, float] = {}
+    for moves, probability in found.items():
+        for move in moves:
+            if move.parameter == parameter:
+                own[move] = own.get(move, 0.0) + probability
+    return own
+
+
+def _one_more(series: Series, moves: Moves) -> dict[Moves, float]:
     """Return the log posterior of combinations of these moves and one more, of a parameter that stayed so far."""
-    beside, taken = Beside.of(series, grid, moves), {move.parameter for move in moves}
+    grid, taken = series.grid, {move.parameter for move in moves}
     columns = np.array([c for c in series.columns if c // series.count not in taken], dtype=np.int64)
-    if not len(columns):
-        return {}
-    before = sum(log_prior(move, series) for move in moves)
-    own, pull = beside.left(series, grid, columns)
+    beside = Beside.of(series, moves, grid)
+    own, pull = beside.left(series, columns, grid)
     inflation, variance = grid.inflation[:, None], grid.variance[:, None]
     share = variance * own / inflation
     gain = 0.5 * pull**2 * variance / (inflation**2 * (1.0 + share)) - 0.5 * np.log1p(share)
@@ -288,43 +250,33 @@ def _one_more(series: Series, grid: Grid, moves: Moves) -> dict[Move, float]:
     found = {}
     for column, value in zip(columns.tolist(), single.tolist(), strict=True):
         parameter, shape = divmod(column, series.count)
-        move = Move(parameter, "jump", shape) if shape < series.count - 1 else Move(parameter, "trend")
-        found[move] = value + before + log_prior(move, series)
+        found[Move(parameter, "jump", shape) if shape < series.count - 1 else Move(parameter, "trend")] = value
     for parameter in dict.fromkeys((columns // series.count).tolist()):
         walk = Move(parameter, "walk")
-        whole = Beside.of(series, grid, (*moves, walk)).log_likelihood
-        found[walk] = float(logsumexp(whole)) + before + log_prior(walk, series)
-    return found
+        found[walk] = float(logsumexp(Beside.of(series, (*moves, walk), grid).log_likelihood))
+    before = sum(log_prior(move, series) for move in moves)
+    return {tuple(sorted((*moves, m))): value + before + log_prior(m, series) for m, value in found.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Constants and moves together.
-
-    Attributes
-    ----------
-    series
-        Of which.
-    columns
-        Numbers of the D moves.
-    mean, covariance
-        (P + D,) and (P + D, P + D) constants, then moves, in expected sizes.
-    """
+    """Posterior of P constants, then D moves, in expected sizes: mean (P + D,) and covariance (P + D, P + D)."""
 
     series: Series
-    columns: tuple[int, ...]
+    columns: NDArray[np.int64]
     mean: Array
     covariance: Array
 
     @classmethod
-    def of(cls, series: Series, grid: Grid, moves: Sequence[Move], free: int | None = None) -> State:
+    def of(cls, series: Series, moves: Sequence[Move], free: int | None = None, grid: Grid | None = None) -> State:
         """Solve for moves at the most probable scale and scatter, one parameter ``free`` as each campaign has it."""
-        point = int(np.argmax(Beside.of(series, grid, moves).log_likelihood))
+        grid = grid or series.grid
+        point = int(np.argmax(Beside.of(series, moves, grid).log_likelihood))
         inflation = float(grid.inflation[point])
         columns, share = series.made_of([move for move in moves if move.parameter != free])
-        steps = [] if free is None else series.spans(Move(free, "walk"))
+        steps, _ = series.made_of([] if free is None else [Move(free, "walk")])
         variance = np.concatenate([grid.variance[point] * share, np.full(len(steps), settings.WIDE**2)])
-        columns += steps
+        columns = np.concatenate([columns, steps])
         own = series.information[np.ix_(columns, columns)] / inflation + np.diag(1.0 / variance)
         inner = np.linalg.inv(own)
         amounts = inner @ series.pull[columns] / inflation
@@ -332,46 +284,26 @@ class State:
         mean = series.constants @ series.vectors.sum(axis=0) - carried @ amounts
         across = -carried @ inner
         whole = np.block([[inflation * series.constants - across @ carried.T, across], [across.T, inner]])
-        return cls(series, tuple(columns), np.concatenate([mean, amounts]), whole)
+        return cls(series, columns, np.concatenate([mean, amounts]), whole)
 
-    def over_time(self, parameter: int) -> tuple[Array, Array]:
-        """(K,) value of a parameter in each campaign, and its deviation."""
+    def path(self, parameter: int) -> Array:
+        """(K, P + D) what the value of a parameter in each campaign is made of."""
+        owner, shape = np.divmod(self.columns, self.series.count)
         along = np.zeros((self.series.count, len(self.mean)))
         along[:, parameter] = 1.0
-        for k, column in enumerate(self.columns):
-            owner, shape = divmod(column, self.series.count)
-            if owner == parameter:
-                along[:, len(self.series.followed) + k] = self.series.shapes[shape]
-        variance = np.einsum("ki,ij,kj->k", along, self.covariance, along)
-        return along @ self.mean, np.sqrt(np.maximum(variance, 0.0))
+        along[:, len(self.series.followed) :] = np.where(owner == parameter, self.series.shapes[shape].T, 0.0)
+        return along
 
-    def amount(self, column: int) -> tuple[float, float]:
-        """Return how far one move goes, and its deviation."""
-        k = len(self.series.followed) + self.columns.index(column)
-        return float(self.mean[k]), float(np.sqrt(self.covariance[k, k]))
-
-    def line(self, parameter: int, column: int) -> tuple[Array, Array]:
-        """(2,) value of a parameter in the last campaign and its rate, per unit of time; (2, 2) their covariance."""
-        k, last = len(self.series.followed) + self.columns.index(column), self.series.shapes[-1, -1]
-        along = np.zeros((2, len(self.mean)))
-        along[0, parameter], along[0, k], along[1, k] = 1.0, last, 1.0 / self.series.span
+    def told(self, along: Array) -> tuple[Array, Array]:
+        """(R,) values of linear combinations (R, P + D), and (R, R) their covariance."""
         return along @ self.mean, along @ self.covariance @ along.T
 
 
 def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float, float | None] | None:
     """Return when a straight line reaches ±limit: the expected time from now, and a 95 % interval (Fieller 1954).
 
-    Parameters
-    ----------
-    value, covariance
-        (2,) value now and rate; (2, 2).
-    limit
-        Of the absolute value.
-
-    Returns
-    -------
-    tuple or None
-        Its upper end is ``None`` where the line may as well never get there; ``None`` where it does not move at all.
+    From its (2,) value now and rate and their (2, 2) covariance. The upper end is ``None`` where the line may as well
+    never get there; all is ``None`` where it does not move.
     """
     now, rate = float(value[0]), float(value[1])
     if rate == 0.0:
@@ -388,65 +320,46 @@ def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float
     return distance / rate, max((middle - root) / square, 0.0), max((middle + root) / square, 0.0)
 
 
-def chances(series: Series, grid: Grid, moves: tuple[Move, ...]) -> Array:
+def chances(series: Series, moves: Moves) -> Array:
     """(P,) bound on the chance that a series without change shows a move as clear as the clearest of each parameter.
 
-    Parameters
-    ----------
-    series, grid
-        The campaigns.
-    moves
-        The best explanation: each parameter is judged beside the moves of the others.
-
-    Returns
-    -------
-    numpy.ndarray
-        1 for parameters that are not followed.
+    Each parameter is judged beside the ``moves`` of the others; 1 for one that is not followed.
     """
-    found = np.ones(len(series.followed))
-    moving, columns = {move.parameter for move in moves}, series.columns
-    shared = _chances(series, grid, moves) if len(columns) else np.zeros(0)
+    found, owner = np.ones(len(series.followed)), series.columns // series.count
+    moving = {move.parameter for move in moves}
+    shared = _chances(series, moves)
     for parameter in np.flatnonzero(series.followed).tolist():
         rest = tuple(move for move in moves if move.parameter != parameter)
-        single = _chances(series, grid, rest) if parameter in moving else shared
-        found[parameter] = min(float(single[columns // series.count == parameter].min()), 1.0)
+        single = _chances(series, rest) if parameter in moving else shared
+        found[parameter] = min(float(single[owner == parameter].min()), 1.0)
     return found
 
 
-def scatter(series: Series, grid: Grid, moves: tuple[Move, ...]) -> float:
+def scatter(series: Series, moves: Moves) -> float:
     """Return φ² as the campaigns show it beside some moves, not less than 1."""
-    distance, degrees = _left(series, grid, moves)
+    distance, degrees = _left(series, Beside.of(series, moves, series.loose))
     return max(distance / degrees, 1.0)
 
 
-def _left(series: Series, grid: Grid, moves: tuple[Move, ...]) -> tuple[float, float]:
-    """Return Q and ν: the squared distance of the campaigns from what some moves say, and its degrees of freedom."""
+def _left(series: Series, beside: Beside) -> tuple[float, float]:
+    """Return Q and ν: the chi-square of the campaigns about what some moves say, and its degrees of freedom."""
     distance, degrees = series.scattered
-    beside = Beside.of(series, _wide(grid), moves)
-    if len(beside.columns):
-        distance -= float(beside.mean[0] @ series.pull[beside.columns])
+    distance -= float(beside.mean[0] @ series.pull[beside.columns])
     return max(distance, 0.0), max(degrees - len(beside.columns), 2.0)
 
 
-def _chances(series: Series, grid: Grid, moves: tuple[Move, ...]) -> Array:
+def _chances(series: Series, moves: Moves) -> Array:
     """(C,) bound on the chance of each single move beside others, which are taken as wide as the grid has them."""
-    own, pull = Beside.of(series, _wide(grid), moves).left(series, _wide(grid), series.columns)
-    seen = own[0] > settings.HIDDEN * np.diag(series.information)[series.columns]
+    if not len(series.columns):
+        return np.zeros(0)
+    beside, information = Beside.of(series, moves, series.loose), np.diag(series.information)[series.columns]
+    own, pull = beside.left(series, series.columns, series.loose)
+    seen = own[0] > settings.HIDDEN * information
     square = np.where(seen, pull[0] ** 2 / np.where(seen, own[0], 1.0), 0.0)
-    distance, degrees = _left(series, grid, moves)
+    distance, degrees = _left(series, beside)
     rest = np.maximum(distance - square, 0.0) / (degrees - 1.0)
     tail = fdtrc(1.0, degrees - 1.0, square / np.maximum(rest, 1.0))
-    return np.asarray(np.where(seen, tail, 1.0) / _weights(series))
-
-
-def _weights(series: Series) -> Array:
-    """(C,) share of each single move in the chance."""
-    information = np.diag(series.information)[series.columns]
     inverse = 1.0 / np.maximum(information, settings.HIDDEN * max(float(information.max()), settings.HIDDEN))
     owner = series.columns // series.count
-    return np.asarray(inverse / np.bincount(owner, inverse)[owner] / len(np.unique(owner)))
-
-
-def _wide(grid: Grid) -> Grid:
-    """Return the one point of a grid at which moves are held least, and campaigns scatter as they say."""
-    return Grid(grid.variance.max(keepdims=True), np.ones(1), np.zeros(1))
+    weights = inverse / np.bincount(owner, inverse)[owner] / len(np.unique(owner))
+    return np.asarray(np.where(seen, tail, 1.0) / weights)

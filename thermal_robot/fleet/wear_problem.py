@@ -1,4 +1,4 @@
-"""Several campaigns of one robot as one linear problem: the same parameters in all, each campaign's frames its own.
+"""Joint least squares of several campaigns of one robot: the same parameters in all, each campaign's frames its own.
 
 Parameters are those of the effects that were named in any campaign, and what somebody could set anew
 (:attr:`Effect.told_inside`): a collision shows in the zeros of joints, whether or not those were off before. All
@@ -25,7 +25,7 @@ from thermal_robot.effects import Effect, Parameter, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EffectError
-from thermal_robot.fleet import wear_settings as settings
+from thermal_robot.fleet import settings
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
@@ -40,16 +40,11 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """K campaigns as products of the P parameters that they have in common, in units of their expected sizes.
+    """Normal equations of K campaigns in the P parameters that they have in common, in units of their expected sizes.
 
-    Attributes
-    ----------
-    keys, parameters, titles
-        Of each parameter: effect and name; what it is, without responses; its effect in plain words.
-    matrices, vectors
-        (K, P, P) and (K, P): whitened, and what is a campaign's own taken off.
-    has
-        (K, P) whether a campaign can say anything of a parameter: it has the columns that its effect reads.
+    ``keys`` are names of effect and parameter, ``parameters`` the same without responses, ``titles`` their effects in
+    plain words; ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, what is a campaign's own taken off; ``has``
+    (K, P) tells whether a campaign can say anything of a parameter: it has the columns that its effect reads.
     """
 
     keys: tuple[Key, ...]
@@ -58,11 +53,6 @@ class Problem:
     matrices: Array
     vectors: Array
     has: NDArray[np.bool_]
-
-    @property
-    def sizes(self) -> Array:
-        """(P,) expected size of each parameter, SI."""
-        return np.array([parameter.size for parameter in self.parameters])
 
 
 def require_alike(fits: Sequence[Fit]) -> None:
@@ -73,33 +63,27 @@ def require_alike(fits: Sequence[Fit]) -> None:
     CampaignError
         Naming the campaign that is of another robot than the first.
     """
-    first = fits[0].campaign
-    for fit in fits[1:]:
-        campaign, robot = fit.campaign, first.robot
-        for what, found, expected in (
-            ("joints", campaign.robot.joint_names, robot.joint_names),
-            ("tool frame", campaign.robot.tool_frame, robot.tool_frame),
-            ("root frame", campaign.robot.root_frame, robot.root_frame),
+    first, robot = fits[0].campaign, fits[0].campaign.robot
+    for campaign in (fit.campaign for fit in fits[1:]):
+        other = campaign.robot
+        for what, found, wanted in (
+            ("joints", other.joint_names, robot.joint_names),
+            ("tool frame", other.tool_frame, robot.tool_frame),
+            ("root frame", other.root_frame, robot.root_frame),
         ):
-            if found != expected:
+            if found != wanted:
+                expected = f"{wanted}, as in {first.name}"
                 raise CampaignError(
-                    campaign.name, "is of another robot", column=what, found=str(found),
-                    expected=f"{expected}, as in {first.name}",
-                )  # fmt: skip
-        if campaign.robot.urdf != robot.urdf:
-            raise CampaignError(
-                campaign.name, "has another URDF, so that its errors are counted from another model",
-                expected=f"the text of {first.name}'s; name the same file in both",
-            )  # fmt: skip
+                    campaign.name, "is of another robot", column=what, found=str(found), expected=expected
+                )
+        if other.urdf != robot.urdf:
+            problem = "has another URDF, so that its errors are counted from another model"
+            expected = f"the text of {first.name}'s; name the same file in both"
+            raise CampaignError(campaign.name, problem, expected=expected)
 
 
 def problem(fits: Sequence[Fit]) -> Problem:
-    """Put campaigns, each fitted by itself, into one problem.
-
-    Parameters
-    ----------
-    fits
-        Of K campaigns, in the order of time.
+    """Put campaigns, each fitted by itself and in the order of time, into one problem.
 
     Raises
     ------
@@ -107,29 +91,23 @@ def problem(fits: Sequence[Fit]) -> Problem:
         If the unknown frames of one cannot be fitted.
     """
     shared = _shared([effect for fit in fits for effect, _ in fit.effects], fits[0].nominal)
-    own = [[effect for effect, _ in fit.effects if _begins_anew(effect, fit.nominal)] for fit in fits]
-    visits = [_Visit.of(fit, shared, mine) for fit, mine in zip(fits, own, strict=True)]
+    tellable = [dict(_told([gate.elsewhere(effect, fit.nominal) for effect in shared], fit.nominal)) for fit in fits]
     listed: dict[Key, Parameter] = {}
-    for visit in visits:
-        listed |= {key: p for key, p in visit.shared.items() if key not in listed}
-    titles = {effect.name: effect.title for effect in shared}
-    keys, values = tuple(listed), np.zeros(len(listed))
-    sizes = np.array([listed[key].size for key in keys])
-    for _ in range(settings.ROUNDS):
-        parts = [visit.products(keys, sizes, values) for visit in visits]
+    for one in tellable:
+        listed |= {key: parameter for key, parameter in one.items() if key not in listed}
+    keys, bare = tuple(listed), tuple(replace(parameter, responses=()) for parameter in listed.values())
+    sizes, values = np.array([parameter.size for parameter in bare]), np.zeros(len(keys))
+    visits = [_Visit.of(fit, keys, one) for fit, one in zip(fits, tellable, strict=True)]
+    for _ in range(settings.LINEARISATIONS):
+        parts = [visit.products(sizes, values) for visit in visits]
         matrices, vectors = (np.array(each) for each in zip(*parts, strict=True))
         total = matrices.sum(axis=0) + np.eye(len(keys)) / settings.WIDE**2
         values = sizes * np.linalg.solve(total, vectors.sum(axis=0))
         for visit in visits:
-            visit.step(keys, values)
-    return Problem(
-        keys,
-        tuple(replace(listed[key], responses=()) for key in keys),
-        tuple(titles[name] for name, _ in keys),
-        matrices,
-        vectors,
-        np.array([[key in visit.shared for key in keys] for visit in visits]),
-    )
+            visit.step(values)
+    titles = {effect.name: effect.title for effect in shared}
+    has = np.array([visit.here for visit in visits])
+    return Problem(keys, bare, tuple(titles[name] for name, _ in keys), matrices, vectors, has)
 
 
 def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect, ...]:
@@ -172,62 +150,52 @@ class _AsTold(Effect):
 
 @dataclass(eq=False)
 class _Visit:
-    """One campaign: what it says of the common parameters, about a model that is improved step by step.
+    """One campaign, linearised about a common model that is improved step by step.
 
-    Attributes
-    ----------
-    fit
-        Of it alone: its rows, weights and noise.
-    shared, own
-        Parameters with their responses in its rows: those of all campaigns, and its own.
-    frames
-        So far.
-    linear, whitening
-        The last linearisation.
+    ``here`` (P,) tells which of the common parameters it can tell; ``common`` are these with their responses in its
+    rows, ``own`` its own; ``linear`` is the last linearisation, about ``frames``.
     """
 
     fit: Fit
-    shared: dict[Key, Parameter]
+    here: NDArray[np.bool_]
+    common: tuple[Parameter, ...]
     own: tuple[Parameter, ...]
-    frames: Frames
     whitening: Whitening
-    linear: Linear | None = None
+    frames: Frames
+    linear: Linear
 
     @classmethod
-    def of(cls, fit: Fit, shared: Sequence[Effect], own: Sequence[Effect]) -> _Visit:
+    def of(cls, fit: Fit, keys: Sequence[Key], told: dict[Key, Parameter]) -> _Visit:
         """Read the parameters' responses in the rows of a campaign; an effect whose columns it lacks has none."""
-        listed = dict(_told([gate.elsewhere(effect, fit.nominal) for effect in shared], fit.nominal))
-        mine = tuple(p for effect in own for p in _named(effect, gate.checked(effect, fit.nominal)))
-        best, white = fit.explanation.best, fit.explanation.whitening
-        return cls(fit, listed, mine, fit.nominal.frames, replace(white, noise=white.noise * best.noise))
+        fresh = [effect for effect, _ in fit.effects if _begins_anew(effect, fit.nominal)]
+        own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
+        white, linear = fit.explanation.whitening, fit.explanation.linear
+        white = replace(white, noise=white.noise * fit.explanation.best.noise)
+        common = tuple(told[key] for key in keys if key in told)
+        return cls(fit, np.array([key in told for key in keys]), common, own, white, fit.nominal.frames, linear)
 
-    def products(self, keys: Sequence[Key], sizes: Array, values: Array) -> tuple[Array, Array]:
+    def products(self, sizes: Array, values: Array) -> tuple[Array, Array]:
         """Return (P, P) and (P,) products about values of the common parameters."""
-        here = np.array([key in self.shared for key in keys])
-        told = [self.shared[key] for key in keys if key in self.shared]
-        campaign = self.fit.campaign
+        here, campaign = self.here, self.fit.campaign
         nominal = observe(campaign, self.frames)
-        change, instrument = displacement(nominal, [(_AsTold(told=tuple(told)), values[here])])
+        change, instrument = displacement(nominal, [(_AsTold(told=self.common), values[here])])
         seen = observe(campaign, self.frames, displacement=change, instrument=instrument)
-        columns = moved_by(seen, (*told, *self.own))
-        gap = seen.gap + columns[:, :, : len(told)] @ values[here]
+        columns = moved_by(seen, (*self.common, *self.own))
+        gap = seen.gap + columns[:, :, : here.sum()] @ values[here]
         scale = np.concatenate([sizes[here], [p.size for p in self.own]])
-        block = Block(_AsTold(), (), columns, scale)
-        self.linear = Linear(gap, frame_columns(seen)[0], (block,))
+        self.linear = Linear(gap, frame_columns(seen)[0], (Block(_AsTold(), (), columns, scale),))
         stack = whitened(self.linear, self.whitening)
-        matrix, vector = _without_own(stack.T @ stack, self.linear.frames.shape[2], scale, len(told))
-        whole, along = np.zeros((len(keys), len(keys))), np.zeros(len(keys))
-        whole[np.ix_(here, here)], along[here] = matrix, vector
-        return whole, along
+        matrix, vector = np.zeros((len(here), len(here))), np.zeros(len(here))
+        flat = self.linear.frames.shape[2]
+        matrix[np.ix_(here, here)], vector[here] = _without_own(stack.T @ stack, flat, scale, int(here.sum()))
+        return matrix, vector
 
-    def step(self, keys: Sequence[Key], values: Array) -> None:
+    def step(self, values: Array) -> None:
         """Move the frames to where they fit best with new values of the common parameters."""
-        if self.linear is None or not self.linear.frames.shape[2]:
-            return
-        here = np.array([values[k] for k, key in enumerate(keys) if key in self.shared])
-        left = self.linear.gap - self.linear.blocks[0].columns[:, :, : len(here)] @ here
-        step = frame_step(self.linear, self.whitening, left)
-        self.frames = moved(self.frames, step, frame_columns(self.fit.nominal)[1])
+        common = self.linear.blocks[0].columns[:, :, : self.here.sum()]
+        if self.linear.frames.shape[2]:
+            step = frame_step(self.linear, self.whitening, self.linear.gap - common @ values[self.here])
+            self.frames = moved(self.frames, step, frame_columns(self.fit.nominal)[1])
 
 
 def _told(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:

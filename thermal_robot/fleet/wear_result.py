@@ -1,14 +1,15 @@
-"""What is said of a robot over time: frozen values, as text and as JSON of the schema ``thermal-robot/wear/1``."""
+"""Change points, rates and alarms of one robot over time: frozen values, as text and as JSON."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from thermal_robot.files import write_text
+from thermal_robot.fleet import settings
 from thermal_robot.percents import percent
 
 SCHEMA = "thermal-robot/wear/1"
@@ -98,7 +99,7 @@ class Crossing:
     dates: tuple[str, str, str] = ("", "", "")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Worn:
     """One parameter over time; SI.
 
@@ -143,20 +144,20 @@ class Worn:
     unit: str
     comparable: bool
     reason: str
-    alarm: bool
-    chance: float
-    moved: float
-    kind: str
-    kinds: dict[str, float]
-    jump: Jump | None
-    rate: Rate | None
+    alarm: bool = False
+    chance: float = 1.0
+    moved: float = 0.0
+    kind: str = "constant"
+    kinds: dict[str, float] = field(default_factory=dict)
+    jump: Jump | None = None
+    rate: Rate | None = None
     change: float
     change_std: float
     values: tuple[float | None, ...]
     stds: tuple[float | None, ...]
     fitted: tuple[float, ...]
-    crossing: Crossing | None
-    confounded_with: tuple[str, ...]
+    crossing: Crossing | None = None
+    confounded_with: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,8 +200,11 @@ class Wear:
 
     @property
     def summary(self) -> str:
-        """One sentence."""
-        return _summary(self)
+        """What moved, how and when, in one sentence."""
+        span = f"{len(self.campaigns)} campaigns of {self.robot}"
+        if not self.alarms:
+            return f"Over {span} nothing moves that would not by chance in {_share(self.false_alarm)} of such series."
+        return f"Over {span}: {'; '.join(_moves(self, worn) for worn in self.alarms)}."
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
@@ -219,37 +223,31 @@ class Wear:
         return "\n".join(_lines(self))
 
 
-_LIKELY = 0.5
-"""Probability from which on a parameter that does not ring is named beside those that do."""
-
-
-def _summary(wear: Wear) -> str:
-    """Return one sentence: what moved, how and when."""
-    span = f"{len(wear.campaigns)} campaigns of {wear.robot}"
-    if not wear.alarms:
-        return f"Over {span} nothing moves that would not by chance in {_share(wear.false_alarm)} of such series."
-    told = "; ".join(_moves(wear, worn) for worn in wear.alarms)
-    return f"Over {span}: {told}."
-
-
 def _lines(wear: Wear) -> Iterator[str]:
-    yield _summary(wear)
-    yield ""
     first, last = wear.campaigns[0], wear.campaigns[-1]
     days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
+    yield wear.summary
+    yield ""
     yield f"campaigns    {len(wear.campaigns)}{days}"
     yield f"alarms       at most {_share(wear.false_alarm)} of series without a change ring"
     yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {percent(wear.nothing)}"
-    for worn in wear.parameters:
-        if worn.alarm:
-            yield ""
-            yield from _of_one(wear, worn)
-    likely = [w for w in wear.parameters if not w.alarm and w.comparable and w.moved > _LIKELY]
-    if likely:
+    for worn in wear.alarms:
         yield ""
-        yield from (f"perhaps      {_moves(wear, w)}: {percent(w.moved, 0)}, but no alarm" for w in likely)
+        yield from _of_one(wear, worn)
+    quiet = [w for w in wear.parameters if w.comparable and not w.alarm]
+    if any(w.moved > settings.LIKELY for w in quiet):
+        yield ""
+    for w in quiet:
+        if w.moved > settings.LIKELY:
+            yield f"perhaps      {_moves(wear, w)}: {percent(w.moved, 0)}, but no alarm"
     yield ""
-    yield from _others(wear, {w.parameter for w in likely})
+    stays = [w for w in quiet if w.moved <= settings.LIKELY]
+    if stays:
+        yield f"stays        {'; '.join(f'{w.parameter} (moved: {percent(w.moved)})' for w in stays)}"
+    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
+    hidden = [w for w in wear.parameters if not w.comparable]
+    for reason in dict.fromkeys(w.reason for w in hidden):
+        yield f"not compared {', '.join(w.parameter for w in hidden if w.reason == reason)}: {reason}"
     yield from (f"note         {note}" for note in wear.notes)
 
 
@@ -258,32 +256,19 @@ def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
     kinds = ", ".join(f"{kind} {percent(p, 0)}" for kind, p in worn.kinds.items() if p >= 0.005)
     yield f"             chance of such an alarm without a change: at most {worn.chance:.1g}; {kinds}"
     if worn.jump:
-        a, b = wear.campaigns[worn.jump.earliest], wear.campaigns[worn.jump.latest]
-        yield f"             95 %: between {_when(wear, a.name, a.date)} and {_when(wear, b.name, b.date)}"
+        yield f"             95 %: {_between(wear, worn.jump.earliest, worn.jump.latest)}"
     if worn.confounded_with:
         yield f"             cannot be told from a change of {', '.join(worn.confounded_with)}"
     if worn.crossing:
         yield f"             {_reaches(worn.crossing, worn.unit)}"
 
 
-def _others(wear: Wear, named: set[str]) -> Iterator[str]:
-    stays = [w for w in wear.parameters if w.comparable and not w.alarm and w.parameter not in named]
-    if stays:
-        yield f"stays        {'; '.join(f'{w.parameter} (moved: {percent(w.moved)})' for w in stays)}"
-    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
-    hidden = [w for w in wear.parameters if not w.comparable]
-    for reason in dict.fromkeys(w.reason for w in hidden):
-        names = ", ".join(w.parameter for w in hidden if w.reason == reason)
-        yield f"not compared {names}: {reason}"
-
-
 def _moves(wear: Wear, worn: Worn) -> str:
     """Say how one parameter moves."""
     name = f"{worn.title}, {worn.parameter}"
     if worn.jump is not None:
-        a, b = wear.campaigns[worn.jump.after], wear.campaigns[worn.jump.after + 1]
-        where = f"between {_when(wear, a.name, a.date)} and {_when(wear, b.name, b.date)}"
         size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"
+        where = _between(wear, worn.jump.after, worn.jump.after + 1)
         return f"{name} jumped by {size} {where} ({percent(worn.jump.probability, 0)})"
     if worn.rate is not None:
         return f"{name} moves by {worn.rate.value:+.3g} ± {worn.rate.std:.2g} {worn.unit} a day"
@@ -291,18 +276,20 @@ def _moves(wear: Wear, worn: Worn) -> str:
     return f"{name} {how}, by {worn.change:+.3g} ± {worn.change_std:.2g} {worn.unit} from first to last"
 
 
-def _when(wear: Wear, name: str, date: str) -> str:
-    return f"{name} ({date})" if wear.dated else name
+def _between(wear: Wear, first: int, last: int) -> str:
+    visits = (wear.campaigns[first], wear.campaigns[last])
+    return "between " + " and ".join(f"{v.name} ({v.date})" if wear.dated else v.name for v in visits)
 
 
 def _reaches(crossing: Crossing, unit: str) -> str:
     limit = f"limit {crossing.limit:.3g} {unit}"
-    if crossing.state == "passed":
-        return f"{limit}: passed"
-    if crossing.state == "never":
-        return f"{limit}: never, as it does not go there"
-    if crossing.state == "unknown":
-        return f"{limit}: not foreseen, for lack of a rate"
+    said = {
+        "passed": "passed",
+        "never": "never, as it does not go there",
+        "unknown": "not foreseen, for lack of a rate",
+    }
+    if crossing.state in said:
+        return f"{limit}: {said[crossing.state]}"
     expected, low, high = crossing.dates
     return f"{limit}: about {expected} (95 %: {low} to {high or 'never'})"
 
