@@ -97,7 +97,7 @@ def test_a_joint_stands_where_its_law_puts_it_and_is_drawn_against_what_drives_i
         units["compliance"] = "m/N" if length else "rad/(N·m)"
         assert parameter.unit == units.get(parameter.label, own)
         assert parameter.size == {"zero offset": 5e-4 if length else 1e-3}.get(parameter.label, parameter.size)
-    np.testing.assert_allclose(tool_with(campaign, effect, values), tool_at(arm, q), atol=1e-13)
+    np.testing.assert_allclose(tool_with(campaign, effect, values), tool_at(arm, q), atol=1e-14)
 
 
 def test_joints_that_stood_still_have_no_lag_and_a_model_does_not_forget_the_others(rv_m2):

@@ -12,7 +12,7 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin, get_type_hints
 
-from thermal_robot import schema
+import thermal_robot.schema as schema
 from thermal_robot.campaign.settings import TEMPERATURE
 from thermal_robot.effects.effect import Effect
 from thermal_robot.schema import Kind, MisfitError, number

@@ -147,15 +147,16 @@ def named(name: str) -> Effect:
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
     """Return what an answer says of one effect; :class:`UnknownEffectError` says which name was probably meant."""
     if name not in answers:
-        meant = did_you_mean(str(name), answers) or f"; there are {', '.join(sorted(answers)) or 'none'}"
-        raise UnknownEffectError(f"no effect named {name!r} was considered{meant}")
+        raise UnknownEffectError(f"no effect named {name!r} was considered{_meant(str(name), answers)}")
     return answers[name]
 
 
+def _meant(name: str, known: Iterable[str]) -> str:
+    return did_you_mean(name, known) or f"; there are {', '.join(sorted(known)) or 'none'}"
+
+
 def _unknown(name: str, known: Iterable[str]) -> EffectError:
-    there = dict.fromkeys((*known, *RANDOM))
-    meant = did_you_mean(name, there) or f"; there are {', '.join(sorted(there))}"
-    return EffectError(f"no effect is named {name!r}{meant}")
+    return EffectError(f"no effect is named {name!r}{_meant(name, (*known, *RANDOM))}")
 
 
 def choose(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate
 from thermal_robot.effects.arguments import Count, NotNegative
@@ -32,7 +33,7 @@ from thermal_robot.effects.effect import (
     in_words,
 )
 from thermal_robot.effects.fading import Fading, ends, left_at
-from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
+from thermal_robot.effects.quantities import TURN, driving, quantity, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
 
@@ -145,8 +146,9 @@ class Discovered(Fading):
         of, clock = SHAPES[self.shape].of, self.values(observations)
         if of == "quantity" or clock is None:
             return clock
-        if of == "strains":
-            return strains(observations, self.quantity.removeprefix(TURN), self.marks)
+        if of == "strains":  # of each element over what makes it slip, −1 to 1
+            past, joint = observations.campaign.since_turn, self.quantity.removeprefix(TURN)
+            return np.column_stack([past[strained(joint, slip)] / slip for slip in self.marks])
         since, run = self._since_start(observations, clock)
         if of == "run":
             return since[:, None]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
-from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects import settings
 from thermal_robot.effects.effect import Driver
@@ -118,14 +117,6 @@ def began(observations: Observations, clock: Array) -> dict[str, float]:
     if rows is None:
         return {"": float(clock.min())}
     return {str(run): float(clock[rows == run].min()) for run in np.unique(rows)}
-
-
-def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
-    """(N, K) strains of a joint's elements over what makes them slip, −1 to 1 ; ``None`` without order."""
-    past = observations.campaign.since_turn
-    if joint not in past:
-        return None
-    return np.column_stack([past[strained(joint, slip)] / slip for slip in slips])
 
 
 def driving(observations: Observations, name: str) -> Driver | None:
