@@ -39,23 +39,18 @@ class Backlash(Effect):
     than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad, two minutes of arc: catalogues promise
     0.3 mrad of cycloidal gears (1′), wear adds to it, and light arms show ten.
 
-    Friction in a loaded gear grows with the load, and holds the gear wound up on the side from which it came: lost
-    motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), as the hysteresis of strain-wave gears widens with torque.
-    Expected size 0.5 mrad at the joint's largest torque.
+    Hysteresis of a loaded gear grows with the load: lost motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), of
+    0.5 mrad at the joint's largest torque. A slide's carriage turns when it reverses, by −½ t_e side about each axis e
+    of the joint's frame. Expected size 0.05 mrad: catalogues of guides state pitch and yaw of 5 to 20″.
 
-    A slide has play in its guides, too: drive and friction pull beside each other, and the carriage turns when it
-    reverses, by −½ t_e side about each axis e of the joint's frame. The carriage sits on what moves, or stays where the
-    stroke begins. Expected size 0.05 mrad, 10 seconds of arc: catalogues of guides state pitch and yaw of 5 to 20″.
+    Only poses that are reached from both sides show it. Where torque decides always, only a jump at zero torque tells
+    it from :class:`JointCompliance`.
 
-    Only poses that are reached from both sides show it. Where torque decides always, it is nearly
-    :class:`JointCompliance`, from which only a jump at zero torque tells it.
-
-    ``held``: share of the joint's ``largest`` torque in the campaign, N·m (a model goes by this, whatever it is asked
-    to predict), above which gravity wins, 0 never; one for all joints or one for each of the ``chain``. ``soft``: share
-    of friction over which teeth change sides, 0 at once. ``steady``: each joint's torque, N·m, that all but a tenth of
-    the rows exceed to one side; with less friction it always lies on that side: an offset, that is left to it.
-    ``grows``: lost motion grows with the torque. ``carriage`` of a slide sits ``moving`` with it or ``staying``; empty
-    where none turns.
+    ``held``: share of the joint's ``largest`` torque in the campaign, N·m, above which gravity wins, 0 never; one for
+    all joints or one for each of the ``chain``. ``soft``: share of friction over which teeth change sides, 0 at once.
+    ``steady``: each joint's torque, N·m, that all but a tenth of the rows exceed to one side; with less friction it
+    always lies there: an offset. ``grows``: lost motion grows with the torque. ``carriage`` of a slide sits ``moving``
+    with it or ``staying`` where the stroke begins; empty where none turns.
     """
 
     held: Share | tuple[Share, ...] = 0.0

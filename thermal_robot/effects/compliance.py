@@ -89,16 +89,11 @@ class BaseCompliance(_Yielding):
     """Base compliance: pedestal, floor or vehicle tip by c_e M_e about each horizontal axis e of the root frame; rad.
 
     M (N·m) is the moment of the weight of all links, and of the payload, about the root frame's origin (the URDF's
-    masses); c_e in rad/(N·m), a spring about each axis. What yields ``below`` the origin, a floor under a pedestal,
-    moves the whole arm sideways, too: by c_e h_e M_e, with c_e h_e in m/(N·m), for a depth h_e of the place that
-    yields. Expected size: it tips by 0.2 mrad at the largest moment of the campaign, 0.5 m below; from a foundation to
-    a vehicle nobody knows it better.
-
-    Where an inclinometer on the base was read, its reading (``tilt``) is the turn about these axes of the root frame,
-    times a gain, 1 where it stands where the base does; and a depth in m. A constant reading is a frame of the base.
-
-    Springs in the joints let each arm beyond them yield to its own load, this one the whole arm to all of it. A joint
-    that turns the arm about the vertical tells the two axes apart.
+    masses); c_e in rad/(N·m), a spring about each axis. What yields ``below`` the origin moves the whole arm sideways,
+    too: by c_e h_e M_e, with c_e h_e in m/(N·m), for a depth h_e. Expected size: it tips by 0.2 mrad at the largest
+    moment of the campaign, 0.5 m below. Where an inclinometer on the base was read, its reading (``tilt``) is the turn
+    about these axes times a gain, 1 where it stands where the base does; and a depth in m. A joint that turns the arm
+    about the vertical tells the two axes apart.
     """
 
     below: bool = False

@@ -39,12 +39,10 @@ class Geometric(Effect):
     """Geometric error: every segment's placement is off by a constant twist, P_s exp(ξ_s), LOCAL.
 
     ξ_s = (translation, rotation). Expected size 0.5 mm and 0.5 mrad a component, what uncalibrated industrial arms show
-    (Mooring, Roth and Driels 1991; the UR and ABB arms of the public campaigns); an arm that its maker calibrated shows
-    tenths of that, a light one several times as much.
-
-    The six parameters of a segment are redundant along and about parallel axes and with unknown frames; the prior
-    sizes hold what the data do not determine. It contains :class:`JointOffset`, :class:`InstrumentScale` and
-    :class:`ThermalElongation` at constant temperature.
+    (Mooring, Roth and Driels 1991; the UR and ABB arms of the public campaigns): a calibrated arm shows tenths of that,
+    a light one several times as much. The six parameters of a segment are redundant along and about parallel axes and
+    with unknown frames; the prior sizes hold what the data do not determine. It contains :class:`JointOffset`,
+    :class:`InstrumentScale` and :class:`ThermalElongation` at constant temperature.
     """
 
     name: ClassVar[str] = "geometric"
@@ -122,11 +120,9 @@ class JointOffset(Effect):
     """Joint zero error (mastering): q_actual = q_command + o_j.
 
     Expected size 1 mrad (0.5 mm for a prismatic joint), the order that mastering with a gauge leaves
-    (Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*, 1991).
-
-    The first joint's offset is exactly a turn of the base about that joint's axis, and the last one's a turn of the
-    tool: with unknown frames neither can be told. All offsets are contained in :class:`Geometric`; where that
-    was found, they are what a controller's zeros can take of it.
+    (Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*, 1991). The first joint's offset is exactly a
+    turn of the base about that joint's axis, the last one's a turn of the tool: with unknown frames neither can be
+    told. Where :class:`Geometric` was found, offsets are what a controller's zeros can take of it.
     """
 
     name: ClassVar[str] = "joint_offset"
@@ -155,9 +151,8 @@ class BaseFrame(Effect):
     """Registration error of the base: its declared pose is off by a constant twist in the root frame.
 
     Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted before
-    any effect is asked for. It is a twist of the first joint's placement, too, so that :class:`Geometric` contains it.
-    Where the first joint turns about an axis of the root frame, its zero offset is a turn of the base about that axis
-    alone, and no measurement of the tool tells which it is. ``alone`` names the one component that is off.
+    any effect is asked for. It is a twist of the first joint's placement, too (:class:`Geometric`), and about that
+    joint's axis its zero offset. ``alone`` names the one component that is off.
     """
 
     alone: str = ""
@@ -194,10 +189,9 @@ class ToolFrame(Effect):
     """Tool-centre-point error: the declared place of the target is off by a constant twist in the tool frame.
 
     Expected size 2 mm and 2 mrad; a campaign of positions shows the three translations only. Only where the campaign
-    declares ``tool = "known"``: an unknown tool is fitted before any effect is asked for. ``turns``: the three
-    rotations are parameters, too; ``None`` asks the campaign, while a model keeps what it was fitted with, as commands
-    to be predicted carry no measured orientation. ``alone`` names the one component that is off. Turned about the last
-    joint's axis, the tool is where that joint's zero offset would put it.
+    declares ``tool = "known"``. ``turns``: the three rotations are parameters, too; ``None`` asks the campaign, while a
+    model keeps what it was fitted with. ``alone`` names the one component that is off. About the last joint's axis it
+    is that joint's zero offset.
     """
 
     turns: bool | None = None
@@ -241,8 +235,7 @@ class InstrumentScale(Effect):
 
     Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per
     kelvin, a camera or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share
-    look exactly alike, so :class:`Geometric` contains it, unless a joint slides or the target stands off a known tool
-    frame; with an unknown base the place of the origin does not matter.
+    look alike, so :class:`Geometric` contains it, unless a joint slides or the target stands off a known tool frame.
     """
 
     name: ClassVar[str] = "instrument_scale"

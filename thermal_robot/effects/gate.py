@@ -123,7 +123,8 @@ def elsewhere(effect: Effect, observations: Observations) -> Effect:
 
 def unfaded(effect: Effect) -> Effect:
     """Effect as it goes on beyond the rows where it was found, if it has such a range."""
-    return replace(effect, fades=False) if getattr(effect, "found", ()) else effect  # type: ignore[call-arg]
+    ends = getattr(effect, "fades", False) and getattr(effect, "found", ())
+    return replace(effect, fades=False) if ends else effect  # type: ignore[call-arg]
 
 
 def variants(effect: Effect, observations: Observations) -> tuple[Effect, ...]:

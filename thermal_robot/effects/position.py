@@ -31,8 +31,8 @@ _NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part
 class OfPosition(Fading):
     """Functions of the joints' own positions: all that a joint has end together, as they may cancel in part.
 
-    Over less than a turn a gain, slow waves and laws look alike, and only their sum is known. What has seen a whole
-    turn is known everywhere, if it comes back after a turn or is a gain; so is the gain of a joint that slides.
+    What has seen a whole turn is known everywhere, if it comes back after a turn or is a gain; so is the gain of a
+    joint that slides.
     """
 
     def _ended(self, observations: Observations, joint: int, order: float) -> tuple[Array, Array]:
@@ -143,15 +143,14 @@ class TransmissionError(Waves):
 class JointRipple(Waves):
     """Transmission error of high order, ripple: q_actual = q_command + Σ_k a_k sin(n_k q) + b_k cos(n_k q).
 
-    Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain
-    wave gears are rated for a transmission error of 1 to 2 minutes of arc peak to peak, most of it twice a turn of the
-    motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. Expected size 0.1 mrad. What comes round
-    once or twice in a turn is :class:`TransmissionError`. Where the campaign states a gear ratio, an order near a whole
-    or half multiple of it is said to be the motor's.
+    Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number.
+    Expected size 0.1 mrad: strain-wave gears are rated for 1 to 2 minutes of arc peak to peak, most of it twice a turn
+    of the motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. An order near a whole or half
+    multiple of a stated gear ratio is said to be the motor's.
 
-    ``orders`` (rad per rad; rad/m where the joint slides) are no parameters: they are looked for in what remains, joint
-    by joint, and join one after another (:mod:`thermal_robot.inference.generate`); ``tried`` is among how many
-    waves all of these were picked, the product of the numbers for each. Without waves the effect does nothing.
+    ``orders`` (rad per rad; rad/m where the joint slides) are looked for in what remains, joint by joint
+    (:mod:`thermal_robot.inference.generate`); ``tried`` is among how many waves all of these were picked, the product
+    of the numbers for each. Without waves the effect does nothing.
     """
 
     joints: tuple[str, ...] = ()

@@ -80,22 +80,19 @@ _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below a
 class ThermalElongation(Effect):
     """Thermal expansion: every segment lengthens with its link's temperature, Δl_s = α_s l_s (T_link − T_reference).
 
-    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a ``common`` one for all, or a
-    common one with a smaller deviation above it for each (partial pooling; ``spread``: its expected size, 0 for none),
-    along the virtual prismatic joint of their Eqs 6-8. No link shrinks when it becomes warmer: none of them is
-    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5, twice that where it warms twice as
-    much as its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
-    the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
-    link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
+    Equation 5 of Kluz et al. (2018), along the virtual prismatic joint of their Eqs 6-8, with a coefficient of its own
+    for each segment, a ``common`` one for all, or a common one with a smaller deviation above it for each (partial
+    pooling; ``spread``: its expected size, 0 for none). No link shrinks when it becomes warmer. Expected size 1.5e-5 /K
+    (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5); of a polymer ``[priors]`` says more. Where one sensor reads the air or
+    a place on the robot, the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to
+    an hour for a cast link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
 
-    Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount that
-    depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
-    temperature turns or jumps within the campaign: of a steady rise it merely takes off a constant.
+    A steady rise with time resembles :class:`Drift`, but moves the tool by an amount that depends on the pose; constant
+    temperature is :class:`Geometric`. A lag shows only where the temperature turns or jumps within the campaign.
 
-    ``times`` and ``temperatures``: the campaign's record, s and °C, kept where there is a ``lag``, s, as a later sample
-    knows only its own instant. ``starts``: instants, s, from which it holds: the first row, and the first of each
-    session, as nobody reads the sensor in between. ``balanced``: the links are then as warm as the record lets expect;
-    else they differ by some kelvin, of which exp(−(t − start) / lag) is left at t.
+    ``times`` and ``temperatures``: the campaign's record, s and °C, kept where there is a ``lag``, s. ``starts``:
+    instants, s, from which it holds: the first row, and the first of each session. ``balanced``: the links are then as
+    warm as the record lets expect; else they differ by some kelvin, of which exp(−(t − start) / lag) is left at t.
     """
 
     common: bool = False

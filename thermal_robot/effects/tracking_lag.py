@@ -22,13 +22,12 @@ class TrackingLag(Effect):
 
     T (s) is the servo's delay, or that between the command's clock and the instrument's; f (rad or m) the error that
     dry friction leaves in a loop without integral part; a (s²) what inertia and interpolation add: ½ T² for a pure
-    delay. Three parameters a joint, a only where ``acceleration.<joint>`` is recorded. Expected sizes 1 ms, 0.1 mrad
-    (0.1 mm) and 1e-6 s² (Siciliano et al., *Robotics: Modelling, Planning and Control*, 2009, chapter 8). ``moving``
-    and ``accelerating`` joints are taken from the observations where absent.
+    delay. a only where ``acceleration.<joint>`` is recorded. Expected sizes 1 ms, 0.1 mrad (0.1 mm) and 1e-6 s²
+    (Siciliano et al., *Robotics: Modelling, Planning and Control*, 2009, chapter 8). ``moving`` and ``accelerating``
+    joints are taken from the observations where absent.
 
-    Friction depends on the sign of the speed alone, as :class:`Backlash` does on that of the last move: where each pose
-    is passed in the direction of approach, backlash is exactly this f, and is preferred where it suffices. The delay,
-    which grows with speed, is only here: measure the same poses at several speeds.
+    Where each pose is passed in the direction of approach, :class:`Backlash` is exactly this f, and is preferred where
+    it suffices. The delay, which grows with speed, is only here: measure the same poses at several speeds.
     """
 
     moving: tuple[str, ...] | None = None
