@@ -17,9 +17,8 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import CampaignError, CorrectedModel, EffectError, ThermalRobotError
-from thermal_robot.effects import Backlash, Drift, Effect, Geometric, ThermalElongation, TransmissionError
+from thermal_robot.effects import Backlash, Drift, Effect, Geometric, JointRipple, ThermalElongation, TransmissionError
 from thermal_robot.effects.gate import checked
-from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.law import Discovered
 from thermal_robot.model_file import PARTS, SCHEMA, VERSION, checksum
 from thermal_robot.observations import Frames, observe

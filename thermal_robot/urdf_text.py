@@ -77,20 +77,18 @@ def _written(urdf: WritesUrdf) -> str:
 def _read(path: Path) -> Source:
     source = f"the robot file {str(path)!r}"
     try:
-        if path.exists() and not path.is_dir():
-            if not path.is_file():
-                raise RobotError(f"{source} is a pipe or a device, not a file", name=str(path))
-            if path.stat().st_size > _LARGEST_FILE:
-                raise RobotError(f"{source} is larger than any URDF ({_LARGEST_FILE >> 20} MiB)", name=str(path))
-        return Source(_decoded(path.read_bytes()).lstrip(), source, path.resolve().parent)
-    except IsADirectoryError:
-        problem = "is a folder, not a URDF file"
-    except FileNotFoundError:
+        if path.is_dir():
+            problem = "is a folder, not a URDF file"
+        elif path.exists() and not path.is_file():
+            problem = "is a pipe or a device, not a file"
+        elif path.exists() and path.stat().st_size > _LARGEST_FILE:
+            problem = f"is larger than any URDF ({_LARGEST_FILE >> 20} MiB)"
+        else:
+            return Source(_decoded(path.read_bytes()).lstrip(), source, path.resolve().parent)
+    except (FileNotFoundError, ValueError):  # or a name that no file can have
         problem = "does not exist"
     except OSError as error:
         problem = f"cannot be read: {error.strerror}"
-    except ValueError:  # a name that no file can have
-        problem = "does not exist"
     raise RobotError(f"{source} {problem}", name=str(path))
 
 

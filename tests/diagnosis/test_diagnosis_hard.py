@@ -10,7 +10,7 @@ from simulate import simulate
 
 import thermal_robot
 from thermal_robot import EffectError, EstimationError, ThermalRobotError, diagnose
-from thermal_robot.effects.joint_offset import JointOffset
+from thermal_robot.effects import JointOffset
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 

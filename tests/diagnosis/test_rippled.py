@@ -8,8 +8,7 @@ from inference.test_ripple import rippling
 from thermal_robot import diagnose
 from thermal_robot.diagnosis import prune
 from thermal_robot.diagnosis.prune import grown
-from thermal_robot.effects import choose
-from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.effects import JointRipple, choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit
 

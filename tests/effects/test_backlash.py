@@ -24,30 +24,12 @@ def approached(arm, seed=6, **more):
     return approach, commanded(arm, columns, **more)
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
-def test_lost_motion_stops_half_of_it_short_of_where_the_joint_was_going(arm):
-    approach, campaign = approached(arm)
-    lost = 2e-3 * (1.0 + np.arange(arm.n))
-    expected = tool_at(arm, campaign.q - 0.5 * lost * approach)
-    np.testing.assert_allclose(tool_with(campaign, Backlash(), lost), expected, atol=1e-14)
-
-
-def test_a_joint_without_a_recorded_approach_has_no_parameter(rv_m2):
+def test_a_joint_without_a_recorded_approach_has_no_parameter_and_one_that_comes_one_way_no_driver(rv_m2):
     _, campaign = approached(rv_m2)
-    campaign = campaign.drop_covariate("approach.joint_2")
-    places = [p.place for p in Backlash().parameters(observe(campaign))]
-    assert places == [n for n in rv_m2.joint_names if n != "joint_2"]
-    assert Backlash().missing(observe(campaign)) == ()
-    assert "approach.joint_2" not in Backlash().reads(observe(campaign))
-
-
-def test_it_is_drawn_against_the_approach_where_that_varies(rv_m2):
-    approach, campaign = approached(rv_m2)
-    observations = observe(campaign)
-    for j, parameter in enumerate(Backlash().parameters(observations)):
-        name, unit, values = Backlash().driver(observations, [parameter], approach[:, j])
-        assert (name, unit) == (f"approach.{parameter.place}", "")
-        np.testing.assert_array_equal(values, approach[:, j])
+    less = observe(campaign.drop_covariate("approach.joint_2"))
+    others = [n for n in rv_m2.joint_names if n != "joint_2"]
+    assert [p.place for p in Backlash().parameters(less)] == others
+    assert (Backlash().missing(less), Backlash().reads(less)) == ((), tuple(f"approach.{n}" for n in others))
     still = observe(replace(campaign, covariates={**campaign.covariates, "approach.joint_1": np.ones(SAMPLES)}))
     assert Backlash().driver(still, Backlash().parameters(still)[:1], np.ones(SAMPLES)) is None
 
@@ -63,6 +45,7 @@ def test_no_torque_no_play_that_hangs(rv_m2):
     assert (odds[1:] / odds[:-1] < 4.5).all()  # refinement reaches what lies between
     plain = [s.weight for s in variants if not s.held and not s.grows]
     assert sum(s.weight for s in variants if s.held) == pytest.approx(sum(plain))
+    assert not any(s.carriage for s in variants)  # joints that turn have none
     floating = replace(rv_m2, gravity=np.zeros(3))
     assert Backlash().variants(observe(replace(campaign, robot=floating))) == (Backlash(),)
 
@@ -77,52 +60,50 @@ def test_shares_near_another_stay_shares():
     assert Backlash().nearby(1.6) == (Backlash(),)
 
 
+def sides(effect, here):
+    return [-2.0 * parameter.responses[0].values for parameter in effect.parameters(here)]
+
+
 def test_each_joint_hangs_by_its_own_share(rv_m2):
     approach, campaign = approached(rv_m2, seed=8)
-    here = observe(campaign)
+    here, shares = observe(campaign), tuple(np.linspace(0.2, 0.9, rv_m2.n).tolist())
     largest = Backlash().variants(here)[1].largest
-    shares = tuple(np.linspace(0.2, 0.9, rv_m2.n).tolist())
-    each = Backlash(shares, largest).parameters(here)
+    each = sides(Backlash(shares, largest), here)
     for j, share in enumerate(shares):
-        alone = Backlash(share, largest).parameters(here)[j]
-        np.testing.assert_array_equal(each[j].responses[0].values, alone.responses[0].values)
-    same = Backlash((0.5,) * rv_m2.n, largest).parameters(here)
-    for one, other in zip(same, Backlash(0.5, largest).parameters(here), strict=True):
-        np.testing.assert_array_equal(one.responses[0].values, other.responses[0].values)
+        np.testing.assert_array_equal(each[j], sides(Backlash(share, largest), here)[j])
+    same = sides(Backlash((0.5,) * rv_m2.n, largest), here)
+    np.testing.assert_array_equal(same, sides(Backlash(0.5, largest), here))
     # a joint whose share is 0 goes by its approach alone, and a model with shares must know torques
     never = Backlash((0.0,) * rv_m2.n, largest)
-    np.testing.assert_array_equal(never.parameters(here)[1].responses[0].values, -0.5 * approach[:, 1])
+    np.testing.assert_array_equal(sides(never, here)[1], approach[:, 1])
     assert never.nearby(1.6) == (never,)
     assert restored("backlash", json.dumps(Backlash(shares, largest).arguments())) == Backlash(shares, largest)
 
 
+CHAIN = ("shoulder", "wrist", "elbow")
+HELD = Backlash(held=0.5, largest=(10.0, 0.01, 5.0), chain=CHAIN)  # the wrist is too light to hang
+
+
 def test_shares_move_together_and_each_alone():
-    chain = ("shoulder", "wrist", "elbow")
-    held = Backlash(held=0.5, largest=(10.0, 0.01, 5.0), chain=chain)  # the wrist is too light to hang
-    near = held.nearby(2.0)
+    near = HELD.nearby(2.0)
     together = sorted(s.held for s in near if isinstance(s.held, float))
     assert together == pytest.approx([1 / 3, 0.5, 2 / 3])
     own = {s.held for s in near if isinstance(s.held, tuple)}
-    moved = {tuple(np.flatnonzero(np.array(shares) != 0.5).tolist()) for shares in own}
-    assert moved == {(0,), (2,)}
+    assert {tuple(np.flatnonzero(np.array(shares) != 0.5).tolist()) for shares in own} == {(0,), (2,)}
     # or one of them never hangs
     assert {shares for shares in own if 0.0 in shares} == {(0.0, 0.5, 0.5), (0.5, 0.5, 0.0)}
     assert len(near) == 1 + 2 + 4 + 2
-    # one that has moved alone still goes with the others, its odds by the same factor
-    apart = replace(held, held=(0.5, 0.5, 0.8))
+    # one that has moved alone still goes with the others, its odds by the same factor; or all go by one again
+    apart = replace(HELD, held=(0.5, 0.5, 0.8))
     odds = {round(s.held[2] / (1 - s.held[2]), 9) for s in apart.nearby(2.0) if isinstance(s.held, tuple)}
     assert odds == {0.0, 2.0, 4.0, 8.0}
-    # or all go by one again
     assert {s.held for s in apart.nearby(2.0) if not isinstance(s.held, tuple)} == {0.5, 0.8}
-    assert (held.apart, apart.apart) == (0, 1)
+    assert (HELD.apart, apart.apart) == (0, 1)
     # where there is but one joint, its share is the only one
-    assert len(replace(held, places=("elbow",)).nearby(2.0)) == 3
-    assert len(replace(held, places=("elbow", "wrist", "shoulder")).nearby(2.0)) == len(near)
-
-
-def test_one_joint_alone_may_hang():
-    chain = ("shoulder", "wrist", "elbow")
-    never = Backlash(largest=(10.0, 0.01, 5.0), chain=chain)  # the wrist is too light to hang
+    assert len(replace(HELD, places=("elbow",)).nearby(2.0)) == 3
+    assert len(replace(HELD, places=CHAIN).nearby(2.0)) == len(near)
+    # one joint alone may hang
+    never = replace(HELD, held=0.0)
     alone = [s for s in never.nearby(2.0) if s != never]
     assert {tuple(np.flatnonzero(s.held).tolist()) for s in alone} == {(0,), (2,)}
     assert all(s.apart == 1 for s in alone)
@@ -158,32 +139,29 @@ def test_play_that_hangs_lies_where_the_load_pushes_it(arm):
 def test_teeth_change_sides_over_a_share_of_friction(rv_m2):
     """At friction a tooth lies in the middle; a film's width to either side it lies nearly at one, however it came."""
     approach, campaign = approached(rv_m2, seed=8)
-    here, j = observe(campaign), 1
+    here, j, between = observe(campaign), 1, []
     load, largest = here.torque[:, j], np.abs(here.torque).max(axis=0)
     # friction is the torque of one row in the middle, which thus stands just where its teeth change sides
     middle = np.argsort(np.abs(load))[len(load) // 2]
-    friction, sides = np.abs(load[middle]), {}
+    friction = np.abs(load[middle])
+    heavy = np.where(np.abs(load) > friction, np.sign(load), approach[:, j])
     for soft in (0.0, 0.05, 0.2):
-        effect = Backlash(float(friction / largest[j]), tuple(largest.tolist()), soft=soft)
-        sides[soft] = -2.0 * effect.parameters(here)[j].responses[0].values
-        against = approach[:, j] * np.sign(load) < 0.0
-        far = np.abs(np.abs(load) - friction) > 2.0 * soft * friction
-        far[middle] = False
-        heavy = np.where(np.abs(load) > friction, np.sign(load), approach[:, j])
-        np.testing.assert_allclose(sides[soft][far], heavy[far], atol=0.01)
-        assert not against[middle] or sides[soft][middle] == pytest.approx(0.0, abs=1e-9)
-        assert (np.abs(sides[soft]) <= 1.0).all()
+        side = sides(Backlash(float(friction / largest[j]), tuple(largest.tolist()), soft=soft), here)[j]
+        far = (np.abs(np.abs(load) - friction) > 2.0 * soft * friction) & (np.arange(len(load)) != middle)
+        np.testing.assert_allclose(side[far], heavy[far], atol=0.01)
+        assert approach[middle, j] * load[middle] >= 0.0 or side[middle] == pytest.approx(0.0, abs=1e-9)
+        assert (np.abs(side) <= 1.0).all()
+        between.append(int((np.abs(side) < 0.99).sum()))
     # the thicker the film, the more rows lie between
-    between = [int((np.abs(side) < 0.99).sum()) for side in sides.values()]
     assert between == sorted(between)
     assert between[-1] > between[0]
 
 
 def test_the_film_is_refined_within_what_is_dry_friction():
-    held = Backlash(held=0.5, largest=(10.0, 5.0), chain=("shoulder", "elbow"), soft=0.05)
+    held = replace(HELD, soft=0.05)
     assert {round(s.soft, 9) for s in held.nearby(2.0)} == {0.05, 0.1, 0.025}
     assert all(0.0 < s.soft < 0.5 for s in held.nearby(100.0))
-    assert all(s.soft == 0.0 for s in replace(held, soft=0.0).nearby(2.0))
+    assert all(s.soft == 0.0 for s in HELD.nearby(2.0))
 
 
 def test_play_that_always_lies_on_one_side_is_left_to_the_offset(rv_m2):
@@ -197,7 +175,7 @@ def test_play_that_always_lies_on_one_side_is_left_to_the_offset(rv_m2):
     j = int(np.argmax(load.max(axis=0)))
     one_sided = replace(effect, steady=tuple(np.where(np.arange(rv_m2.n) == j, 0.5 * load.max(axis=0), 0.0).tolist()))
     for share, still in ((0.4, True), (0.6, False)):
-        values = replace(one_sided, held=share).parameters(here)[j].responses[0].values
+        values = sides(replace(one_sided, held=share), here)[j]
         assert bool(np.ptp(values) == 0.0) is still
         assert not still or (values == 0.0).all()
 
@@ -267,11 +245,6 @@ def test_a_carriage_with_play_turns_about_where_it_sits(arm, moving):
     assert restored("backlash", json.dumps(effect.arguments())) == effect
 
 
-def test_joints_that_turn_have_no_carriage(rv_m2):
-    _, campaign = approached(rv_m2)
-    assert not any(s.carriage for s in Backlash().variants(observe(campaign)))
-
-
 def measured(arm, true, seed, samples=150):
     """A campaign of poses reached from either side, whose robot errs by ``true(approach, observations)``; m, noisy."""
     rng = np.random.default_rng(seed)
@@ -282,16 +255,23 @@ def measured(arm, true, seed, samples=150):
     return replace(plain, position=true(approach, plain) + NOISE * rng.normal(size=(samples, 3)))
 
 
+def found(campaign):
+    """The effect that is found in a campaign, and its parameters, values and standard deviations."""
+    known = fit(campaign, choose(("backlash", "joint_compliance", "joint_gain")))
+    ((effect, values),) = known.effects
+    assert effect.name == "backlash"
+    best = known.explanation.best.blocks[0]
+    deviations = np.sqrt(np.diag(known.explanation.values[best][1]))
+    return effect, list(zip(known.explanation.linear.blocks[best].parameters, values, deviations, strict=True))
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_lost_motion_that_grows_is_told_from_one_that_does_not(rv_m2, seed):
     def grown(approach, plain):
         return tool_at(rv_m2, plain.q - 0.5 * (2e-4 + 3e-5 * np.abs(observe(plain).torque)) * approach)
 
-    known = fit(measured(rv_m2, grown, seed), choose(("backlash", "joint_compliance", "joint_gain")))
-    ((effect, values),) = known.effects
-    assert (effect.name, effect.grows) == ("backlash", True)
-    deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
-    rows = zip(effect.parameters(known.corrected), values, deviations, strict=True)
+    effect, rows = found(measured(rv_m2, grown, seed))
+    assert effect.grows
     off = [(v - 3e-5) / s for p, v, s in rows if "torque" in p.label and s < 1e-5]
     assert len(off) >= 2
     assert np.abs(off).max() < 4.0
@@ -306,11 +286,8 @@ def test_a_carriage_that_turns_is_found_with_its_slide(seed):
         turn = -0.5 * 4e-4 * approach[:, arm.joint_names.index("rail")]
         return tool_at(there, np.insert(plain.q, there.joint_names.index("hinge"), turn, axis=1))
 
-    known = fit(measured(arm, turned, seed), choose(("backlash", "joint_compliance", "joint_gain")))
-    ((effect, values),) = known.effects
-    assert (effect.name, effect.carriage) == ("backlash", "moving")
-    block = known.explanation.linear.blocks[known.explanation.best.blocks[0]]
-    deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
-    (k,) = (k for k, p in enumerate(block.parameters) if (p.place, p.label) == ("rail", "turn about z at reversal"))
-    assert abs(values[k] - 4e-4) < 4.0 * deviations[k]
-    assert deviations[k] < 4e-5
+    effect, rows = found(measured(arm, turned, seed))
+    assert effect.carriage == "moving"
+    ((value, deviation),) = [(v, s) for p, v, s in rows if (p.place, p.label) == ("rail", "turn about z at reversal")]
+    assert abs(value - 4e-4) < 4.0 * deviation
+    assert deviation < 4e-5

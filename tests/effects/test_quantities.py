@@ -1,4 +1,4 @@
-"""What an error may follow, its unit, and that only what varies is listed."""
+"""Covariates that an error may follow: their units, what is rounding or rest or a twin, and what drives an effect."""
 
 from dataclasses import replace
 
@@ -6,69 +6,116 @@ import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 
-from thermal_robot.effects.quantities import GRAVITY, REACH, began, driving, position_of, quantities, quantity, unit
+from thermal_robot.effects.quantities import (
+    GRAVITY,
+    REACH,
+    began,
+    driving,
+    position_of,
+    quantities,
+    quantity,
+    resolution,
+    torque_columns,
+    unit,
+    varies,
+    without_twins,
+)
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import observe
 
+RNG = np.random.default_rng(4)
+STILL = 0.7 + 7e-7 * RNG.uniform(-1.0, 1.0, 200)  # to 1.4 µrad, however many digits
 
-@pytest.mark.parametrize(
-    ("name", "turning", "sliding"),
-    [
-        ("{}", "rad", "m"),
-        ("encoder.{}", "rad", "m"),
-        ("velocity.{}", "rad/s", "m/s"),
-        ("acceleration.{}", "rad/s²", "m/s²"),
-        ("torque.{}", "N·m", "N"),
-        ("approach.{}", "", ""),
-    ],
-)
-def test_a_quantity_of_a_joint_has_the_unit_of_how_the_joint_moves(awkward, name, turning, sliding):
+
+def test_a_quantity_has_the_unit_of_its_column_and_of_how_its_joint_moves(awkward, rv_m2):
+    per_joint = {"{}": "rad", "encoder.{}": "rad", "velocity.{}": "rad/s", "acceleration.{}": "rad/s²"}
     for joint, kind in zip(awkward.joint_names, awkward.joint_types, strict=True):
-        assert unit(awkward, name.format(joint)) == (sliding if kind == "prismatic" else turning)
-
-
-def test_what_no_joint_of_the_chain_records_has_no_known_unit(awkward):
-    assert {unit(awkward, name) for name in ("velocity.nobody", "torque", "time.start", "reach.w")} == {""}
-
-
-def test_other_quantities_have_the_unit_of_their_column(rv_m2):
+        slides = kind == "prismatic"
+        for name, turning in per_joint.items():
+            assert unit(awkward, name.format(joint)) == (turning.replace("rad", "m") if slides else turning)
+        assert unit(awkward, f"torque.{joint}") == ("N" if slides else "N·m")
+        assert unit(awkward, f"approach.{joint}") == ""
     expected = {"time": "s", "temperature": "°C", "temperature.hand": "°C", "payload": "kg", "reach.x": "m"}
-    assert {name: unit(rv_m2, name) for name in expected} == expected
-    assert {unit(rv_m2, name) for name in ("order", "session", "speed", "gravity.x", "humidity")} == {""}
-
-
-def test_a_joint_that_is_called_like_a_column_is_still_a_joint(awkward):
-    # the awkward arm has a link and a joint of one name; a joint named like a quantity is its position
+    unknown = (
+        "order",
+        "session",
+        "speed",
+        "gravity.x",
+        "humidity",
+        "velocity.nobody",
+        "torque",
+        "time.start",
+        "reach.w",
+    )
+    assert {name: unit(rv_m2, name) for name in (*expected, *unknown)} == {**expected, **dict.fromkeys(unknown, "")}
+    # a joint that is called like a column is still a joint
     renamed = replace(awkward, joint_names=("time", *awkward.joint_names[1:]))
     assert unit(renamed, "time") == ("m" if awkward.joint_types[0] == "prismatic" else "rad")
 
 
-def test_what_does_not_vary_is_no_quantity(rv_m2):
+@pytest.mark.parametrize(
+    ("values", "unit", "said"),
+    [
+        (STILL, "rad", False),
+        (np.where(RNG.random(200) < 0.5, 21.0, 21.125), "°C", False),  # the last digit of a sensor
+        (np.round(RNG.uniform(21.0, 21.6, 200), 1), "°C", True),
+        (np.where(RNG.random(200) < 0.5, 20.0, 35.0), "°C", True),  # two days, not two digits
+        (np.where(RNG.random(200) < 0.5, 0.0, 1.0), "rad", True),  # two poses
+        (np.where(RNG.random(200) < 0.5, 0.0, 1.2), "kg", True),
+        (np.where(RNG.random(200) < 0.5, -1.0, 1.0), "", True),
+        (RNG.uniform(-1.0, 1.0, 200), "rad", True),
+        (np.full(200, 3.0), "kg", False),
+        (np.array([]), "rad", False),
+    ],
+)
+def test_what_varies_by_no_more_than_it_is_read_to_does_not_vary(values, unit, said):
+    assert varies(values, resolution(values, unit)) is said
+
+
+def test_digits_beyond_what_an_instrument_tells_do_not_count():
+    fine = np.round(RNG.uniform(20.0, 30.0, 500), 6)
+    found = [resolution(values, "°C") for values in (fine, np.round(fine, 1), np.arange(0.0, 100.0, 5.0))]
+    assert found == [0.05, pytest.approx(0.1), 0.5]
+
+
+def test_a_twin_goes_and_what_says_more_or_stands_alone_stays():
+    q = RNG.uniform(-1.0, 1.0, 300)
+    readings = {
+        "elbow": q,
+        "shoulder": q[::-1],
+        "encoder.elbow": q + 1e-3 * RNG.standard_normal(300),
+        "encoder.shoulder": q,  # of another joint's motion: somebody exchanged the columns, and it says more
+        "temperature": 20.0 + q,
+        "temperature.arm": 20.0 + q,
+        "temperature.hand": 20.0 + q**2,
+        "encoder.nobody": q,
+    }
+    twins = {"encoder.elbow", "temperature.arm"}
+    assert set(without_twins(readings, ("elbow", "shoulder"))) == set(readings) - twins
+    alone = dict.fromkeys(twins, STILL)
+    assert without_twins(alone, ("elbow",)) == alone
+
+
+def test_only_what_varies_is_a_quantity(rv_m2):
     q = commanded(rv_m2).q.copy()
-    q[:, 1] = 0.3
-    recorded = {"temperature": np.full(SAMPLES, 21.0), "payload": np.linspace(0.0, 2.0, SAMPLES)}
-    found = quantities(observe(replace(commanded(rv_m2, recorded), q=q)))
-    assert "payload" in found
-    assert not {"temperature", "joint_2", "session"} & set(found)
-    assert all(values.shape == (SAMPLES,) and np.ptp(values) > 0 for values in found.values())
-
-
-def test_a_joint_that_stands_still_and_a_twin_are_no_quantities(rv_m2):
-    campaign = commanded(rv_m2)
-    q = campaign.q.copy()
     q[:, 1] = 0.3 + 7e-7 * np.linspace(-1.0, 1.0, SAMPLES)
-    recorded = {"encoder.joint_3": q[:, 2] + 1e-4 * np.sin(np.arange(SAMPLES)), "encoder.joint_2": q[:, 1]}
-    found = quantities(observe(replace(campaign, q=q, covariates=recorded)))
-    assert {"joint_1", "joint_3"} < set(found)
-    assert not {"joint_2", "encoder.joint_2", "encoder.joint_3"} & set(found)
-
-
-def test_a_wrist_that_keeps_pointing_down_has_no_direction_of_gravity(rv_m2):
-    campaign = commanded(rv_m2)
-    q = np.tile(campaign.q[:1], (SAMPLES, 1))
-    q[:, 0] = np.linspace(-1.0, 1.0, SAMPLES)  # about the vertical
-    q[:, 4] += 1e-3 * np.linspace(0.0, 1.0, SAMPLES)
-    assert not set(GRAVITY) & set(quantities(observe(replace(campaign, q=q))))
+    recorded = {
+        "temperature": np.full(SAMPLES, 21.0),
+        "payload": np.linspace(0.0, 2.0, SAMPLES),
+        "encoder.joint_3": q[:, 2] + 1e-4 * np.sin(np.arange(SAMPLES)),
+        "encoder.joint_2": q[:, 1],
+    }
+    found = quantities(observe(replace(commanded(rv_m2, recorded), q=q)))
+    assert {"payload", "joint_1", "joint_3"} <= set(found)
+    assert not {"temperature", "joint_2", "session", "encoder.joint_2", "encoder.joint_3"} & set(found)
+    assert all(values.shape == (SAMPLES,) and np.ptp(values) > 0 for values in found.values())
+    # a wrist that keeps pointing down has no direction of gravity, and without gravity nothing points down
+    turned = np.tile(commanded(rv_m2).q[:1], (SAMPLES, 1))
+    turned[:, 0] = np.linspace(-1.0, 1.0, SAMPLES)  # about the vertical
+    turned[:, 4] += 1e-3 * np.linspace(0.0, 1.0, SAMPLES)
+    floating = replace(commanded(rv_m2), robot=replace(rv_m2, gravity=np.zeros(3)))
+    for campaign in (replace(commanded(rv_m2), q=turned), floating):
+        assert not set(GRAVITY) & set(quantities(observe(campaign)))
 
 
 def test_the_row_stands_in_for_a_clock_only_where_there_is_none(rv_m2):
@@ -80,29 +127,23 @@ def test_the_row_stands_in_for_a_clock_only_where_there_is_none(rv_m2):
         np.testing.assert_array_equal(found[clock], values)
 
 
-def test_a_session_counts_in_the_alphabet(rv_m2):
-    labels = np.array(["b", "a", "c", "a", "b", "b", "a", "c", "c", "a"])
-    campaign = replace(commanded(rv_m2), labels={"session": labels})
+def test_a_session_counts_in_the_alphabet_and_begins_with_the_first_of_its_rows(rv_m2):
+    labels, clock = np.array(list("bacabbacca")), np.arange(float(SAMPLES))[::-1]
+    campaign = commanded(rv_m2, {"time": clock}, labels={"session": labels})
     np.testing.assert_array_equal(quantities(observe(campaign))["session"], [1, 0, 2, 0, 1, 1, 0, 2, 2, 0])
-    one = replace(campaign, labels={"session": np.array(["a"] * SAMPLES)})
-    assert quantity(observe(one), "session") is None
+    assert quantity(observe(replace(campaign, labels={"session": np.array(["a"] * SAMPLES)})), "session") is None
+    assert began(observe(replace(campaign, labels={})), clock) == {"": 0.0}
+    assert began(observe(campaign), clock) == {"a": 0.0, "b": 4.0, "c": 1.0}
 
 
 @pytest.mark.parametrize("arm", ["rv_m2", "ur10", "awkward"], indirect=True)
 def test_gravity_in_the_tool_is_a_unit_vector_that_points_down(arm):
     observations = observe(commanded(arm))
-    seen = np.column_stack([quantity(observations, name) for name in GRAVITY])
+    seen, reach = (np.column_stack([quantity(observations, name) for name in names]) for names in (GRAVITY, REACH))
     np.testing.assert_allclose(np.linalg.norm(seen, axis=1), 1.0, rtol=1e-12)
-    poses = tool_poses(arm, observations.q)
-    down = arm.gravity / np.linalg.norm(arm.gravity)
+    poses, down = tool_poses(arm, observations.q), arm.gravity / np.linalg.norm(arm.gravity)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", poses[:, :3, :3], seen), np.tile(down, (SAMPLES, 1)), atol=1e-12)
-    reach = np.column_stack([quantity(observations, name) for name in REACH])
     np.testing.assert_allclose(reach, poses[:, :3, 3], atol=1e-12)
-
-
-def test_without_gravity_nothing_points_down(rv_m2):
-    floating = observe(replace(commanded(rv_m2), robot=replace(rv_m2, gravity=np.zeros(3))))
-    assert not set(GRAVITY) & set(quantities(floating))
 
 
 def test_what_drives_an_effect_has_its_unit_and_varies(rv_m2):
@@ -111,16 +152,30 @@ def test_what_drives_an_effect_has_its_unit_and_varies(rv_m2):
     name, its_unit, values = driving(observations, "temperature")
     assert (name, its_unit) == ("temperature", "°C")
     np.testing.assert_array_equal(values, recorded["temperature"])
-    assert driving(observations, "payload") is None
-    assert driving(observations, "humidity") is None
+    assert driving(observations, "payload") is driving(observations, "humidity") is None
     assert position_of(observations, "joint_2")[:2] == ("position of joint_2", "rad")
     np.testing.assert_array_equal(position_of(observations, "joint_2")[2], observations.q[:, 1])
 
 
-def test_a_session_begins_with_the_first_of_its_rows_in_whatever_order(rv_m2):
-    clock = np.arange(float(SAMPLES))[::-1]
-    campaign = commanded(rv_m2, {"time": clock})
-    assert began(observe(campaign), clock) == {"": 0.0}
-    labels = {"session": np.repeat(["late", "early"], [4, SAMPLES - 4])}
-    seen = observe(replace(campaign, labels=labels))
-    assert began(seen, clock) == {"early": 0.0, "late": float(SAMPLES - 4)}
+def test_a_joints_torque_is_read_from_its_sensor_and_from_the_payload_where_it_is_computed(rv_m2):
+    torques = tuple(f"torque.{joint}" for joint in rv_m2.joint_names)
+
+    def seen(**columns):
+        return observe(commanded(rv_m2, {c: np.full(SAMPLES, v) for c, v in columns.items()}))
+
+    for columns, expected in (
+        ((), ()),
+        (("payload",), ("payload",)),
+        (("payload", torques[1]), ("payload", torques[1])),
+        (("payload", *torques), torques),
+        (torques[::-1], torques),
+        (("torque.gripper", "temperature"), ()),
+    ):
+        assert torque_columns(seen(**dict.fromkeys(columns, 1.0))) == expected
+    # these columns are what the torque follows
+    columns = {"payload": 1.0, "torque.joint_2": 5.0, "temperature": 20.0}
+    before, followed = seen(**columns).torque, set()
+    for column, value in columns.items():
+        if not np.array_equal(seen(**{**columns, column: value + 1.0}).torque, before):
+            followed.add(column)
+    assert set(torque_columns(seen(**columns))) == followed

@@ -16,7 +16,7 @@ from fuzz import corpus
 from fuzz.corpus import Files
 
 from thermal_robot import simulate
-from thermal_robot.effects import library
+from thermal_robot.effects import FRAMES, library
 from thermal_robot.kinematics import gravity_torques
 from thermal_robot.observations import observe
 from thermal_robot.robot import Robot, load_robot
@@ -124,7 +124,9 @@ def _conditions(rng: Random, chance: np.random.Generator, robot: Robot, q: np.nd
 def _at_work(rng: Random, chance: np.random.Generator, robot: Robot, q: np.ndarray, conditions: dict) -> list:
     """Effects in the setting in which they are first looked for, of sizes up to thirty times the expected ones."""
     plain = observe(simulate(robot, commands=q, conditions=conditions))
-    able = [effect for effect in library().values() if not (effect.random or effect.frame or effect.missing(plain))]
+    able = [
+        effect for effect in library().values() if not (effect.random or effect.name in FRAMES or effect.missing(plain))
+    ]
     found = []
     for effect in rng.sample(able, min(rng.choice((0, 1, 1, 2, 3)), len(able))):
         own = effect.variants(plain)[0].parameters(plain)

@@ -9,8 +9,7 @@ from simulate import simulate
 from time_constants import LAG
 from time_constants import campaign as lagging
 
-from thermal_robot.effects import choose, gate
-from thermal_robot.effects.joint_gain import JointGain
+from thermal_robot.effects import JointGain, choose, gate
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.exact import _leading, _others, corrected_observations, settle

@@ -7,8 +7,7 @@ import pytest
 from helpers import NOISE, tool_with
 from simulate import simulate
 
-from thermal_robot.effects import choose
-from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.effects import JointRipple, choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.generate import alike, waves
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.values import Estimate, Finding, Location, Refused, is_frame
-from thermal_robot.effects import Effect, Parameter, gate, library, random_effects
+from thermal_robot.effects import FRAMES, Effect, Parameter, gate, named, random_effects
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_words import called, event, in_joints, sizes, usually
+from thermal_robot.effects.position import Waves
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.inference import settings
@@ -144,7 +145,7 @@ def _scatter(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
 
 def unknown_frames(fit: Fit) -> tuple[str, ...]:
     """Return the names of the frame effects whose frame is unknown and therefore fitted."""
-    return tuple(e.name for e in library().values() if e.frame and gate.missing(e, fit.nominal))
+    return tuple(name for name in FRAMES if gate.missing(named(name), fit.nominal))
 
 
 def within_frames(fit: Fit, block: int) -> bool:
@@ -220,7 +221,7 @@ def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
     law, _ = fit.effects[e.best.blocks.index(block)]
     parameters, spread = e.linear.blocks[block].parameters, e.values[block][1]
     if not isinstance(law, Discovered):
-        return {"size": in_joints(law.sized_as, parameters, values, spread)} if law.sized_as else {}
+        return {"size": in_joints(parameters, values, spread)} if isinstance(law, Waves) else {}
     size = sizes(law, fit.nominal, values, spread)
     short, whole = event(law, fit.nominal, size)
     return {

@@ -15,8 +15,7 @@ from thermal_robot.diagnosis.attribution import without_laws
 from thermal_robot.diagnosis.cross_validation import Model, Walk, schemes
 from thermal_robot.diagnosis.residual_tests import Examined, examine
 from thermal_robot.diagnosis.values import Dependence, Location, Refused, Unexplained
-from thermal_robot.effects import Effect
-from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.effects import Effect, JointRipple
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings

@@ -1,4 +1,4 @@
-"""From values to displacement: what an error in a channel moves, and what a set of fitted effects does to the robot."""
+"""Sensitivities of the channels, and the displacement of the robot by fitted effects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from thermal_robot.errors import EffectError, ThermalRobotError
 from thermal_robot.kinematics import Displacement
 
 if TYPE_CHECKING:
-    from thermal_robot.campaign import Campaign
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
 
@@ -79,37 +78,25 @@ def displacement(
     :class:`EffectError` if parameters break the contract, or are not as many as values: rows lack what is read.
     """
     samples, robot = observations.campaign.samples, observations.robot
-    joint = np.zeros((samples, robot.n))
-    segment = np.zeros((samples, len(robot.segments), 6))
-    base, tool = np.zeros((samples, 6)), np.zeros((samples, 6))
-    instrument: Array | None = None
+    joint, segment = np.zeros((samples, robot.n)), np.zeros((samples, len(robot.segments), 6))
+    whole = {"base": np.zeros((samples, 6)), "tool": np.zeros((samples, 6)), "instrument": np.zeros((samples, 3))}
+    channels = set()
     for effect, values in effects:
-        for parameter, value in zip(_as_many(effect, observations, len(values)), values, strict=True):
+        parameters = gate.checked(effect, observations)
+        if len(parameters) != len(values):
+            lacking = ", ".join(gate.missing(effect, observations))
+            raise EffectError(
+                f"effect {effect.name!r} was fitted with {len(values)} parameters and has {len(parameters)} in these "
+                "rows" + (f", which lack {lacking}" if lacking else "")
+            )
+        for parameter, value in zip(parameters, values, strict=True):
             for response in parameter.responses:
-                moved = value * response.values
-                if response.channel == "joint":
-                    joint[:, response.index] += moved
-                elif response.channel == "segment":
-                    segment[:, response.index] += moved
-                elif response.channel == "base":
-                    base += moved
-                elif response.channel == "tool":
-                    tool += moved
-                else:
-                    instrument = moved if instrument is None else instrument + moved
-    return Displacement(joint=joint, segment=segment, base=base, tool=tool), instrument
-
-
-def _as_many(effect: Effect, observations: Observations, values: int) -> tuple[Parameter, ...]:
-    """Return the parameters of an effect that has so many values."""
-    found = gate.checked(effect, observations)
-    if len(found) != values:
-        lacking = ", ".join(gate.missing(effect, observations))
-        raise EffectError(
-            f"effect {effect.name!r} was fitted with {values} parameters and has {len(found)} in these rows"
-            + (f", which lack {lacking}" if lacking else "")
-        )
-    return found
+                each = {"joint": joint, "segment": segment}.get(response.channel)
+                moved = whole[response.channel] if each is None else each[:, response.index]
+                moved += value * response.values
+                channels.add(response.channel)
+    displaced = Displacement(joint=joint, segment=segment, base=whole["base"], tool=whole["tool"])
+    return displaced, whole["instrument"] if "instrument" in channels else None
 
 
 def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
@@ -129,23 +116,18 @@ def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
         except ThermalRobotError:  # such rows cannot be: nothing says that they would not matter
             return False
 
-    spare = [c for c in read if same([c], {}) and any(same([c], {c: other}) for other in _others(campaign, c))]
+    def others(column: str) -> tuple[Array, ...]:
+        values = campaign.covariates[column]
+        moved = np.roll(values, 1)  # those of other rows, or one more and one less where all are one
+        return (moved,) if np.any(moved != values) else (values - 1.0, values + 1.0)
+
+    spare = [c for c in read if same([c], {}) and any(same([c], {c: other}) for other in others(c))]
     return tuple(c for c in read if c not in spare) if same(spare, {}) else read
-
-
-def _others(campaign: Campaign, column: str) -> tuple[Array, ...]:
-    """Return other values that a column may have: those of other rows, or one more and one less where all are one."""
-    values = campaign.covariates[column]
-    moved = np.roll(values, 1)
-    return (moved,) if np.any(moved != values) else (values - 1.0, values + 1.0)
 
 
 def _alike(some: Sequence[Parameter], others: Sequence[Parameter]) -> bool:
     """Tell whether parameters have the same names and responses."""
-    if [(p.name, len(p.responses)) for p in some] != [(p.name, len(p.responses)) for p in others]:
-        return False
-    return all(
-        (a.channel, a.index) == (b.channel, b.index) and np.array_equal(a.values, b.values)
-        for p, q in zip(some, others, strict=True)
-        for a, b in zip(p.responses, q.responses, strict=True)
-    )
+    one, two = ([(p.name, r.channel, r.index, r.values) for p in own for r in p.responses] for own in (some, others))
+    named = [p.name for p in some] == [p.name for p in others]
+    pairs = zip(one, two, strict=False)
+    return named and len(one) == len(two) and all(a[:3] == b[:3] and np.array_equal(a[3], b[3]) for a, b in pairs)

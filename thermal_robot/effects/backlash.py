@@ -1,8 +1,8 @@
-"""Lost motion: where a joint stops depends on the side it came from, or on the side on which its load lies."""
+"""Lost motion of joints: backlash to the side of approach or of the load, hysteresis, play of a carriage."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -30,7 +30,7 @@ _STANDS = 0.1  # of the rows: where friction wins in fewer, play that hangs to o
 
 @dataclass(frozen=True)
 class Backlash(Effect):
-    """Every joint stops short by half its play: q_actual = q_command − ½ b_j · side_j; rad or m.
+    """Backlash: every joint stops short by half its play, q_actual = q_command − ½ b_j · side_j; rad or m.
 
     side is ``approach.<joint>``: +1 where the joint was increasing, −1 where it was decreasing, 0 where that is not
     known. Where gravity outweighs friction F_j = held · max|τ_j|, the joint hangs on its teeth, however it came: side
@@ -39,23 +39,18 @@ class Backlash(Effect):
     than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad, two minutes of arc: catalogues promise
     0.3 mrad of cycloidal gears (1′), wear adds to it, and light arms show ten.
 
-    Friction in a loaded gear grows with the load, and holds the gear wound up on the side from which it came: lost
-    motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), as the hysteresis of strain-wave gears widens with torque.
-    Expected size 0.5 mrad at the joint's largest torque.
+    Hysteresis of a loaded gear grows with the load: lost motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), of
+    0.5 mrad at the joint's largest torque. A slide's carriage turns when it reverses, by −½ t_e side about each axis e
+    of the joint's frame. Expected size 0.05 mrad: catalogues of guides state pitch and yaw of 5 to 20″.
 
-    A slide has play in its guides, too: drive and friction pull beside each other, and the carriage turns when it
-    reverses, by −½ t_e side about each axis e of the joint's frame. The carriage sits on what moves, or stays where the
-    stroke begins. Expected size 0.05 mrad, 10 seconds of arc: catalogues of guides state pitch and yaw of 5 to 20″.
+    Only poses that are reached from both sides show it. Where torque decides always, only a jump at zero torque tells
+    it from :class:`JointCompliance`.
 
-    Only poses that are reached from both sides show it. Where torque decides always, it is nearly
-    :class:`JointCompliance`, from which only a jump at zero torque tells it.
-
-    ``held``: share of the joint's ``largest`` torque in the campaign, N·m (a model goes by this, whatever it is asked
-    to predict), above which gravity wins, 0 never; one for all joints or one for each of the ``chain``. ``soft``: share
-    of friction over which teeth change sides, 0 at once. ``steady``: each joint's torque, N·m, that all but a tenth of
-    the rows exceed to one side; with less friction it always lies on that side: an offset, that is left to it.
-    ``grows``: lost motion grows with the torque. ``carriage`` of a slide sits ``moving`` with it or ``staying``; empty
-    where none turns.
+    ``held``: share of the joint's ``largest`` torque in the campaign, N·m, above which gravity wins, 0 never; one for
+    all joints or one for each of the ``chain``. ``soft``: share of friction over which teeth change sides, 0 at once.
+    ``steady``: each joint's torque, N·m, that all but a tenth of the rows exceed to one side; with less friction it
+    always lies there: an offset. ``grows``: lost motion grows with the torque. ``carriage`` of a slide sits ``moving``
+    with it or ``staying`` where the stroke begins; empty where none turns.
     """
 
     held: Share | tuple[Share, ...] = 0.0
@@ -98,13 +93,18 @@ class Backlash(Effect):
 
     @property
     def weight(self) -> float:
-        """Friction always wins as likely as not, whatever the number of shares; more than that is half as likely."""
+        """Prior weight: friction always wins as likely as not; more than one share of it is half as likely."""
         return 1.0 / len(_SHARES) if np.any(self.held) else 0.5 if self.grows or self.carriage else 1.0
 
     @property
+    def _shares(self) -> Array:
+        """(n,) share of each joint."""
+        return np.broadcast_to(self.held, len(self.largest))
+
+    @property
     def apart(self) -> int:
-        """Joints whose share is not that of most."""
-        shares = [s for j, s in enumerate(np.broadcast_to(self.held, len(self.largest)).tolist()) if self._may_hang(j)]
+        """Number of joints whose share is not that of most."""
+        shares = [share for j, share in enumerate(self._shares.tolist()) if self._may_hang(j)]
         return len(shares) - max(map(shares.count, shares), default=0)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
@@ -113,7 +113,7 @@ class Backlash(Effect):
         Besides, teeth that change sides over more or less of friction, one joint that never hangs, or alone does, and
         where shares differ, that of one for all.
         """
-        shares = np.broadcast_to(self.held, len(self.largest))
+        shares = self._shares
         able = [j for j, joint in enumerate(self.chain) if self._may_hang(j) and joint in (self.places or self.chain)]
         own = [j for j in able if shares[j] > 0.0]
         if not own:
@@ -130,7 +130,7 @@ class Backlash(Effect):
 
     def _with(self, j: int, share: float) -> Effect:
         """Return the effect with another share of one joint's largest torque."""
-        shares = np.broadcast_to(self.held, len(self.largest))
+        shares = self._shares
         return replace(self, held=tuple(np.where(np.arange(len(shares)) == j, share, shares).tolist()))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -142,30 +142,26 @@ class Backlash(Effect):
                 continue
             own = unit(robot, joint)
             short = -0.5 * self._side(observations, j, np.asarray(covariates[f"approach.{joint}"]))
-            found.append(Parameter("lost motion", own, _SIZE, "joint", joint, (at_joint(j, short),), positive=True))
+            told = [("lost motion", own, _SIZE, short)]
             if self.grows and torque is not None and self._may_hang(j):
-                per, size = "m/N" if own == "m" else "rad/(N·m)", _SIZE / self.largest[j]
-                wound = (at_joint(j, short * np.abs(torque[:, j])),)
-                found.append(Parameter("lost motion per torque", per, size, "joint", joint, wound, positive=True))
-            if self.carriage:
-                found += self._turning(observations, joint, short)
+                per = "m/N" if own == "m" else "rad/(N·m)"
+                told.append(("lost motion per torque", per, _SIZE / self.largest[j], short * np.abs(torque[:, j])))
+            for label, measured, size, lost in told:
+                found.append(Parameter(label, measured, size, "joint", joint, (at_joint(j, lost),), positive=True))
+            if self.carriage and robot.joint_types[j] == "prismatic":
+                found += self._turning(observations, j, short)
         return tuple(found)
 
-    def _turning(self, observations: Observations, joint: str, short: Array) -> list[Parameter]:
-        """Return three turns of the carriage of a slide, rad; none of a joint that turns."""
-        robot = observations.robot
-        s = next((s for s, segment in enumerate(robot.segments) if segment.name == joint), None)
-        j = robot.joint_names.index(joint)
-        if s is None or robot.joint_types[j] != "prismatic":
-            return []
-        stroke = observations.q[:, [j]] * (self.carriage == "moving")
-        at = stroke * robot.chain.axes[robot.segments[s].index]
-        found = []
-        for name, axis in zip("xyz", np.eye(3), strict=True):
-            twist = short[:, None] * np.hstack([np.cross(at, axis), np.broadcast_to(axis, at.shape)])
-            label = f"turn about {name} at reversal"
-            found.append(Parameter(label, "rad", _TURNS, "joint", joint, (at_segment(s, twist),)))
-        return found
+    def _turning(self, observations: Observations, j: int, short: Array) -> Iterator[Parameter]:
+        """Yield three turns of the carriage of a slide, rad; none of one beside the chain."""
+        robot, joint = observations.robot, observations.robot.joint_names[j]
+        for s in (s for s, segment in enumerate(robot.segments) if segment.name == joint):
+            stroke = observations.q[:, [j]] * (self.carriage == "moving")
+            at = stroke * robot.chain.axes[robot.segments[s].index]
+            for name, axis in zip("xyz", np.eye(3), strict=True):
+                twist = short[:, None] * np.hstack([np.cross(at, axis), np.broadcast_to(axis, at.shape)])
+                label = f"turn about {name} at reversal"
+                yield Parameter(label, "rad", _TURNS, "joint", joint, (at_segment(s, twist),))
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the direction in which the joint came."""

@@ -1,4 +1,4 @@
-"""All effects by name: the program's own, those of installed packages, and the choice among them."""
+"""Registry of effects by name: the program's own, those of installed packages, and the choice among them."""
 
 from __future__ import annotations
 
@@ -12,51 +12,47 @@ from typing import TypeVar
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.effects.arguments import with_arguments
 from thermal_robot.effects.backlash import Backlash
-from thermal_robot.effects.base_compliance import BaseCompliance
-from thermal_robot.effects.base_frame import BaseFrame
+from thermal_robot.effects.beam import ThermalBending
+from thermal_robot.effects.compliance import BaseCompliance, LinkCompliance
+from thermal_robot.effects.constant import BaseFrame, Geometric, InstrumentScale, JointOffset, ToolFrame
 from thermal_robot.effects.drift import Drift
 from thermal_robot.effects.effect import Effect
-from thermal_robot.effects.encoder_resolution import EncoderResolution
-from thermal_robot.effects.excess_repeatability import ExcessRepeatability
-from thermal_robot.effects.geometric import Geometric
-from thermal_robot.effects.instrument_scale import InstrumentScale
 from thermal_robot.effects.joint_compliance import JointCompliance
-from thermal_robot.effects.joint_gain import JointGain
-from thermal_robot.effects.joint_offset import JointOffset
-from thermal_robot.effects.joint_ripple import JointRipple
-from thermal_robot.effects.link_compliance import LinkCompliance
-from thermal_robot.effects.random_effect import RandomEffect
-from thermal_robot.effects.thermal_bending import ThermalBending
+from thermal_robot.effects.position import JointGain, JointRipple, TransmissionError
+from thermal_robot.effects.random_effect import EncoderResolution, ExcessRepeatability, RandomEffect
 from thermal_robot.effects.thermal_elongation import ThermalElongation
-from thermal_robot.effects.tool_frame import ToolFrame
 from thermal_robot.effects.tracking_lag import TrackingLag
-from thermal_robot.effects.transmission_error import TransmissionError
 from thermal_robot.errors import EffectError, Note, UnknownEffectError
 
 _Said = TypeVar("_Said")
-_SYSTEMATIC: tuple[type[Effect], ...] = (
-    BaseFrame,
-    ToolFrame,
-    JointOffset,
-    JointGain,
-    TransmissionError,
-    JointRipple,
-    Backlash,
-    JointCompliance,
-    TrackingLag,
-    Geometric,
-    LinkCompliance,
-    BaseCompliance,
-    ThermalElongation,
-    ThermalBending,
-    Drift,
-    InstrumentScale,
-)
-_RANDOM: tuple[type[RandomEffect], ...] = (EncoderResolution, ExcessRepeatability)
+_SYSTEMATIC: dict[str, type[Effect]] = {
+    kind.name: kind
+    for kind in (
+        BaseFrame,
+        ToolFrame,
+        JointOffset,
+        JointGain,
+        TransmissionError,
+        JointRipple,
+        Backlash,
+        JointCompliance,
+        TrackingLag,
+        Geometric,
+        LinkCompliance,
+        BaseCompliance,
+        ThermalElongation,
+        ThermalBending,
+        Drift,
+        InstrumentScale,
+    )
+}
+_RANDOM: dict[str, type[RandomEffect]] = {kind.name: kind for kind in (EncoderResolution, ExcessRepeatability)}
 
 KINEMATIC = (JointOffset.name, Geometric.name)
 """Names of the effects that a calibration of the kinematics fits: what a controller's zeros can take, and the rest."""
-RANDOM = tuple(kind.name for kind in _RANDOM)
+FRAMES = (BaseFrame.name, ToolFrame.name)
+"""Names of the effects that are errors of a frame which the campaign declares known."""
+RANDOM = tuple(_RANDOM)
 """Names of the effects that scatter."""
 
 
@@ -69,7 +65,7 @@ def random_effects() -> tuple[RandomEffect, ...]:
     >>> [effect.name for effect in random_effects()]
     ['encoder_resolution', 'excess_repeatability']
     """
-    return tuple(kind() for kind in _RANDOM)
+    return tuple(kind() for kind in _RANDOM.values())
 
 
 def library() -> dict[str, Effect]:
@@ -87,7 +83,7 @@ def library() -> dict[str, Effect]:
     >>> library()["backlash"].title
     'lost motion in the joints'
     """
-    found: dict[str, Effect] = {kind.name: kind() for kind in _SYSTEMATIC}
+    found: dict[str, Effect] = {name: kind() for name, kind in _SYSTEMATIC.items()}
     for point in entry_points(group="thermal_robot.effects"):
         try:
             loaded = point.load()
@@ -140,10 +136,9 @@ def named(name: str) -> Effect:
     Traceback (most recent call last):
     thermal_robot.errors.EffectError: no effect is named 'drft'; did you mean 'drift'?
     """
-    own = {kind.name: kind for kind in _SYSTEMATIC}
-    if name in own:  # no package can give one of these names, and looking all of them up takes a while
-        return own[name]()
-    known = {**library(), **{effect.name: effect for effect in random_effects()}}
+    if own := _SYSTEMATIC.get(name) or _RANDOM.get(name):
+        return own()  # no package can give one of these names, and looking all of them up takes a while
+    known = library()
     if name not in known:
         raise _unknown(name, known)
     return known[name]
@@ -152,15 +147,16 @@ def named(name: str) -> Effect:
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
     """Return what an answer says of one effect; :class:`UnknownEffectError` says which name was probably meant."""
     if name not in answers:
-        meant = did_you_mean(str(name), answers) or f"; there are {', '.join(sorted(answers)) or 'none'}"
-        raise UnknownEffectError(f"no effect named {name!r} was considered{meant}")
+        raise UnknownEffectError(f"no effect named {name!r} was considered{_meant(str(name), answers)}")
     return answers[name]
 
 
+def _meant(name: str, known: Iterable[str]) -> str:
+    return did_you_mean(name, known) or f"; there are {', '.join(sorted(known)) or 'none'}"
+
+
 def _unknown(name: str, known: Iterable[str]) -> EffectError:
-    there = dict.fromkeys((*known, *RANDOM))
-    meant = did_you_mean(name, there) or f"; there are {', '.join(sorted(there))}"
-    return EffectError(f"no effect is named {name!r}{meant}")
+    return EffectError(f"no effect is named {name!r}{_meant(name, (*known, *RANDOM))}")
 
 
 def choose(

@@ -1,4 +1,4 @@
-"""The base, or the instrument, settles while the campaign runs."""
+"""Drift of the base or of the instrument while the campaign runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drift(Fading):
-    """The base moves by a twist that grows with time from zero at the first measurement: exp(β(t)) T.
+    """Drift: the base moves by a twist that grows with time from zero at the first measurement, exp(β(t)) T.
 
     Linear, β(t) = β (t − t₀)/span, or exponential, β(t) = β (1 − exp(−(t − t₀)/τ)) / (1 − exp(−span/τ)), so that β is
     the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of ``time``
@@ -61,10 +61,6 @@ class Drift(Fading):
         """Return it as it begins and ends with the campaign."""
         return self if observations.clock is None else replace(self, found=ends(observations.clock))
 
-    def unfaded(self) -> Effect:
-        """Return it as it goes on after the campaign."""
-        return replace(self, found=())
-
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Time constants longer and shorter by a factor; beside the linear law, long ones."""
         shares = (0.0, 1.0, 2.0) if self.time_constant == 0.0 else (1.0, factor, 1.0 / factor)
@@ -76,7 +72,9 @@ class Drift(Fading):
         clock = observations.clock
         if clock is None:
             return ()
-        elapsed = ((np.clip(clock, self.found[0], self.found[1]) if self.found else clock) - self.origin) / self.span
+        if self.found and self.fades:
+            clock = np.clip(clock, self.found[0], self.found[1])
+        elapsed = (clock - self.origin) / self.span
         tau = self.time_constant
         grown = elapsed if tau == 0.0 else np.expm1(-elapsed / tau) / np.expm1(-1.0 / tau)
         return tuple(

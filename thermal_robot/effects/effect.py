@@ -1,9 +1,8 @@
 """The contract of an effect: where error enters the chain, and the quantity it grows with.
 
-An effect is a frozen dataclass that names its parameters and gives, for each, the *unit response*: what a
-parameter of one unit does in the channels, read from the observations. It calls no kinematics, fits nothing and
-holds no fitted value. Constructor arguments carry what is nonlinear (a time constant, an origin of time, an order);
-:meth:`Effect.variants` proposes values for them, and inference chooses.
+An effect is a frozen dataclass. It names its parameters and gives the *unit response* of each: what one unit does in
+the channels, read from the observations. It calls no kinematics, fits nothing and holds no fitted value. Arguments of
+its constructor carry what is nonlinear (a time constant, an order); :meth:`Effect.variants` proposes values for them.
 
 A new effect is a file like this one::
 
@@ -21,31 +20,22 @@ A new effect is a file like this one::
                 for j, joint in enumerate(observations.robot.joint_names)
             )
 
-Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
-others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
-(how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
-(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against), ``sized_as``
-(whether what it does in each joint is told), ``unfaded`` (where it is not known to go on). Every effect has the
-arguments ``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those,
-are kept, by the gate.
-
-Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
-breaks the contract or raises.
+Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. All else
+that may stand in the class has a default (:class:`Effect`). Nobody asks an effect directly:
+:mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it breaks the contract or raises.
 """
 
 from __future__ import annotations
 
-import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.effects.settings import SIZE_MOST
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -59,13 +49,11 @@ SOURCED, UNSOURCED = 0.5, 1.5
 within a factor of 3.6 of it; where nobody knows it, three times more or less is no surprise."""
 TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}", "rad") for axis in "xyz"))
 """Name and unit of each component of a twist."""
-ALONE = 0.1 / len(TWIST)
-"""Weight of each component of a misplaced frame alone, beside all together: one frame in ten is off in one alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What one unit of a parameter does in one place of one channel.
+    """Unit response: what one unit of a parameter does in one place of one channel.
 
     Attributes
     ----------
@@ -182,19 +170,19 @@ class Parameter:
 
     @cached_property
     def bare(self) -> Parameter:
-        """It without its responses, which may be large."""
-        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive)
+        """The parameter without its responses, which may be large."""
+        return replace(self, responses=())
 
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """Base of all effects; see the module's docstring for how to write one.
+    """Base of all effects; the module's docstring shows how to write one.
 
     Attributes
     ----------
     places
-        Names of the joints or links whose parameters are kept; empty for all parameters. One place at fault needs few
-        parameters, and those of the sound places would count against it.
+        Names of the joints or links whose parameters are kept; empty for all. One place at fault needs few parameters,
+        and those of the sound places would count against it.
     excluded
         Names of the joints or links whose parameters are not kept, whatever ``places`` says.
 
@@ -218,31 +206,21 @@ class Effect(ABC):
     name: ClassVar[str] = ""
     """By which it is asked for and reported."""
     title: ClassVar[str] = ""
-    """What it is in plain words, for a sentence; the name with spaces where a class states none."""
+    """Plain words for a sentence; the name with spaces where a class states none."""
     singular: ClassVar[str] = ""
-    """What it is in a single joint, for a sentence; the title where a class states none."""
+    """The same of a single joint; the title where a class states none."""
     sided_by: ClassVar[tuple[str, ...]] = ()
     """Quantities that give parameters that cannot be negative their side: of ``torque``, ``approach``, ``temperature``
     and ``gravity`` the first that the campaign has."""
-    sized_as: ClassVar[str] = ""
-    """What is said of all that it does in each joint, such as ``peak to peak``; empty where its parameters say it."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Covariates without which the effect is not testable."""
     size_spread: ClassVar[float] = SOURCED
-    """How firmly the expected sizes of its parameters are known: standard deviation of the logarithm of their common
-    factor, which is learnt from the data."""
-    size_most: ClassVar[float] = SIZE_MOST
-    """Times the expected sizes, to which that factor may grow: what no robot reaches is as improbable then as it is."""
+    """Standard deviation of the logarithm of its size: of the common factor of all expected sizes, which is learnt."""
     random: ClassVar[bool] = False
     """Whether it scatters: no mean follows from it; see :class:`thermal_robot.effects.random_effect.RandomEffect`."""
-    frame: ClassVar[str] = ""
-    """Which of the campaign's frames it is an error of, ``base`` or ``tool``; empty for all others."""
     contained_in: ClassVar[tuple[str, ...]] = ()
     """Names of larger effects that can do exactly what it does, but for the unknown frames; where that holds for some
     arms only, the class says so."""
-    constant: ClassVar[bool] = False
-    """Whether its parameters and responses follow from the robot alone, the same in all rows: they are then asked for
-    once a robot. Each class says so for itself; what derives from it is asked again."""
     told_inside: ClassVar[bool] = False
     """Whether its own part is told where a larger effect that contains it was found: what somebody could set anew."""
 
@@ -261,8 +239,8 @@ class Effect(ABC):
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return fewer parameters that do the same, in the order in which they are told; empty where all are told.
 
-        With the parameters of the effects inside that come first (:attr:`told_inside`) they are, but for what the data
-        do not see, no more than needed. Each is a combination of :meth:`parameters`.
+        Each is a combination of :meth:`parameters`. Beside those of the effects inside (:attr:`told_inside`), which
+        come first, they are no more than needed, but for what the data do not see.
         """
         return ()
 
@@ -272,17 +250,20 @@ class Effect(ABC):
 
     @property
     def share(self) -> float | None:
-        """Of the prior probability of its name; ``None`` where it goes by places and weight."""
+        """Share of the prior probability of its name; ``None`` where it goes by places and weight.
+
+        Settings of an effect that states its share are not looked for in single places.
+        """
         return None
 
     @property
     def weight(self) -> float:
-        """How probable it is beside other settings of the same places."""
+        """Prior weight beside other settings of the same places."""
         return 1.0
 
     @property
     def apart(self) -> int:
-        """How many constants stand apart from a common one: each has its price."""
+        """Number of constants that stand apart from a common one: each has its price."""
         return 0
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
@@ -300,19 +281,9 @@ class Effect(ABC):
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Return settings near this one, itself among them: the constants that may be refined, and no others.
 
-        Estimation moves to the best of them, with factors (above 1) that become smaller. A constant that does not
-        appear here stays where :meth:`variants` put it.
+        Estimation moves to the best of them, with factors (above 1) that become smaller.
         """
         return (self,)
-
-    def at(self, place: str) -> Effect | None:
-        """Return the effect in one joint or link alone; ``None`` where it is to have no such setting.
-
-        Whether it has parameters there, the gate looks up (:func:`thermal_robot.effects.gate.at`).
-        """
-        alone = copy.copy(self)
-        object.__setattr__(alone, "places", (place,))
-        return alone
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return what drives the effect at one place, to draw it against.
@@ -339,10 +310,6 @@ class Effect(ABC):
 
     def elsewhere(self, observations: Observations) -> Effect:
         """Return the effect as it is in another campaign of the robot, with that one's record in place of its own."""
-        return self
-
-    def unfaded(self) -> Effect:
-        """Return the effect as it is where it does not fade in rows of which nobody knows whether it goes on there."""
         return self
 
     def arguments(self) -> dict[str, Any]:

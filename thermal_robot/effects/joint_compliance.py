@@ -1,4 +1,4 @@
-"""Elastic joints: they yield to the torque that gravity, payload or contact puts on them."""
+"""Joint compliance: gear or servo yields to the torque that gravity, payload or contact puts on it."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
 
-_WIND_UP = 1e-3
+_WIND_UP = 1e-3  # rad or m, at the largest torque
 _LEVER = 0.1  # m: how far a body's centre may lie from the next joint
 _FEW = 0.1  # of the strongest shape of any joint: weaker ones are left out
-_DRAWN = 300
+_DRAWN = 300  # configurations
+_PER_TORQUE = {"rad": "rad/(N·m)", "m": "m/N"}
 
 
 @dataclass(frozen=True)
 class JointCompliance(Effect):
-    """Every joint yields to its torque: q_actual = q_command − c_j τ_j.
+    """Joint compliance: q_actual = q_command − c_j τ_j.
 
     τ_j (N·m) is the torque that holds the joint against gravity (Pinocchio's sign): from the URDF's inertias and the
     payload, or ``torque.<joint>`` where the robot reports it. c_j in rad/(N·m). Expected size: a wind-up of 1 mrad at
@@ -77,8 +78,8 @@ class JointCompliance(Effect):
         if robot.has_masses or any(f"torque.{joint}" in recorded for joint in robot.joint_names):
             return replace(self, joints=(), weights=())
         few = _few_weights(robot)
-        flat = np.concatenate([*(weights for _, weights in few), np.zeros(0)])
-        return replace(self, joints=tuple(j for j, _ in few), weights=tuple(flat.tolist()))
+        flat = tuple(float(weight) for _, weights in few for weight in weights)
+        return replace(self, joints=tuple(j for j, _ in few), weights=flat)
 
     def _shapes(self, observations: Observations) -> list[tuple[int, Array]]:
         """Joint and (N,) values of each shape of gravity's torques."""
@@ -90,27 +91,16 @@ class JointCompliance(Effect):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One compliance a joint, rad/(N·m), or m/N for a prismatic joint; free weights in rad or m."""
-        robot, torque = observations.robot, observations.torque
-        names = robot.joint_names
-        found = []
+        robot, torque, found = observations.robot, observations.torque, []
+        names, units = robot.joint_names, [unit(robot, joint) for joint in robot.joint_names]
         for k, (j, shape) in enumerate(self._shapes(observations)):
             label = f"yield to gravity, shape {self.joints[: k + 1].count(j)}"
-            found.append(Parameter(label, unit(robot, names[j]), _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
+            found.append(Parameter(label, units[j], _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
         if torque is not None:
             size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
-            units = {"rad": "rad/(N·m)", "m": "m/N"}
-            found += [
-                Parameter(
-                    "compliance",
-                    units[unit(robot, joint)],
-                    size,
-                    "joint",
-                    joint,
-                    (at_joint(j, -torque[:, j]),),
-                    positive=True,
-                )
-                for j, joint in enumerate(names)
-            ]
+            for j, joint in enumerate(names):
+                own, response = _PER_TORQUE[units[j]], (at_joint(j, -torque[:, j]),)
+                found.append(Parameter("compliance", own, size, "joint", joint, response, positive=True))
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:

@@ -1,19 +1,20 @@
-"""A law that nobody wrote down: an error of one place that follows one quantity, found in a remainder."""
+"""Semiparametric law that nobody wrote down: an error of one place that follows one quantity, found in a remainder."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pprint import pformat
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate
 from thermal_robot.effects.arguments import Count, NotNegative
@@ -32,7 +33,7 @@ from thermal_robot.effects.effect import (
     in_words,
 )
 from thermal_robot.effects.fading import Fading, ends, left_at
-from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
+from thermal_robot.effects.quantities import TURN, driving, quantity, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
 
@@ -41,12 +42,14 @@ if TYPE_CHECKING:
 
 
 PREFIX = "discovered."
-_COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
+_ALONG = tuple(f"{how} {axis}" for how in ("along", "about") for axis in "xyz")  # components of a twist
+_IN_A_JOINT, _ELSEWHERE = 3e-4, 1e-4  # rad; m and rad
+_SHIFTED = 0.04  # of the range: how far a mark is moved to refine it, by a factor of two
 
 
 @dataclass(frozen=True)
 class Discovered(Fading):
-    """An error enters at one place and follows one quantity x by a law f(x) = Σ_k c_k φ_k(x).
+    """Linear combination of basis functions, f(x) = Σ_k c_k φ_k(x), of one quantity x, by which one place errs.
 
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`), with the ``marks`` that it asks for. In
     a joint f is an angle (or a displacement); at the base, the tool or a segment (``link`` and the name of the joint at
@@ -89,18 +92,18 @@ class Discovered(Fading):
 
     @property
     def share(self) -> float:
-        """Of the prior probability of a law: one of all that were tried."""
+        """Prior probability of one law of all that were tried."""
         return 1.0 / self.tried
 
     @property
     def follows(self) -> str:
-        """What it follows, as a diagnosis reports it: the quantity, or the product of two."""
+        """Quantity, or product of two, that a diagnosis reports."""
         return f"{self.quantity} * {self.by}" if self.by else self.quantity
 
     @property
     def modulated(self) -> Effect | None:
-        """The known effect that changes with the quantity, in the law's joint; ``None`` where there is none."""
-        return restored(self.of, self.of_arguments).at(self.place) if self.of else None
+        """Known effect that changes with the quantity, in the law's joint; ``None`` where there is none."""
+        return gate.placed(restored(self.of, self.of_arguments), (self.place,)) if self.of else None
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the quantities that the campaign lacks, and what the effect in the law lacks."""
@@ -113,7 +116,7 @@ class Discovered(Fading):
         """Return the columns that it follows, what tells the order of moves, and what the effect in the law reads."""
         names = [self.quantity, self.by]
         if self.quantity.startswith(TURN):
-            names += [next((name for name in CLOCK if name in observations.covariates), "")]
+            names += [name for name in CLOCK if name in observations.covariates][:1]
         if self.modulated:
             names += gate.reads(self.modulated, observations)
         return tuple(name for name in dict.fromkeys(names) if name in observations.covariates)
@@ -126,13 +129,26 @@ class Discovered(Fading):
         second = quantity(observations, self.by)
         return None if second is None else first * second
 
+    def _first(self, observations: Observations) -> Array | None:
+        campaign = observations.campaign
+        if self.shape == "constant":
+            return np.zeros(campaign.samples)
+        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
+            number = {label: float(k) for k, label in enumerate(self.labels)}
+            rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
+            return np.array([number.get(label, np.nan) for label in rows])
+        if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
+            return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
+        return quantity(observations, self.quantity)
+
     def _followed(self, observations: Observations) -> Array | None:
         """Return what the shape is of, at the rows; ``None`` where the campaign cannot tell."""
         of, clock = SHAPES[self.shape].of, self.values(observations)
         if of == "quantity" or clock is None:
             return clock
-        if of == "strains":
-            return strains(observations, self.quantity.removeprefix(TURN), self.marks)
+        if of == "strains":  # of each element over what makes it slip, −1 to 1
+            past, joint = observations.campaign.since_turn, self.quantity.removeprefix(TURN)
+            return np.column_stack([past[strained(joint, slip)] / slip for slip in self.marks])
         since, run = self._since_start(observations, clock)
         if of == "run":
             return since[:, None]
@@ -158,31 +174,19 @@ class Discovered(Fading):
             began[own] = starts[run[own]] if known else clock[own].min()
         return np.maximum(clock - began, 0.0), run
 
-    def _first(self, observations: Observations) -> Array | None:
-        campaign = observations.campaign
-        if self.shape == "constant":
-            return np.zeros(campaign.samples)
-        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
-            number = {label: float(k) for k, label in enumerate(self.labels)}
-            rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
-            return np.array([number.get(label, np.nan) for label in rows])
-        if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
-            return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
-        return quantity(observations, self.quantity)
-
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
         """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
         shape, clock = SHAPES[self.shape], self.quantity in CLOCK
         start = "the start" if clock else f"{self.quantity} {self._marked(self.origin)}"
         over = "the campaign" if clock else f"{self._marked(self.span)} of {self.quantity}"
-        labels = tuple(label.format(start=start, range=over) for label in shape.labels)
+        labels = [label.format(start=start, range=over) for label in shape.labels]
         if shape.each and self.labels:
-            labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
+            labels += [f"at {self.labels[int(mark)]}" for mark in self.marks]
         elif shape.each:  # as many digits as tell the marks apart
             digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
-            labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
-        labels += tuple(f"at the start of {run}" for run in self.runs if shape.of == "runs")
-        return shape.functions(values, self.marks, self.origin, self.span), labels
+            labels += [f"at {self._marked(mark, digits)}" for mark in self.marks]
+        labels += [f"at the start of {run}" for run in self.runs if shape.of == "runs"]
+        return shape.functions(values, self.marks, self.origin, self.span), tuple(labels)
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell.
@@ -243,34 +247,44 @@ class Discovered(Fading):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""
         rows = self.at_rows(observations)
-        found = () if rows is None else self._of(observations, *rows)
+        if rows is None:
+            return ()
+        own, found = self._own(observations), []
+        for function, label in zip(rows[0].T, rows[1], strict=True):
+            for p in own:
+                rows_of = {"joint": function}
+                responses = tuple(
+                    replace(r, values=r.values * rows_of.get(r.channel, function[:, None])) for r in p.responses
+                )
+                name = f"{p.label}, {label}" if p.label else label
+                found.append(replace(p, label=name, responses=responses, positive=False))
         return self.registered(found, [self._left(observations)] * len(found))
 
-    def _of(self, observations: Observations, functions: Array, labels: tuple[str, ...]) -> tuple[Parameter, ...]:
+    def _own(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Return the parameters that a function multiplies: those of the effect in the law, or one a component."""
         robot = observations.robot
         if self.modulated is not None:
-            whole = gate.checked(self.modulated, observations)
-            return tuple(_times(p, f, n) for f, n in zip(functions.T, labels, strict=True) for p in whole)
-        found = []
+            return gate.checked(self.modulated, observations)
         if self.kind == "joint":
-            j, own = robot.joint_names.index(self.place), unit(robot, self.place)
-            for function, label in zip(functions.T, labels, strict=True):
-                found.append(Parameter(label, own, 3e-4, "joint", self.place, (at_joint(j, function),)))
-            return tuple(found)
-        respond, where = self._responder(observations)
-        components = _COMPONENTS[: 6 if self.turns or self.kind != "tool" else 3]
-        for function, label in zip(functions.T, labels, strict=True):
-            for c, component in enumerate(components):
-                twist = function[:, None] * np.eye(6)[c]
-                found.append(Parameter(f"{component}, {label}", TWIST[c][1], 1e-4, self.kind, where, (respond(twist),)))
-        return tuple(found)
+            response, own = at_joint(robot.joint_names.index(self.place), 1.0), unit(robot, self.place)
+            return (Parameter("", own, _IN_A_JOINT, "joint", self.place, (response,)),)
+        respond: Callable[[Array], Response] = at_base if self.kind == "base" else at_tool
+        where = self.kind
+        if self.kind == "link":
+            s, segment = next((s, own) for s, own in enumerate(robot.segments) if own.name == self.place)
+            respond, where = (lambda twist: at_segment(s, twist)), segment.parent_link
+        shown = zip(_ALONG, TWIST, np.eye(6)[: 6 if self.turns or self.kind != "tool" else 3], strict=False)
+        return tuple(
+            Parameter(along, measured, _ELSEWHERE, self.kind, where, (respond(twist),))
+            for along, (_, measured), twist in shown
+        )
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Return the same law with its mark a little lower and higher: by a share of the range."""
         shape = SHAPES[self.shape]
         if not shape.mark:
             return (self,)
-        shift = (factor - 1.0) * 0.04 * self.span
+        shift = (factor - 1.0) * _SHIFTED * self.span
         widths = (factor, 1.0 / factor) if shape.width else ()
         wider = (replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in widths)
         return self, self.shifted(shift), self.shifted(-shift), *wider
@@ -286,36 +300,43 @@ class Discovered(Fading):
         return driving(observations, self.quantity)
 
     def to_source(self, values: Array, name: str = "my_effect") -> str:
-        """Write the law as a file to be kept and put under ``thermal_robot.effects``; the values are a comment."""
-        return source(self.arguments(), self.describe(), values, name)
+        """Write the law as a Python file of an effect; the fitted values (P,), SI, stand in it as a comment."""
+        fields = {key: value for key, value in self.arguments().items() if key != "name"}
+        what = self.describe()
+        return _SOURCE.format(
+            title="".join(part.capitalize() for part in name.split("_")),
+            name=name,
+            lines="\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items()),
+            values=fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    "),
+            what=what[:1].upper() + what[1:],
+        )
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
         at = {"joint": in_words("joint", self.place), "link": f"the placement of {self.place}"}.get(
             self.kind, f"the {self.kind}"
         )
-        mark = self.marks[0] if self.marks else 0.0
+        mark, zero, step = self.marks[0] if self.marks else 0.0, self.kind == "joint", self.shape == "step"
         how = SHAPES[self.shape].words.format(mark=self._marked(mark), order=mark)
         if self.shape == "harmonic" and self.unit == SI.length:
             how = f"a wave of {2.0 * np.pi / mark:.4g} {self.unit}"
-        follows = "its position" if (self.kind, self.place) == ("joint", self.quantity) else self.quantity
+        follows = "its position" if zero and self.place == self.quantity else self.quantity
         if self.modulated is not None:
             return f"{self.modulated.singular} in {at} that changes with {follows} ({how})"
         if self.shape == "constant":
             return f"a constant error at {at}"
         if self.labels and not self.by:
-            return (
-                f"{f'the zero of {at} is another' if self.kind == 'joint' else f'{at} stands elsewhere'} {self._when()}"
-            )
-        if self.kind != "joint" and self.runs and self.shape == "step":
+            return f"{f'the zero of {at} is another' if zero else f'{at} stands elsewhere'} {self._when()}"
+        if not zero and self.runs and step:
             return f"{at} stands elsewhere from session {self.runs[1]} on"
-        if self.by:
-            return f"an error at {at} that follows {follows} times {self.by} ({how})"
-        if (self.kind, self.shape) == ("joint", "step") and self.quantity in CLOCK:
+        if zero and step and not self.by and self.quantity in CLOCK:
             between = f", between session {self.runs[0]} and {self.runs[1]}" if self.runs else ""
-            return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip() + between
-        if self.quantity.startswith(TURN):
-            return f"an error at {at} that follows how far it has gone since it last turned round ({how})"
+            when = (f"{mark:.0f}" if abs(mark) >= 1000.0 else f"{mark:.4g}").replace("-", "−")  # without an exponent
+            return f"the zero of {at} jumped at {self.quantity} {when} {self.unit}".rstrip() + between
+        if self.by:
+            follows = f"{follows} times {self.by}"
+        elif self.quantity.startswith(TURN):
+            follows = "how far it has gone since it last turned round"
         return f"an error at {at} that follows {follows} ({how})"
 
     def _when(self) -> str:
@@ -328,35 +349,6 @@ class Discovered(Fading):
 
     def _marked(self, mark: float, digits: int = 3) -> str:
         return f"{mark:.{digits}g} {self.unit}".rstrip().replace("-", "−")
-
-    def _responder(self, observations: Observations) -> tuple[Callable[[Array], Response], str]:
-        if self.kind in ("base", "tool"):
-            return at_base if self.kind == "base" else at_tool, self.kind
-        s, segment = next((s, own) for s, own in enumerate(observations.robot.segments) if own.name == self.place)
-        return lambda twist: at_segment(s, twist), segment.parent_link
-
-
-def _whole(mark: float) -> str:
-    """Return a time or an order without an exponent."""
-    return (f"{mark:.0f}" if abs(mark) >= 1000.0 else f"{mark:.4g}").replace("-", "−")
-
-
-def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
-    """Return a parameter whose unit response is multiplied by an (N,) function; it may have either sign."""
-    responses = tuple(
-        replace(r, values=r.values * (function if r.channel == "joint" else function[:, None]))
-        for r in parameter.responses
-    )
-    return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
-
-
-def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:
-    """Text of a Python file with a law as an effect; the fitted values (P,), SI, stand in it as a comment."""
-    fields = {k: v for k, v in arguments.items() if k != "name"}
-    lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
-    title = "".join(part.capitalize() for part in name.split("_"))
-    found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
-    return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
 
 
 _SOURCE = '''"""{what}.

@@ -1,4 +1,4 @@
-"""Laws in words: a short name, what a law of that place and quantity usually is, and the column that would tell.
+"""Laws in words and in size: a short name, what a law of that place and quantity usually is, how much it changes.
 
 What is usual is the experience of calibration: Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*,
 1991, chapter 2 (geometry, gears, joints that yield), and ISO 230-1 and 230-3 (play, warming). It is never more than a
@@ -7,7 +7,7 @@ hint, and is said as one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING
@@ -16,18 +16,18 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:
     from thermal_robot.effects.effect import Parameter
-    from thermal_robot.effects.law import Discovered
     from thermal_robot.observations import Observations
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much a law, or an effect in one joint, changes over the rows that were measured, with one sigma, in SI.
+    """Range of a law, or of an effect in one joint, over the rows that were measured, with one sigma, in SI.
 
     ``what`` it is the size of is ``step`` or ``range``; ``place`` is the joint, where the effect acts in several.
     """
@@ -40,7 +40,7 @@ class Size:
 
 
 def sizes(law: Discovered, observations: Observations, values: Array, covariance: Array) -> tuple[Size, ...]:
-    """How much a law changes between the two rows between which it changes most.
+    """Change of a law between the two rows between which it changes most, with its standard deviation.
 
     Values (K·C,) and covariance are as fitted, functions first, SI. One size for a joint, and for an effect that
     changes; at a link, the base or the tool one of the translation, m, and one of the rotation, rad, each the length of
@@ -53,25 +53,26 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
     components = len(parameters) // functions.shape[1]
     by_function = np.asarray(values, dtype=float).reshape(-1, components)
     units = [parameter.unit for parameter in parameters[:components]]
-    what = SHAPES[law.shape].size
+    # all of one unit make up a vector, unless each stands for itself
+    together = [[c for c, own in enumerate(units) if own == unit] for unit in dict.fromkeys(units)]
     found = []
-    for unit, own in _together(units, single=law.modulated is not None):
+    for own in [[c] for c in range(components)] if law.modulated is not None else together:
         moved = functions @ by_function[:, own]
         first = int(np.linalg.norm(moved - moved.mean(axis=0), axis=1).argmax())
         last = int(np.linalg.norm(moved - moved[first], axis=1).argmax())
-        change = moved[last] - moved[first]
+        change, direction = moved[last] - moved[first], np.zeros(components)
         length = float(np.linalg.norm(change))
-        direction = np.zeros(components)
         direction[own] = change / length if length > 0.0 else 0.0
         weight = np.kron(functions[last] - functions[first], direction)
-        found.append(Size(what, length, sqrt(max(float(weight @ covariance @ weight), 0.0)), unit))
+        std = sqrt(max(float(weight @ covariance @ weight), 0.0))
+        found.append(Size(SHAPES[law.shape].size, length, std, units[own[0]]))
     if law.modulated is not None:  # of an effect with several parameters the one that is plainest
         found = sorted(found, key=lambda size: -size.value / max(size.std, 1e-300))[:1]
     return tuple(found)
 
 
-def in_joints(what: str, parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
-    """How much an effect of joints changes in each of them between the two rows between which it changes most.
+def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
+    """Change peak to peak of waves in each joint, between the two rows between which they change most.
 
     Single waves of a joint that moves over part of a turn do the same in part; what they do together is better known.
     Values (K,) and covariance are SI; largest first, none of a place that does not err in its joint alone.
@@ -85,22 +86,12 @@ def in_joints(what: str, parameters: Sequence[Parameter], values: Array, covaria
         rows = np.column_stack(np.broadcast_arrays(*(response.values for (response,) in responses)))
         moved = rows @ np.asarray(values, dtype=float)[own]
         weight = rows[int(moved.argmax())] - rows[int(moved.argmin())]
-        variance = float(weight @ covariance[np.ix_(own, own)] @ weight)
-        found.append(Size(what, float(np.ptp(moved)), sqrt(max(variance, 0.0)), parameters[own[0]].unit, place))
+        std = sqrt(max(float(weight @ covariance[np.ix_(own, own)] @ weight), 0.0))
+        found.append(Size("peak to peak", float(np.ptp(moved)), std, parameters[own[0]].unit, place))
     return tuple(sorted(found, key=lambda size: -size.value))
 
 
-def _together(units: list[str], single: bool) -> Iterator[tuple[str, list[int]]]:
-    """Yield units with the components that make up one vector: all of one unit, unless each stands for itself."""
-    if single:
-        yield from ((unit, [c]) for c, unit in enumerate(units))
-    else:
-        yield from ((unit, [c for c, u in enumerate(units) if u == unit]) for unit in dict.fromkeys(units))
-
-
 _LOAD = "something that yields to load"
-_SLIPS = "warming, or something that slips"
-_ANY = ""
 
 USUALLY: dict[tuple[str, str], str] = {
     ("joint", "own position"): "gears or an encoder",
@@ -121,12 +112,12 @@ USUALLY: dict[tuple[str, str], str] = {
     ("tool", "position"): "a tool or a target that bends under its own weight",
     ("tool", "session"): "a tool or a target that was mounted anew",
     ("tool", "temperature"): "a tool that grows with heat",
-    (_ANY, "time"): _SLIPS,
-    (_ANY, "session"): "something that was mounted anew",
-    (_ANY, "temperature"): "something that warms",
-    (_ANY, "position"): _LOAD,
-    (_ANY, "load"): _LOAD,
-    (_ANY, "motion"): "something that swings or trails",
+    ("", "time"): "warming, or something that slips",
+    ("", "session"): "something that was mounted anew",
+    ("", "temperature"): "something that warms",
+    ("", "position"): _LOAD,
+    ("", "load"): _LOAD,
+    ("", "motion"): "something that swings or trails",
 }
 """What errs there, by kind of place and kind of quantity; the empty place stands for those that are not listed."""
 
@@ -154,6 +145,15 @@ WHETHER = {
 }
 """By column, the cause that it would show or rule out."""
 
+_KINDS = {
+    **dict.fromkeys((*GRAVITY, *REACH), "position"),
+    **dict.fromkeys(CLOCK, "time"),
+    **dict.fromkeys(("torque", "payload", "tilt"), "load"),
+    **dict.fromkeys(("velocity", "acceleration", "speed"), "motion"),
+    **{name: name for name in ("session", "temperature", "approach")},
+    "none": "nothing",
+}
+
 
 def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
     """Kind of a quantity as seen from a place, one of :data:`TELLS`; empty for one that only this campaign knows."""
@@ -162,51 +162,37 @@ def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
         return "memory"
     if quantity in joints or (column == "encoder" and of in joints):
         return "own position" if place in (quantity, of) else "position"
-    if quantity in (*GRAVITY, *REACH):
-        return "position"
-    if quantity in CLOCK:
-        return "time"
-    kinds = {"torque": "load", "payload": "load", "tilt": "load"}
-    kinds |= dict.fromkeys(("velocity", "acceleration", "speed"), "motion")
-    kinds |= {name: name for name in ("session", "temperature", "approach")} | {"none": "nothing"}
-    return kinds.get(column, "")
+    return _KINDS.get(quantity) or ("" if column in CLOCK else _KINDS.get(column, ""))
 
 
 def usually(law: Discovered, joints: Sequence[str]) -> str:
-    """Say what a law of that place and that quantity usually is; empty where nobody can say."""
+    """Usual cause of a law of that place and that quantity; empty where nobody can say."""
     names = ["session"] if is_event(law) else [law.quantity, law.by]  # what was set up anew, once or for a session
     kinds = [kind_of(name, law.place, joints) for name in names if name]
-    found = (USUALLY.get((law.kind, kind)) or USUALLY.get((_ANY, kind), "") for kind in kinds)
+    found = (USUALLY.get((law.kind, kind)) or USUALLY.get(("", kind), "") for kind in kinds)
     return next((words for words in found if words), "")
 
 
 def called(law: Discovered) -> str:
-    """Return a short name of a law: what errs, and over what."""
+    """Short name of a law: what errs, and over what."""
     at = {"joint": law.place, "link": f"{law.place}'s placement"}.get(law.kind, f"the {law.kind}")
+    own = law.kind == "joint" and law.quantity == law.place
+    over = f"over {f'{law.quantity} times {law.by}' if law.by else 'its position' if own else law.quantity}"
     if law.modulated is not None:
-        return f"{law.modulated.singular} in {at} over {_follows(law)}"
-    what = SHAPES[law.shape].noun
-    if law.shape == "constant":
-        return f"{what} at {at}"
+        return f"{law.modulated.singular} in {at} {over}"
     if law.shape == "apart" and law.labels:
         return f"{at} standing elsewhere in {law.quantity} {law.labels[int(law.marks[0])]}"
-    if law.runs and law.shape == "step":
-        return f"{what} at {at} between sessions"
-    if law.quantity.startswith(TURN):
-        return f"{what} at {at} since it turned"
-    return f"{what} at {at} over {_follows(law)}"
-
-
-def _follows(law: Discovered) -> str:
-    if law.by:
-        return f"{law.quantity} times {law.by}"
-    return "its position" if law.kind == "joint" and law.quantity == law.place else law.quantity
+    if law.shape == "constant":
+        over = ""
+    elif law.runs and law.shape == "step":
+        over = "between sessions"
+    elif law.quantity.startswith(TURN):
+        over = "since it turned"
+    return f"{SHAPES[law.shape].noun} at {at} {over}".rstrip()
 
 
 def is_event(law: object) -> bool:
     """Tell whether a law is an event: base, tool or a joint's zero elsewhere from row to row, or in a session."""
-    from thermal_robot.effects.law import Discovered
-
     if not isinstance(law, Discovered) or law.by or law.of or law.kind == "link":
         return False
     in_time = law.quantity in CLOCK and law.shape in ("step", "run")

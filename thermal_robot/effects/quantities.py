@@ -1,15 +1,14 @@
-"""What an error may follow: what is recorded or computed from it, and varies by more than it is read to."""
+"""Covariates that an error may follow: recorded or computed, where they vary by more than they are read to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
-from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects import settings
 from thermal_robot.effects.effect import Driver
@@ -17,7 +16,6 @@ from thermal_robot.effects.effect import Driver
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
-
 
 _ROUNDING = 1e-9  # relative: how far sums of floats are off
 
@@ -46,18 +44,14 @@ def without_twins(readings: Mapping[str, Array], joints: tuple[str, ...]) -> dic
 
     An encoder's reading goes where it says what was commanded, the temperature of a link where it is that of the robot.
     """
-    return {name: v for name, v in readings.items() if not _twin(v, readings.get(_said_by(name, joints)))}
-
-
-def _said_by(name: str, joints: tuple[str, ...]) -> str:
-    column, _, place = name.partition(".")
-    if column == "encoder" and place in joints:
-        return place
-    return "temperature" if column == "temperature" and place else ""
-
-
-def _twin(values: Array, other: Array | None) -> bool:
-    return other is not None and float(np.std(values - other)) < settings.TWIN * float(np.std(other))
+    found = {}
+    for name, values in readings.items():
+        column, _, place = name.partition(".")
+        said = place if column == "encoder" and place in joints else "temperature" * (column == "temperature" != name)
+        other = readings.get(said)
+        if other is None or not np.std(values - other) < settings.TWIN * np.std(other):
+            found[name] = values
+    return found
 
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
@@ -86,13 +80,12 @@ def quantities(observations: Observations) -> dict[str, Array]:
     names += [*observations.robot.joint_names, *GRAVITY, *REACH]
     found = {name: quantity(observations, name) for name in names}
     robot = observations.robot
-    telling = {n: v for n, v in found.items() if v is not None and varies(v, _least(robot, n, v))}
+    telling: dict[str, Array] = {}
+    for name, values in found.items():
+        if values is not None:
+            least = settings.GRAVITY_READS_TO if name in GRAVITY else resolution(values, unit(robot, name))
+            telling |= {name: values} if varies(values, least) else {}
     return without_twins(telling, robot.joint_names)
-
-
-def _least(robot: Robot, name: str, values: Array) -> float:
-    """Return by how much a quantity must vary for an error to be seen to follow it, in its unit."""
-    return settings.GRAVITY_READS_TO if name in GRAVITY else resolution(values, unit(robot, name))
 
 
 def quantity(observations: Observations, name: str) -> Array | None:
@@ -124,14 +117,6 @@ def began(observations: Observations, clock: Array) -> dict[str, float]:
     if rows is None:
         return {"": float(clock.min())}
     return {str(run): float(clock[rows == run].min()) for run in np.unique(rows)}
-
-
-def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
-    """(N, K) strains of a joint's elements over what makes them slip, −1 to 1 ; ``None`` without order."""
-    past = observations.campaign.since_turn
-    if joint not in past:
-        return None
-    return np.column_stack([past[strained(joint, slip)] / slip for slip in slips])
 
 
 def driving(observations: Observations, name: str) -> Driver | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
@@ -14,10 +15,12 @@ from thermal_robot.effects.effect import Effect, Parameter
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
+_SAME = 1e-6  # rad or m: commands nearer than this repeat each other
+
 
 @dataclass(frozen=True)
 class RandomEffect(Effect):
-    """An effect whose parameter is the size of a scatter: no column follows from it, and no correction takes it away.
+    """Variance component: the parameter is the size of a scatter, which no column and no correction takes away.
 
     It is told from the covariance of what remains, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j moves
     the target and one σ_j (rad or m) a joint and component.
@@ -46,3 +49,45 @@ class RandomEffect(Effect):
         """
         which = np.arange(len(pose)) if self.component == "visit" else np.unique(pose, return_inverse=True)[1]
         return np.asarray(size / self.factor * rng.normal(size=len(pose))[which])
+
+
+@dataclass(frozen=True)
+class EncoderResolution(RandomEffect):
+    """Quantisation: every joint stands on a step of its encoder, with the same error at each repeat of a command.
+
+    A step s leaves an even distribution over ± s/2, with standard deviation s/√12 (Widrow, *Statistical analysis of
+    amplitude-quantized sampled-data systems*, 1961): a sawtooth of the command. Where no pose is repeated, only a step
+    that shows in the command tells it from :class:`ExcessRepeatability`.
+    """
+
+    name: ClassVar[str] = "encoder_resolution"
+    title: ClassVar[str] = "encoders that count in coarse steps"
+    component: ClassVar[Literal["pose", "visit"]] = "pose"
+    label: ClassVar[str] = "step"
+    factor: ClassVar[float] = sqrt(12.0)
+
+    def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
+        """Return how far the nearest step is from each command; chance has only where the encoder's zero lies."""
+        first = size * rng.uniform()
+        return first + size * np.round((command - first) / size) - command if size else np.zeros_like(command)
+
+
+@dataclass(frozen=True)
+class ExcessRepeatability(RandomEffect):
+    """Excess repeatability error: every joint scatters anew at each visit to a pose, with σ_j, rad or m.
+
+    Only repeats of a pose show it: rows with the same label ``pose``, or, without that column, the same command again.
+    """
+
+    name: ClassVar[str] = "excess_repeatability"
+    title: ClassVar[str] = "joints that scatter more than the instrument"
+    needs: ClassVar[tuple[str, ...]] = ("pose",)
+    component: ClassVar[Literal["pose", "visit"]] = "visit"
+    label: ClassVar[str] = "standard deviation"
+    factor: ClassVar[float] = 1.0
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return ``pose`` unless a pose is repeated; rows without a label stand alone."""
+        labels = observations.campaign.pose_labels
+        visits = np.round(observations.q / _SAME) if labels is None else labels[labels != ""]
+        return () if len(np.unique(visits, axis=0)) < len(visits) else self.needs

@@ -1,4 +1,4 @@
-"""The shapes of laws that nobody wrote down, one entry each: functions of a quantity, their names, their words.
+"""Basis functions of laws that nobody wrote down, one entry a shape: functions of a quantity, their names, their words.
 
 ========== ======================================================= ==========================
 shape      φ_k(x), with u = (x − origin) / span                    marks
@@ -32,7 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -40,26 +40,28 @@ from thermal_robot.arrays import Array
 
 _SHORTEST = 1e-6  # of the range: what settles within less is settled at once
 
-Functions = Callable[[Array, tuple[float, ...], float, float], Array]
-"""(N, K) of what the shape is of, (N,) or (N, K), the marks, origin and span."""
+Marks = tuple[float, ...]
+Curves = Callable[[Array, Marks, float, float], list[Any]]
 
 
 @dataclass(frozen=True)
 class Shape:
-    """One shape of a law: its functions φ of the table above, and its words.
+    """Basis of one shape of a law, the functions φ of the table above, and its words.
 
-    ``labels`` name those that do not belong to one of the marks ``each``; ``{start}`` and ``{range}`` stand for origin
-    and span, in the quantity's unit; in ``words`` ``{mark}`` stands for its first mark with the unit, ``{order}``
-    without. ``mark`` is ``sudden`` where moving it changes the functions only when it passes a row, ``gradual`` where
-    smoothly, empty where it is not to be moved; ``width`` where the second mark is a width, to be refined, too.
-    ``size`` is what the difference between its largest and its smallest value is called, ``noun`` a short name. ``of``
-    is what the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
-    (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
+    ``curves`` names its functions but for the one that stands ``beside`` them: a ``constant``, or for a share the
+    ``rest`` of it. ``labels`` name those that do not belong to one of the marks ``each``; ``{start}`` and ``{range}``
+    stand for origin and span, in the quantity's unit; in ``words`` ``{mark}`` stands for its first mark with the unit,
+    ``{order}`` without. ``mark`` is ``sudden`` where moving it changes the functions only when it passes a row,
+    ``gradual`` where smoothly, empty where it is not to be moved; ``width`` where the second mark is a width, to be
+    refined, too. ``size`` is what the difference between its largest and its smallest value is called, ``noun`` a short
+    name. ``of`` is what the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as
+    marked; the (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
     """
 
-    functions: Functions
+    curves: str
     labels: tuple[str, ...]
     words: str
+    beside: Literal["constant", "rest", ""] = "constant"
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
     each: bool = False
@@ -67,110 +69,66 @@ class Shape:
     noun: str = "an error"
     of: Literal["quantity", "strains", "run", "runs"] = "quantity"
 
-
-def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.ones((len(x), 1))
-
-
-def _ramp(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones_like(x), (x - origin) / span])
+    def functions(self, x: Array, marks: Marks, origin: float, span: float) -> Array:
+        """(N, K) functions of what the shape is of, (N,) or (N, K)."""
+        curves = np.column_stack([np.empty((len(x), 0)), *_CURVES[self.curves](x, marks, origin, span)])
+        first = {"constant": np.ones((len(x), 1)), "rest": 1.0 - curves, "": curves[:, :0]}[self.beside]
+        return np.hstack([first, curves])
 
 
-def _quadratic(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    u = (x - origin) / span
-    return np.column_stack([np.ones_like(u), u, u**2])
-
-
-def _step(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    late = x > marks[0]
-    return np.column_stack([~late, late]).astype(float)
-
-
-def _run(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    inside = (x > marks[0]) & (x < marks[1])
-    return np.column_stack([~inside, inside]).astype(float)
-
-
-def _slide(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    middle, width = marks
-    late = 0.5 * (1.0 + np.tanh((x - middle) / width))
-    return np.column_stack([1.0 - late, late])
-
-
-def _hinge(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    mark, side = marks
-    return np.column_stack([np.ones_like(x), np.maximum(side * (x - mark), 0.0) / span])
-
-
-def _bump(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    middle, width = marks
-    return np.column_stack([np.ones_like(x), np.exp(-0.5 * ((x - middle) / width) ** 2)])
-
-
-def _drag(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones_like(x), x / span, np.sign(x)])
-
-
-def _harmonic(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones_like(x), np.sin(marks[0] * x), np.cos(marks[0] * x)])
-
-
-def _hysteresis(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones(len(x)), x])
-
-
-def _relaxing(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones(len(x)), np.exp(-x / max(abs(marks[0]), _SHORTEST * span))])
-
-
-def _product(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.column_stack([np.ones_like(x), x / span])
-
-
-def _levels(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    return np.asarray(np.eye(len(marks))[np.abs(x[:, None] - np.array(marks)).argmin(axis=1)])
-
-
-def _apart(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    there = x == marks[0]
-    return np.column_stack([~there, there]).astype(float)
-
-
-def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+def _splines(x: Array, knots: Marks, origin: float, span: float) -> list[Array]:
     from scipy.interpolate import CubicSpline
 
-    knots = (np.array(marks) - origin) / span
-    u = (x - origin) / span
-    spline = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")
-    inside = spline(np.clip(u, knots[0], knots[-1]))
-    slope = spline(knots[[0, -1]], 1)
-    beyond = np.minimum(u - knots[0], 0.0)[:, None] * slope[0] + np.maximum(u - knots[-1], 0.0)[:, None] * slope[1]
-    return np.asarray(inside + beyond)
+    at, u = (np.array(knots) - origin) / span, (x - origin) / span
+    spline = CubicSpline(at, np.eye(len(at)), bc_type="natural")
+    inside, slope = spline(np.clip(u, at[0], at[-1])), spline(at[[0, -1]], 1)
+    beyond = np.minimum(u - at[0], 0.0)[:, None] * slope[0] + np.maximum(u - at[-1], 0.0)[:, None] * slope[1]
+    return [inside + beyond]
 
+
+_CURVES: dict[str, Curves] = {
+    "constant": lambda x, m, o, s: [],
+    "ramp": lambda x, m, o, s: [(x - o) / s],
+    "quadratic": lambda x, m, o, s: [(x - o) / s, ((x - o) / s) ** 2],
+    "step": lambda x, m, o, s: [x > m[0]],
+    "run": lambda x, m, o, s: [(x > m[0]) & (x < m[1])],
+    "slide": lambda x, m, o, s: [0.5 * (1.0 + np.tanh((x - m[0]) / m[1]))],
+    "hinge": lambda x, m, o, s: [np.maximum(m[1] * (x - m[0]), 0.0) / s],
+    "bump": lambda x, m, o, s: [np.exp(-0.5 * ((x - m[0]) / m[1]) ** 2)],
+    "drag": lambda x, m, o, s: [x / s, np.sign(x)],
+    "harmonic": lambda x, m, o, s: [np.sin(m[0] * x), np.cos(m[0] * x)],
+    "product": lambda x, m, o, s: [x / s],
+    "hysteresis": lambda x, m, o, s: [x],
+    "relaxing": lambda x, m, o, s: [np.exp(-x / max(abs(m[0]), _SHORTEST * s))],
+    "levels": lambda x, m, o, s: [np.eye(len(m))[np.abs(x[:, None] - np.array(m)).argmin(axis=1)]],
+    "apart": lambda x, m, o, s: [x == m[0]],
+    "smooth": _splines,
+}
+"""Functions of x, (N,) or (N, K), the marks, origin and span."""
+_BEFORE, _THERE, _ONE = ("before", "after"), ("elsewhere", "there"), "constant"
+_SETTLES = "it settles within {mark} of each start"
 
 SHAPES: dict[str, Shape] = {
-    "constant": Shape(_constant, ("constant",), "constant", noun="a constant error"),
-    "ramp": Shape(_ramp, ("at {start}", "rise over {range}"), "in proportion"),
-    "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic"),
-    "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
-    "run": Shape(_run, ("elsewhere", "there"), "another value for a while", size="step", noun="a step"),
+    "constant": Shape("constant", (_ONE,), "constant", noun="a constant error"),
+    "ramp": Shape("ramp", ("at {start}", "rise over {range}"), "in proportion"),
+    "quadratic": Shape("quadratic", (_ONE, "linear", "quadratic"), "quadratic"),
+    "step": Shape("step", _BEFORE, "a step at {mark}", "rest", "sudden", size="step", noun="a step"),
+    "run": Shape("run", _THERE, "another value for a while", "rest", size="step", noun="a step"),
     "slide": Shape(
-        _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
+        "slide", _BEFORE, "a smooth step at {mark}", "rest", "gradual", width=True, size="step", noun="a step"
     ),
-    "hinge": Shape(_hinge, ("constant", "slope beyond, over {range}"), "a bend at {mark}", "gradual"),
-    "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True, size="bump", noun="a bump"),
-    "drag": Shape(_drag, ("constant", "slope over {range}", "of its sign"), "its slope and its sign"),
+    "hinge": Shape("hinge", (_ONE, "slope beyond, over {range}"), "a bend at {mark}", mark="gradual"),
+    "bump": Shape("bump", (_ONE, "height"), "a bump at {mark}", mark="gradual", width=True, size="bump", noun="a bump"),
+    "drag": Shape("drag", (_ONE, "slope over {range}", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(
-        _harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}", size="peak to peak", noun="a wave"
+        "harmonic", (_ONE, "sine", "cosine"), "harmonic of order {order:g}", size="peak to peak", noun="a wave"
     ),
-    "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
-    "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
-    "relaxing": Shape(
-        _relaxing, ("constant", "at the start"), "it settles within {mark} of each start", "gradual", of="run"
-    ),
-    "relaxing each": Shape(_relaxing, ("constant",), "it settles within {mark} of each start", "gradual", of="runs"),
-    "levels": Shape(_levels, (), "a value at each of its levels", each=True, size="difference"),
-    "apart": Shape(_apart, ("elsewhere", "there"), "one apart from the others", size="difference", noun="an offset"),
-    "smooth": Shape(_smooth, (), "smooth", each=True),
+    "product": Shape("product", (_ONE, "at the largest product"), "in proportion to the product"),
+    "hysteresis": Shape("hysteresis", (_ONE,), "springs that slip", each=True, of="strains"),
+    "relaxing": Shape("relaxing", (_ONE, "at the start"), _SETTLES, mark="gradual", of="run"),
+    "relaxing each": Shape("relaxing", (_ONE,), _SETTLES, mark="gradual", of="runs"),
+    "levels": Shape("levels", (), "a value at each of its levels", "", each=True, size="difference"),
+    "apart": Shape("apart", _THERE, "one apart from the others", "rest", size="difference", noun="an offset"),
+    "smooth": Shape("smooth", (), "smooth", "", each=True),
 }
 """Every shape by its name."""

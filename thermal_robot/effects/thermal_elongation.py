@@ -1,8 +1,8 @@
-"""Links that grow with a temperature, or follow it: the virtual prismatic joints of Kluz et al."""
+"""Thermal expansion of links, at once or with a first-order lag: the virtual prismatic joints of Kluz et al."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
@@ -24,7 +24,7 @@ _FOLLOWED = 64  # histories and lags of which it is kept how far a body is behin
 
 @dataclass(frozen=True)
 class History:
-    """A temperature as it was recorded, straight between its points: increasing (K,) times, s, and temperatures, °C."""
+    """Recorded temperature, straight between its points: increasing (K,) times, s, and temperatures, °C."""
 
     times: tuple[float, ...]
     temperatures: tuple[float, ...]
@@ -47,7 +47,7 @@ class History:
         """
         t, u = np.array(self.times), np.array(self.temperatures)
         rate = np.diff(u) / np.diff(t)
-        behind = _behind(self, lag)
+        behind = np.array(_behind(self, lag))
         i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
         late = times >= t[-1]
         rate = np.append(rate, 0.0)[i]
@@ -59,19 +59,17 @@ class History:
 
 
 @lru_cache(maxsize=_FOLLOWED)
-def _behind(history: History, lag: float) -> Array:
+def _behind(history: History, lag: float) -> tuple[float, ...]:
     """(K,) by how much a body differs from the record at its points, K."""
     t, u = np.array(history.times), np.array(history.temperatures)
-    gains = (np.diff(u) / np.diff(t) * lag).tolist()
     behind = [0.0]
-    for gain, decay in zip(gains, np.exp(-np.diff(t) / lag).tolist(), strict=True):
+    for gain, decay in zip(np.diff(u) / np.diff(t) * lag, np.exp(-np.diff(t) / lag), strict=True):
         behind.append((behind[-1] + gain) * decay - gain)
-    found = np.array(behind)
-    found.setflags(write=False)
-    return found
+    return tuple(behind)
 
 
 _SIZE = 1.5e-5  # 1/K
+_LENGTH = 1e-9  # m: a shorter segment does not grow
 _LAGS = (600.0, 1500.0, 3600.0)
 _SHORTEST, _LONGEST = 300.0, 10800.0  # s: walls of 2 mm, and castings of 20 mm in still air
 _START = 3.0  # K between a link and what its sensor lets expect, at switching on: half of what motors of 100 W bring
@@ -80,24 +78,21 @@ _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below a
 
 @dataclass(frozen=True)
 class ThermalElongation(Effect):
-    """Every segment lengthens with its link's temperature: Δl_s = α_s l_s (T_link − T_reference).
+    """Thermal expansion: every segment lengthens with its link's temperature, Δl_s = α_s l_s (T_link − T_reference).
 
-    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a ``common`` one for all, or a
-    common one with a smaller deviation above it for each (partial pooling; ``spread``: its expected size, 0 for none),
-    along the virtual prismatic joint of their Eqs 6-8. No link shrinks when it becomes warmer: none of them is
-    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5, twice that where it warms twice as
-    much as its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
-    the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
-    link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
+    Equation 5 of Kluz et al. (2018), along the virtual prismatic joint of their Eqs 6-8, with a coefficient of its own
+    for each segment, a ``common`` one for all, or a common one with a smaller deviation above it for each (partial
+    pooling; ``spread``: its expected size, 0 for none). No link shrinks when it becomes warmer. Expected size 1.5e-5 /K
+    (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5); of a polymer ``[priors]`` says more. Where one sensor reads the air or
+    a place on the robot, the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to
+    an hour for a cast link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
 
-    Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount that
-    depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
-    temperature turns or jumps within the campaign: of a steady rise it merely takes off a constant.
+    A steady rise with time resembles :class:`Drift`, but moves the tool by an amount that depends on the pose; constant
+    temperature is :class:`Geometric`. A lag shows only where the temperature turns or jumps within the campaign.
 
-    ``times`` and ``temperatures``: the campaign's record, s and °C, kept where there is a ``lag``, s, as a later sample
-    knows only its own instant. ``starts``: instants, s, from which it holds: the first row, and the first of each
-    session, as nobody reads the sensor in between. ``balanced``: the links are then as warm as the record lets expect;
-    else they differ by some kelvin, of which exp(−(t − start) / lag) is left at t.
+    ``times`` and ``temperatures``: the campaign's record, s and °C, kept where there is a ``lag``, s. ``starts``:
+    instants, s, from which it holds: the first row, and the first of each session. ``balanced``: the links are then as
+    warm as the record lets expect; else they differ by some kelvin, of which exp(−(t − start) / lag) is left at t.
     """
 
     common: bool = False
@@ -163,46 +158,32 @@ class ThermalElongation(Effect):
 
         Then, where the links start out of balance, what they are longer by at each start.
         """
-        responses, segments = {}, observations.robot.segments
-        for s, segment in enumerate(segments):
+        reference, responses = observations.campaign.reference_temperature, {}
+        for s, segment in enumerate(observations.robot.segments):
             temperature = self._temperature(observations, segment.parent_link)
-            if temperature is None or segment.length < 1e-9:
-                continue
-            responses[s] = _grown(observations, s, temperature - observations.campaign.reference_temperature)
-        whole = tuple(responses.values())
-        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", whole, True),)
-        began = () if self.balanced or not self.lag else self._began(observations, tuple(responses))
-        if self.common and not self.spread:
-            return (*one, *began)
-        label, size = ("deviation", self.spread * _SIZE) if self.common else ("strain per kelvin", _SIZE)
-        each = tuple(
-            Parameter(
-                f"{label} of {segments[s].name}",
-                "1/K",
-                size,
-                "link",
-                segments[s].parent_link,
-                (response,),
-                positive=True,
-            )
-            for s, response in responses.items()
-        )
-        return (*one, *each, *began) if self.common else (*each, *began)
+            if temperature is not None and segment.length >= _LENGTH:
+                responses[segment] = _grown(observations, s, temperature - reference)
+        found = []
+        if self.common:
+            found.append(Parameter("strain per kelvin", "1/K", _SIZE, "link", "", tuple(responses.values()), True))
+        if self.spread or not self.common:
+            label, size = ("deviation", self.spread * _SIZE) if self.common else ("strain per kelvin", _SIZE)
+            for own, grown in responses.items():
+                found.append(Parameter(f"{label} of {own.name}", "1/K", size, "link", own.parent_link, (grown,), True))
+        return (*found, *self._began(observations, [grown.index for grown in responses.values()]))
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the temperature that was recorded of the link, or of the robot."""
         own = f"temperature.{parameters[0].place}"
         return driving(observations, own if own in observations.covariates else "temperature")
 
-    def _began(self, observations: Observations, grown: Sequence[int]) -> tuple[Parameter, ...]:
-        """One strain a start: how much longer the links were than the record says, forgotten with the lag."""
-        found = []
-        for k, start in enumerate(self.starts):
+    def _began(self, observations: Observations, grown: Sequence[int]) -> Iterator[Parameter]:
+        """Yield one strain a start: how much longer the links were than the record says, forgotten with the lag."""
+        for k, start in enumerate(() if self.balanced or not self.lag else self.starts):
             since = observations.covariates["time"] - start
             left = np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / self.lag), 0.0)
             responses = tuple(_grown(observations, s, left) for s in grown)
-            found.append(Parameter(f"strain at start {k + 1}", "1", _START * _SIZE, "link", "", responses))
-        return tuple(found)
+            yield Parameter(f"strain at start {k + 1}", "1", _START * _SIZE, "link", "", responses)
 
     def _temperature(self, observations: Observations, link: str) -> Array | None:
         recorded = observations.temperature(link)
@@ -224,7 +205,7 @@ def _follows(observations: Observations) -> bool:
 
 def _columns(observations: Observations) -> tuple[str, ...]:
     """Temperatures that apply to the segments."""
-    links = dict.fromkeys(s.parent_link for s in observations.robot.segments if s.length > 1e-9)
+    links = dict.fromkeys(s.parent_link for s in observations.robot.segments if s.length > _LENGTH)
     own = [f"temperature.{link}" for link in links if f"temperature.{link}" in observations.covariates]
     general = ["temperature"] if len(own) < len(links) and "temperature" in observations.covariates else []
     return (*own, *general)

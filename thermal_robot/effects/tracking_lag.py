@@ -1,4 +1,4 @@
-"""Joints that are measured in passing, and follow their command late."""
+"""Servo lag of joints that are measured in passing."""
 
 from __future__ import annotations
 
@@ -18,17 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TrackingLag(Effect):
-    """Every joint trails its command: q_actual = q_command − T_j q̇_j − f_j sign(q̇_j) + a_j q̈_j.
+    """Tracking error of the servo: q_actual = q_command − T_j q̇_j − f_j sign(q̇_j) + a_j q̈_j.
 
     T (s) is the servo's delay, or that between the command's clock and the instrument's; f (rad or m) the error that
     dry friction leaves in a loop without integral part; a (s²) what inertia and interpolation add: ½ T² for a pure
-    delay. Three parameters a joint, a only where ``acceleration.<joint>`` is recorded. Expected sizes 1 ms, 0.1 mrad
-    (0.1 mm) and 1e-6 s² (Siciliano et al., *Robotics: Modelling, Planning and Control*, 2009, chapter 8). ``moving``
-    and ``accelerating`` joints are taken from the observations where absent.
+    delay. a only where ``acceleration.<joint>`` is recorded. Expected sizes 1 ms, 0.1 mrad (0.1 mm) and 1e-6 s²
+    (Siciliano et al., *Robotics: Modelling, Planning and Control*, 2009, chapter 8). ``moving`` and ``accelerating``
+    joints are taken from the observations where absent.
 
-    Friction depends on the sign of the speed alone, as :class:`Backlash` does on that of the last move: where each pose
-    is passed in the direction of approach, backlash is exactly this f, and is preferred where it suffices. The delay,
-    which grows with speed, is only here: measure the same poses at several speeds.
+    Where each pose is passed in the direction of approach, :class:`Backlash` is exactly this f, and is preferred where
+    it suffices. The delay, which grows with speed, is only here: measure the same poses at several speeds.
     """
 
     moving: tuple[str, ...] | None = None
@@ -72,14 +71,11 @@ class TrackingLag(Effect):
             if joint not in moving:
                 continue
             velocity = np.asarray(recorded[f"velocity.{joint}"])
-            found.append(Parameter("delay", "s", 1e-3, "joint", joint, (at_joint(j, -velocity),)))
-            found.append(
-                Parameter("friction", unit(robot, joint), 1e-4, "joint", joint, (at_joint(j, -np.sign(velocity)),))
-            )
+            told = [("delay", "s", 1e-3, -velocity), ("friction", unit(robot, joint), 1e-4, -np.sign(velocity))]
             if joint in accelerating:
-                acceleration = recorded[f"acceleration.{joint}"]
-                label = "effect of acceleration"
-                found.append(Parameter(label, "s²", 1e-6, "joint", joint, (at_joint(j, acceleration),)))
+                told.append(("effect of acceleration", "s²", 1e-6, recorded[f"acceleration.{joint}"]))
+            for label, measured, size, values in told:
+                found.append(Parameter(label, measured, size, "joint", joint, (at_joint(j, values),)))
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:

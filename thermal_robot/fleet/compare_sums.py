@@ -34,9 +34,9 @@ from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.uncertainty import exceeding
 from thermal_robot.effects import Effect, Parameter, gate
 from thermal_robot.effects.apply import displacement
-from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_words import called
+from thermal_robot.effects.position import OfPosition
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.files import is_file
 from thermal_robot.fleet import settings

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
-from thermal_robot.effects import Effect, Parameter, gate, library
+from thermal_robot.effects import FRAMES, Effect, Parameter, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EffectError
@@ -126,7 +126,7 @@ def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect
 
 def _begins_anew(effect: Effect, observations: Observations) -> bool:
     """Tell whether an effect is a campaign's own."""
-    if effect.frame or effect.name.startswith(PREFIX):
+    if effect.name in FRAMES or effect.name.startswith(PREFIX):
         return True
     try:
         kinds = {parameter.kind for parameter in gate.checked(effect, observations)}

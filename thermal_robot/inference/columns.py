@@ -14,6 +14,7 @@ from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.apply import column
 from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
+from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
 
@@ -73,7 +74,7 @@ def block(observations: Observations, effect: Effect) -> Block:
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
     bare = tuple(parameter.bare for parameter in parameters)
-    return Block(effect, bare, observations, sizes, effect.size_spread, effect.size_most)
+    return Block(effect, bare, observations, sizes, effect.size_spread, SIZE_MOST)
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
-from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.effects import JointRipple
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import quantity, unit
 from thermal_robot.inference import settings

@@ -13,7 +13,7 @@ from thermal_robot.blind.plan import PARALLELOGRAMS, ROBOTS
 from thermal_robot.blind.reality import World
 from thermal_robot.blind.reality.world import cross_axes
 from thermal_robot.campaign import Campaign
-from thermal_robot.effects.base_compliance import overturning
+from thermal_robot.effects.compliance import overturning
 from thermal_robot.kinematics import gravity_torques, tool_poses
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
