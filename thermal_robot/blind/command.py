@@ -114,7 +114,7 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     withdrawn = [record for record in records if "withdrawn" in record]
     for record in withdrawn:
         note(f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}", options.loudness)
-    found = score([record for record in records if record not in withdrawn]).to_dict()
+    found = score([record for record in records if record not in withdrawn])
     written = json.dumps(found, indent=2, ensure_ascii=False)
     if not options.printed:
         print(markdown(found) if options.markdown else text(found))

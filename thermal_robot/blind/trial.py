@@ -16,7 +16,7 @@ from contextlib import closing
 from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot.blind.cases import ASKS, Case
 from thermal_robot.blind.score import shares
@@ -24,30 +24,19 @@ from thermal_robot.blind.supervise import examine
 from thermal_robot.errors import SealError, ThermalRobotError
 from thermal_robot.files import write_bytes, write_text
 
+if TYPE_CHECKING:
+    from thermal_robot.blind.real import RealCase
+
 KEY_BYTES = 32
 
 
 def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
-    """Write answers so that whoever has only the file reads nothing.
+    """Write answers under a stream cipher, and return their commitment: SHA-256 of key and text, in hexadecimal.
 
-    The text is added, byte by byte, to a keystream that SHAKE-256 draws from the key. The key stays in the memory of
-    the process that made the answers: without it the file is noise, and only its length is told. A key must serve
-    once, since two texts under one keystream would betray their difference. The commitment says that the answers were
-    fixed when it was told: nobody finds another text, or another key, with the same hash.
-
-    Parameters
-    ----------
-    answers
-        Plain values; they are written as canonical JSON (see :func:`canonical`).
-    path
-        File to write.
-    key
-        32 random bytes.
-
-    Returns
-    -------
-    str
-        The commitment, in hexadecimal: SHA-256 of the key followed by the plain text.
+    The text, :func:`canonical` JSON, is added to a keystream that SHAKE-256 draws from the 32 random bytes of the key.
+    The key stays in the memory of the process that made the answers: without it the file tells only its length. A key
+    must serve once, since two texts under one keystream would betray their difference. The commitment says that the
+    answers were fixed when it was told: nobody finds another text, or another key, with the same hash.
     """
     if len(key) != KEY_BYTES:
         raise ValueError(f"a key has {KEY_BYTES} bytes, not {len(key)}")
@@ -57,19 +46,7 @@ def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
 
 
 def open_seal(path: Path, key: bytes, commitment: str) -> dict[str, Any]:
-    """Read what :func:`seal` wrote.
-
-    Parameters
-    ----------
-    path, key
-        As given to :func:`seal`.
-    commitment
-        As it returned.
-
-    Returns
-    -------
-    dict
-        The answers.
+    """Read the answers that :func:`seal` wrote, with the same key and the commitment that it returned.
 
     Raises
     ------
@@ -110,24 +87,6 @@ SCHEMA = "thermal-robot/trial/1"
 Plain = dict[str, Any]
 Make = Callable[[Case, Path], Plain]
 _FRESH = ("fresh_position", "fresh_before")  # of the answers: what they give is in the record as two numbers
-
-
-class RealCase(Protocol):
-    """A case that makes its own campaign and judges its own record; a frozen dataclass."""
-
-    @property
-    def id(self) -> str:
-        """Name of its folder."""
-
-    @property
-    def control(self) -> str | None:
-        """``id`` of the case that its record is judged against."""
-
-    def make(self, folder: Path) -> Plain:
-        """Write the campaign, return the answers."""
-
-    def judge(self, record: Plain, control: Plain | None) -> Plain:
-        """Return the record with ``right``, ``asked`` and ``answer``."""
 
 
 def run_trial(
