@@ -88,13 +88,20 @@ def parents(setting: Setting) -> list[Place]:
     return [("link", joint.parent) for joint in setting.world.chain]
 
 
-def in_joints(name: str, draw: Draw, err: Does, **more: Any) -> Fault:
-    """Return a fault of few joints, of an error in each row and joint, (N, n) or what broadcasts to it, rad or m."""
+def adds(
+    to: str, name: str, draw: Draw, what: Does, places: Callable[[Setting], Sequence[Place]], **more: Any
+) -> Fault:
+    """Return a fault that adds something to one attribute of the body."""
 
     def act(body: Body, setting: Setting, values: Array) -> None:
-        body.joints += err(setting, values)
+        setattr(body, to, getattr(body, to) + what(setting, values))
 
-    return Fault(name, draw, act, joints, few=True, **more)
+    return Fault(name, draw, act, places, **more)
+
+
+def in_joints(name: str, draw: Draw, err: Does, **more: Any) -> Fault:
+    """Return a fault of few joints, of an error in each row and joint, (N, n) or what broadcasts to it, rad or m."""
+    return adds("joints", name, draw, err, joints, few=True, **more)
 
 
 def at(where: str, name: str, draw: Draw, twist: Does, **more: Any) -> Fault:
@@ -322,10 +329,6 @@ def ratings(setting: Setting) -> Array:
     return np.maximum(held, _SMALLEST)
 
 
-def _springs(body: Body, setting: Setting, values: Array) -> None:
-    body.springs += np.abs(values[:, 0])
-
-
 def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
     """Draw the compliance of every joint; now and then one worn gear among stiff ones."""
     values = np.abs(rng.normal(1.0, 0.5, (setting.world.n, 1))) * 1e-5
@@ -375,30 +378,12 @@ def _scatter(setting: Setting, values: Array) -> Array:
     return np.asarray(chance.normal(size=setting.q.shape) * np.abs(values[:, 0]))
 
 
-def _manufacture(body: Body, setting: Setting, values: Array) -> None:
-    # the errors of manufacture are there before anything else, and stay
-    body.placements = body.placements + values
-
-
 def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
     values = rng.normal(size=(len(setting.world.chain), 6)) * np.array([2e-4, 2e-4, 2e-4, 5e-4, 5e-4, 5e-4])
     values[[not (j.movable or k in setting.world.segments) for k, j in enumerate(setting.world.chain)]] = 0.0
     if rng.random() < 0.3:  # a crash: one link is bent
         values[np.arange(len(values)) != rng.choice(np.flatnonzero(values.any(axis=1)))] *= 0.1
     return np.asarray(values)
-
-
-def _beams(body: Body, setting: Setting, values: Array) -> None:
-    body.beams += np.abs(values)
-
-
-def _warm(body: Body, setting: Setting, values: Array) -> None:
-    body.growth += values[:, 0] * (setting.links - 20.0)
-
-
-def _bow(body: Body, setting: Setting, values: Array) -> None:
-    """The sun or a motor warms one side: the flanks differ as the link differs from the hall."""
-    body.bow += (setting.links - setting.air[:, None])[:, :, None] * values[None]
 
 
 def _strains(setting: Setting, values: Array) -> dict[str, float]:
@@ -449,10 +434,6 @@ def _tipped(setting: Setting, values: Array) -> dict[str, float]:
     return found
 
 
-def _scale(body: Body, setting: Setting, values: Array) -> None:
-    body.scale += float(values[0, 0])
-
-
 def _rigid(setting: Setting, rng: np.random.Generator) -> Array:
     return np.asarray(2e-3 * rng.normal(size=(1, 6)))
 
@@ -501,7 +482,15 @@ _ALL = (
         known_as=each_joint("lost motion", lambda values: 2.0 * np.abs(values[:, 0])),
         fixed=((1, (_HOLDS,)), (2, (0.05,))),
     ),
-    Fault("joint_compliance", _draw_springs, _springs, joints, quantities=weights, known_as=each_joint("compliance")),
+    adds(
+        "springs",
+        "joint_compliance",
+        _draw_springs,
+        lambda s, v: np.abs(v[:, 0]),
+        joints,
+        quantities=weights,
+        known_as=each_joint("compliance"),
+    ),
     in_joints(
         "tracking_lag",
         _draw_servo,
@@ -513,31 +502,43 @@ _ALL = (
         known_as=_lags,
         fixed=((2, (0.0, 1.0)),),
     ),
-    Fault("geometric", _draw_manufacture, _manufacture, parents, quantities=lambda s, places: s.world.names),
-    Fault("link_compliance", _all_segments(1e-6, (0.4, 1.6), 2), _beams, segments, quantities=weights),
-    Fault(
+    # the errors of manufacture are there before anything else, and stay
+    adds("placements", "geometric", _draw_manufacture, _always, parents, quantities=lambda s, places: s.world.names),
+    adds(
+        "beams",
+        "link_compliance",
+        _all_segments(1e-6, (0.4, 1.6), 2),
+        lambda s, v: np.abs(v),
+        segments,
+        quantities=weights,
+    ),
+    adds(
+        "growth",
         "thermal_elongation",
         _all_segments(STEEL, (0.7, 1.7)),
-        _warm,
+        lambda s, v: v[:, 0] * (s.links - 20.0),
         segments,
         wants=("temperature",),
         quantities=warmths,
         known_as=_strains,
     ),
-    Fault(
+    # the sun or a motor warms one side: the flanks differ as the link differs from the hall
+    adds(
+        "bow",
         "thermal_bending",
         lambda s, rng: 1e-4 * rng.normal(size=(len(s.world.segments), 2)),
-        _bow,
+        lambda s, v: (s.links - s.air[:, None])[:, :, None] * v[None],
         segments,
         wants=("sensor:links",),
         quantities=warmths,
     ),
     at("base", "drift", _draw_creep, _creep, quantities=clock, known_as=_crept, fixed=((6, (1e3, 5e3, 1e6)),)),
     at("base", "base_compliance", _draw_tip, _tip, quantities=weights, known_as=_tipped, fixed=((2, (0.0, 1.0)),)),
-    Fault(
+    adds(
+        "scale",
         "instrument_scale",
         lambda s, rng: np.array([[rng.choice([-1e-4, 1e-4])]]),
-        _scale,
+        lambda s, v: v[0, 0].item(),
         lambda s: [],
         known_as=lambda s, values: {"scale error, instrument": float(values[0, 0])},
     ),

@@ -16,6 +16,7 @@ from thermal_robot.blind.reality.fault import (
     Fault,
     Place,
     Quantities,
+    adds,
     at,
     clock,
     follows,
@@ -30,7 +31,6 @@ from thermal_robot.blind.reality.fault import (
     within,
 )
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.world import Body
 from thermal_robot.errors import EffectError
 
 Array = NDArray[np.float64]
@@ -91,10 +91,10 @@ def _remounted(setting: Setting, values: Array) -> Array:
     return np.pad(values, ((0, 0), (0, 3)))[setting.session]
 
 
-def _bolt(body: Body, setting: Setting, values: Array) -> None:
+def _bolt(setting: Setting, values: Array) -> Array:
     """A bolt gives way: from one moment on a link's far end is tilted against it."""
     late = setting.time > values[:, 6].max() * setting.time[-1]
-    body.placements = body.placements + late[:, None, None] * values[None, :, :6]
+    return np.asarray(late[:, None, None] * values[None, :, :6])
 
 
 def _draw_bolt(setting: Setting, rng: np.random.Generator) -> Array:
@@ -167,7 +167,7 @@ _ALONE = (
         wants=("sessions",),
         quantities=_SESSION,
     ),
-    Fault("yielding_bolt", _draw_bolt, _bolt, parents, few=True, quantities=clock, fixed=((6, (0.5,)),)),
+    adds("placements", "yielding_bolt", _draw_bolt, _bolt, parents, few=True, quantities=clock, fixed=((6, (0.5,)),)),
     # a damaged stretch of a gear: off only while the joint stands there
     in_joints(
         "damaged_teeth",

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from html import escape
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
@@ -13,12 +13,16 @@ from matplotlib.ticker import FuncFormatter
 from thermal_robot.blind.judged import KNOWN
 from thermal_robot.blind.report.text import (
     ASKED,
+    GROUPED,
+    Plain,
     coefficients,
     count,
     effect,
     facts,
     interval,
     kind,
+    left,
+    lost,
     miss,
     needed,
     question,
@@ -61,20 +65,10 @@ _GROUPS = {
 }
 
 
-def confusion_figure(score: Mapping[str, Any], which: str = "single") -> Figure:
-    """Draw how often each truth was answered by each name.
+def confusion_figure(score: Plain, which: str = "single") -> Figure:
+    """Draw the confusion matrix of a table of the score: how often each truth was answered by each name.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-    which
-        Name of a table of its ``confusion``.
-
-    Returns
-    -------
-    Figure
-        Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
+    Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
     """
     table = score["confusion"].get(which)
     if table is None:
@@ -121,13 +115,10 @@ def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
     return cell
 
 
-def calibration_figure(score: Mapping[str, Any]) -> Figure:
-    """Draw how often effects were at work against how probable they were said to be, and how many there were.
+def calibration_figure(score: Plain) -> Figure:
+    """Draw the reliability diagram: how often effects were at work against how probable they were said to be.
 
-    Returns
-    -------
-    Figure
-        Above, for each bin of probabilities, the share that was at work with its 95 % bar; below, how many there were.
+    Above, for each bin of probabilities, the share with its 95 % bar; below, how many effects there were.
     """
     steps = score["calibration"]["all"]["bins"]
     if not any(b["present"]["trials"] for b in steps):
@@ -145,7 +136,7 @@ def calibration_figure(score: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+def _frequencies(axes: Axes, steps: Sequence[Plain]) -> None:
     """Draw the share at work of each bin against the mean probability in it, beside the line of a sound scale."""
     axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
     said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
@@ -160,7 +151,7 @@ def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
     axes.set_ylim(-3.0, 103.0)
 
 
-def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+def _numbers(axes: Axes, steps: Sequence[Plain]) -> None:
     """Draw how many effects each bin holds, on a logarithmic axis."""
     for b in steps:
         number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
@@ -176,7 +167,7 @@ def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
     axes.set_ylabel("effects")
 
 
-def _error(calibration: Mapping[str, Any]) -> str:
+def _error(calibration: Plain) -> str:
     all_, sure = calibration["all"], calibration["doubtful"]
     said = f"calibration error {units.percent(all_['error'])} over {all_['trials']} effects"
     if sure["trials"]:
@@ -184,7 +175,7 @@ def _error(calibration: Mapping[str, Any]) -> str:
     return said
 
 
-def shrinkage_figure(score: Mapping[str, Any]) -> Figure:
+def shrinkage_figure(score: Plain) -> Figure:
     """Draw what stays of the gap's mean square on fresh samples against what the diagnosis claims to stay."""
     pairs = score["shrinkage"]["pairs"]
     if not pairs:
@@ -231,34 +222,29 @@ def _empty(heading: str, why: str) -> Drawing:
 _LAST = 1.5  # times the lower bound: where a step without an upper one ends in the drawing
 
 
-def power_figure(score: Mapping[str, Any]) -> Figure:
-    """Draw the share of effects found against their size and against the number of rows.
+def power_figure(score: Plain) -> Figure:
+    """Draw the power of the diagnosis: the share of effects found, against their size and the number of rows.
 
-    Returns
-    -------
-    Figure
-        Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower
-        and the upper quartile of the other quantity.
+    Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower and
+    the upper quartile of the other quantity.
     """
     detection = score["detection"]
     figure = Drawing(9.6, 4.0)
-    left, right = figure.subplots(1, 2, sharey=True)
+    size, rows = figure.subplots(1, 2, sharey=True)
     curve = detection["curve"] or {"over_ratio": (), "over_samples": ()}
-    _panel(left, detection["ratio"], curve["over_ratio"], lambda rows: f"with {rows:.0f} rows")
-    left.set_xlabel("size: what it leaves over the noise, rms")
-    left.set_ylabel("found, 95 % bars (%)")
-    _panel(right, detection["samples"], curve["over_samples"], lambda size: f"{size:.2g} times the noise")
-    right.set_xlabel("rows of the campaign")
-    if left.lines:
-        left.text(-0.015, 106.0, "cases", transform=left.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
-    title(left, "Found, by size")
-    title(right, "Found, by number of rows")
+    _panel(size, detection["ratio"], curve["over_ratio"], lambda n: f"with {n:.0f} rows")
+    size.set_xlabel("size: what it leaves over the noise, rms")
+    size.set_ylabel("found, 95 % bars (%)")
+    _panel(rows, detection["samples"], curve["over_samples"], lambda n: f"{n:.2g} times the noise")
+    rows.set_xlabel("rows of the campaign")
+    if size.lines:
+        size.text(-0.015, 106.0, "cases", transform=size.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
+    title(size, "Found, by size")
+    title(rows, "Found, by number of rows")
     return figure
 
 
-def _panel(
-    axes: Axes, steps: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], other: Callable[[float], str]
-) -> None:
+def _panel(axes: Axes, steps: Sequence[Plain], lines: Sequence[Plain], other: Callable[[float], str]) -> None:
     told = [s for s in steps if s["found"]["trials"]]
     if not told:
         note(axes, "No case with one effect of known size.")
@@ -292,26 +278,13 @@ def _panel(
     tidy(axes, grid="y")
 
 
-Plain = Mapping[str, Any]
-
 _CARDS = ("single", "null", "removed", "unlisted")
-_CHANGES = ("exact", "found", "way", "day", "false_alarm")
 
 
 def html(score: Plain, generated: str) -> str:
-    """Write a score as a page that needs nothing beside itself and prints on A4.
+    """Write a score of the format ``thermal-robot/blind/1`` as a page that needs nothing beside itself, for A4.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-    generated
-        When it was made, in the words that shall stand in the footer; may be empty.
-
-    Returns
-    -------
-    str
-        A complete HTML document.
+    ``generated`` is when it was made, in the words that shall stand in the footer; may be empty.
     """
     return document("Blind trial", "\n".join(_whole(score, generated)))
 
@@ -325,14 +298,20 @@ def _whole(score: Plain, generated: str) -> Iterator[str]:
     yield _header(score)
     yield section("How often", _kinds(score["kinds"]))
     if score["confusion"]:
-        yield section("What was named", *_confusions(score))
-    yield from _one_by_one(score)
+        said = (
+            "Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed."
+        )
+        tables = (figure(confusion_figure(score, t), "Truth against what was named first") for t in score["confusion"])
+        yield section("What was named", paragraph(said), *tables)
+    groups = [_groups(f"{of}, {more}", score[name], name) for name, of, more, _ in GROUPED if score[name]]
+    if groups:
+        yield section("One by one", *groups)
     said = "How often effects and laws were true against how probable they were said to be"
     yield section("Probabilities", figure(calibration_figure(score), said))
     power = figure(power_figure(score), "Share of effects found, by size and by number of rows")
     yield section("What it takes to be found", power, *_needed(score["detection"]["curve"]))
-    left = figure(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples")
-    yield section("How far the gap shrinks", left)
+    stays = figure(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples")
+    yield section("How far the gap shrinks", stays)
     if score["real"]:
         yield section("Real campaigns", _real(score["real"]))
     if score["misses"]:
@@ -342,71 +321,46 @@ def _whole(score: Plain, generated: str) -> Iterator[str]:
 
 def _header(score: Plain) -> str:
     right = score["cases"] - len(score["misses"])
-    failed = f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
     kicker = '<div class="tr-kicker">Faults that the program was not told of, named by it</div>'
-    heading = f"<h1>Blind trial: {right} of {score['cases']} cases answered rightly{failed}</h1>"
+    heading = f"<h1>Blind trial: {right} of {score['cases']} cases answered rightly{lost(score)}</h1>"
     alone = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts(score))
-    return f"<header>{kicker}\n{heading}\n{_cards(score['kinds'])}\n<dl>{alone}</dl></header>"
+    cards = "".join(_card(of) for of in score["kinds"] if of["kind"] in _CARDS)
+    return f'<header>{kicker}\n{heading}\n<div class="tr-numbers">{cards}</div>\n<dl>{alone}</dl></header>'
 
 
-def _confusions(score: Plain) -> Iterator[str]:
-    yield paragraph(
-        "Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed."
-    )
-    for name in score["confusion"]:
-        yield figure(confusion_figure(score, name), "Truth against what was named first")
-
-
-def _one_by_one(score: Plain) -> Iterator[str]:
-    groups = (
-        ("By effect, where one or several are at work", score["by_effect"]),
-        ("By robot, the same cases and those with nothing at work", score["by_robot"]),
-        ("Effect taken out of the library, by effect", score["removed"]),
-        ("Cause that no library knows, by cause", score["unlisted"]),
-    )
-    tables = [_groups(heading, rates) for heading, rates in groups if rates]
-    if score["changes"]:
-        tables.append(_groups("Campaigns of one robot, by what changes", score["changes"], _CHANGES))
-    if tables:
-        yield section("One by one", *tables)
-
-
-def _cards(kinds: Iterable[Plain]) -> str:
-    shown = []
-    for of in kinds:
-        rate = of["rates"][of["headline"]]
-        if of["kind"] in _CARDS and rate["trials"]:
-            asked = question(of["headline"], of["kind"])
-            lines = (f"{asked[:1].upper()}{asked[1:]}", count(rate), f"95 % interval {interval(rate)}")
-            small = "".join(f"<span>{escape(line)}</span>" for line in lines)
-            heading = kind(of["kind"])
-            value = escape(units.percent(rate["value"]))
-            card = f"<span>{escape(heading[:1].upper() + heading[1:])}</span><b>{value}</b>{small}"
-            shown.append(f'<div class="tr-number" style="flex-basis:11rem">{card}</div>')
-    return f'<div class="tr-numbers">{"".join(shown)}</div>'
+def _card(of: Plain) -> str:
+    """Show the headline of one kind of case; nothing where it was not asked."""
+    rate = of["rates"][of["headline"]]
+    if not rate["trials"]:
+        return ""
+    asked, heading = question(of["headline"], of["kind"]), kind(of["kind"])
+    lines = (f"{asked[:1].upper()}{asked[1:]}", count(rate), f"95 % interval {interval(rate)}")
+    small = "".join(f"<span>{escape(line)}</span>" for line in lines)
+    value = f"<b>{escape(units.percent(rate['value']))}</b>"
+    card = f"<span>{escape(heading[:1].upper() + heading[1:])}</span>{value}{small}"
+    return f'<div class="tr-number" style="flex-basis:11rem">{card}</div>'
 
 
 def _kinds(kinds: Iterable[Plain]) -> str:
     rows = []
     for of in kinds:
         failed = f", {of['failed']} failed" if of["failed"] else ""
-        rows.append(
-            f"<tr><td colspan=4><strong>{escape(kind(of['kind']))}</strong>, {of['cases']} cases{failed}</td></tr>"
-        )
+        said = f"<strong>{escape(kind(of['kind']))}</strong>, {of['cases']} cases{failed}"
+        rows.append(f"<tr><td colspan=4>{said}</td></tr>")
         for name, rate in of["rates"].items():
             asked = escape(question(name, of["kind"]))
             first = f'<span class="tr-found">{asked}</span>' if name == of["headline"] else asked
             rows.append(row((first, count(rate), units.percent(rate["value"]), interval(rate))))
         if of["fresh"]["count"]:
-            left = of["fresh"]
-            said = f"{left['median']:.2f} in the median, 90 % below {left['q90']:.2f}"
-            rows.append(f"<tr><td>left on fresh samples, over the noise</td><td colspan=3 class=tr-n>{said}</td></tr>")
+            stays = f"<td colspan=3 class=tr-n>{left(of)}</td>"
+            rows.append(f"<tr><td>left on fresh samples, over the noise</td>{stays}</tr>")
     return table(("", "cases", "share", "95 % interval"), rows)
 
 
-def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = ASKED) -> str:
+def _groups(heading: str, groups: Plain, name: str) -> str:
+    questions = ("exact", "found", "way", "day", "false_alarm") if name == "changes" else ASKED
     asked = [q for q in questions if any(q in rates for rates in groups.values())]
-    rows = (row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
+    rows = (row((escape(group), *(_share(rates.get(q)) for q in asked))) for group, rates in groups.items())
     return f'<p class="tr-kicker">{escape(heading)}</p>{table(("", *map(question, asked)), rows)}'
 
 
