@@ -107,21 +107,16 @@ def run_trial(
 
     Parameters
     ----------
-    cases
-        What is asked.
-    directory
-        Is made if need be; keeps campaigns, sealed answers, replies, opened answers and records.
+    cases, directory
+        What is asked; what keeps campaigns, sealed answers, replies, opened answers and records, made if need be.
     make
         Writes the campaign of a :class:`Case` into a folder and returns the answers; must be picklable. That of
         :mod:`thermal_robot.blind.reality` by default.
-    workers
-        How many processes make campaigns, and then diagnose them.
-    progress
-        Called with ``"campaigns"`` or ``"diagnoses"``, how many are done, and how many there are.
-    sealed
-        Called with the commitment of :func:`~thermal_robot.blind.trial.seal` before the first diagnosis.
-    timeout
-        Seconds for one diagnosis.
+    workers, timeout
+        How many processes make campaigns, and then diagnose them; s for one diagnosis.
+    progress, sealed
+        Called with ``"campaigns"`` or ``"diagnoses"``, how many are done, and how many there are; called with the
+        commitment of :func:`seal` before the first diagnosis.
 
     Returns
     -------
@@ -158,7 +153,11 @@ def run_trial(
     opened = open_seal(folder / SEALED, key, commitment)
     # with the key, whoever noted the commitment can now check it
     _write(folder / OPENED, {"commitment": commitment, "key": key.hex(), "answers": opened})
-    records = _judged(cases, [join(case, opened[case.id], replies.get(case.id)) for case in cases])
+    records = [join(case, opened[case.id], replies.get(case.id)) for case in cases]
+    found = {record["id"]: record for record in records}
+    for k, case in enumerate(cases):
+        if not isinstance(case, Case):
+            records[k] = case.judge(records[k], found.get(case.control or ""))
     _write(folder / RECORDS, records)
     return records
 
@@ -186,19 +185,10 @@ def _rms(positions: Sequence[Sequence[float]], true: Sequence[Sequence[float]]) 
     return math.sqrt(sum(math.dist(p, t) ** 2 for p, t in zip(positions, true, strict=True)) / len(true))
 
 
-def _judged(cases: Sequence[Case | RealCase], records: list[Plain]) -> list[Plain]:
-    found = {record["id"]: record for record in records}
-    return [
-        record if isinstance(case, Case) else case.judge(record, found.get(case.control or ""))
-        for case, record in zip(cases, records, strict=True)
-    ]
-
-
 def _request(case: Case | RealCase, folder: Path) -> Plain:
-    folder = folder / CAMPAIGNS / case.id
-    request = {"folder": str(folder), "without": list(getattr(case, "without", ())), "only": []}
-    several = isinstance(case, Case) and case.several is not None
-    return {**request, "asks": ASKS[case.kind]} if several else request  # type: ignore[union-attr]
+    without = list(case.without) if isinstance(case, Case) else []
+    request = {"folder": str(folder / CAMPAIGNS / case.id), "without": without, "only": []}
+    return {**request, "asks": ASKS[case.kind]} if case.kind in ASKS else request
 
 
 def _identity(cases: Sequence[Case | RealCase]) -> Plain:
@@ -207,7 +197,7 @@ def _identity(cases: Sequence[Case | RealCase]) -> Plain:
 
     if len({case.id for case in cases}) < len(cases) or not cases:
         raise ThermalRobotError("a trial needs cases, and each needs an id of its own")
-    drawn = json.dumps([asdict(case) for case in cases], sort_keys=True, default=str)  # type: ignore[arg-type]
+    drawn = json.dumps([asdict(case) for case in cases], sort_keys=True, default=str)
     return {
         "schema": SCHEMA,
         "version": __version__,

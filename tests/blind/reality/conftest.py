@@ -45,6 +45,12 @@ BEAM = """<robot name="beam"><link name="wall"/>
 
 
 @pytest.fixture(scope="session")
+def beam_urdf():
+    """The arm of :func:`beam`."""
+    return BEAM
+
+
+@pytest.fixture(scope="session")
 def beam():
     """A uniform arm of 4 kg and 0.8 m that turns about a level axis."""
     from thermal_robot.blind.reality import World
