@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
             print(text, file=notes, flush=True)
 
     cases = _cases(options, seed, tell)
-    if any(getattr(case, "kind", "") == "fleet" for case in cases):  # it would fail after the last campaign
+    if any(case.kind == "fleet" for case in cases):  # it would fail after the last campaign
         _require("pyarrow", "fleets in the trial need")
     tell(f"Seed {seed}: {len(cases)} cases in {directory}")
     from thermal_robot.blind.trial import run_trial

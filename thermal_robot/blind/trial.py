@@ -164,7 +164,7 @@ def run_trial(
 
 def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, Any] | None) -> Plain:
     """Join what was asked, what is true and what was said to a record."""
-    asked: Plain = {"id": case.id, "kind": getattr(case, "kind", "real")}
+    asked: Plain = {"id": case.id, "kind": case.kind}
     if isinstance(case, Case):
         asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
     if reply is None:
@@ -204,7 +204,7 @@ def _identity(cases: Sequence[Case | RealCase]) -> Plain:
         # a program that was changed meanwhile would be judged by some of its predecessor's replies
         "program": _digest(Path(__file__).parents[1], "*.py"),
         "plan": hashlib.sha256(drawn.encode()).hexdigest(),
-        "kinds": dict(Counter(getattr(case, "kind", "real") for case in cases)),
+        "kinds": dict(Counter(case.kind for case in cases)),
         "robots": sorted({case.robot.name for case in cases if isinstance(case, Case)}),
     }
 

@@ -32,12 +32,10 @@ class Instrument:
         (4, 4) the robot's root as the instrument sees it.
     target, declared
         (3,) the target in the tool frame: where it is, and where the file says it is, m.
-    base_known, tool_known
-        What the file declares known.
     noise, turning
         One sigma per axis, m and rad; ``turning`` is ``None`` where it measures no orientation.
-    stated
-        Whether the file states the noise.
+    base_known, tool_known, stated
+        What the file declares known, and whether it states the noise.
     tails
         Degrees of freedom of Student's law that the noise has, more than 2; infinite for Gauss'.
     spoilt

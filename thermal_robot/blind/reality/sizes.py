@@ -29,18 +29,14 @@ class Unseen(Exception):
 
 @dataclass
 class Gauge:
-    """Measures displacements of the target on the rows that are given to the diagnosis.
+    """Measures displacements of the target on the (M,) rows that are given to the diagnosis.
 
     Attributes
     ----------
-    setting
-        The campaign's day.
-    rows
-        (M,) the rows.
     target
         (3,) the target in the tool frame, m.
-    frames
-        (3M, F) columns of the frames that are unknown.
+    base, tool
+        Whether these frames are unknown: what they can do leaves nothing.
     """
 
     setting: Setting

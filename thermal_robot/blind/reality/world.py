@@ -157,7 +157,7 @@ def _joint(node: ElementTree.Element) -> Joint:
         rpy=_numbers(part["origin"], "rpy"),
         axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
         mimic=(mimic["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))) if mimic else None,
-        **(bounds if limit and kind in ("revolute", "prismatic") else {}),
+        **(bounds if part["limit"] is not None and kind in ("revolute", "prismatic") else {}),
     )
 
 
@@ -179,19 +179,16 @@ class Body:
 
     Attributes
     ----------
-    joints
-        (N, n) by how much each joint stands elsewhere than commanded, rad or m.
-    springs
-        (n,) compliance of each joint, rad/(N·m).
-    beams
-        (S, 2) bending compliance 1/(E I) of each segment about its two cross axes, 1/(N·m²).
-    bow
-        (N, S, 2) curvature that each segment has by itself about the same axes, 1/m.
+    joints, springs
+        (N, n) by how much each joint stands elsewhere than commanded, rad or m; (n,) its compliance, rad/(N·m).
+    beams, bow
+        (S, 2) bending compliance 1/(E I) of each segment about its two cross axes, 1/(N·m²); (N, S, 2) curvature that
+        it has by itself about the same axes, 1/m.
     growth
         (N, S) relative growth of each segment.
     placements
-        (N, S', 6) or (S', 6) displacement of the placements of the joints of the chain (m, then rotation vector), in
-        their own frames; S' counts every joint of the chain.
+        (N, S', 6) or (S', 6) displacement of the placements of the S' joints of the chain (m, then rotation vector), in
+        their own frames.
     base, tool
         (N, 4, 4) motion of the base as seen by the instrument, of the target on the tool frame.
     scale
@@ -223,19 +220,15 @@ class World:
 
     Parameters
     ----------
-    urdf
-        XML text.
-    tool_frame
-        Link that carries the target.
+    urdf, tool_frame
+        XML text, and the link that carries the target.
     payload_com
         (3,) centre of mass of what it carries, in the tool frame, m.
 
     Attributes
     ----------
-    joints
-        The n joints of the chain that are commanded.
-    chain
-        All its joints, fixed ones and those that follow another one too.
+    joints, chain
+        The n joints of the chain that are commanded; all its joints, fixed ones and those that follow another one too.
     coupling, rest
         (m, n) and (m,) where the m movable joints of the chain stand, those that follow another one among them:
         coupling · q + rest.
@@ -303,7 +296,6 @@ class World:
         model = copy(self.compile(bending, body.placements if body.placements.ndim == 2 else None))
         data = mujoco.MjData(model)
         tool = model.body(f"link:{self.tool_frame}").id
-        carried = model.body("payload").id
         address = self.address(model)
         pieces_of = [[f"{j.name}/{node}" for node in range(NODES * bending)] + [f"link:{j.child}"] for j in self.grown]
         steps = [[int(model.body(name).id) for name in names] for names in pieces_of]
@@ -315,13 +307,9 @@ class World:
         compliance[np.ix_(address, address)] = (self.coupling * body.springs) @ self.coupling.T
         compliance[nodes, nodes] = (body.beams[: len(nodes)] * pieces[:, None])[:, :, None]
         poses, torque = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros((len(q), self.n))
-        heaviness = np.nan
         each = body.placements if body.placements.ndim == 3 else None
         for i in range(len(q)):
-            if payload[i] != heaviness:
-                heaviness = payload[i]
-                model.body_mass[carried] = heaviness
-                mujoco.mj_setConst(model, data)
+            _carry(model, data, payload[i])
             model.body_pos[:] = rest
             for s, ids in enumerate(steps):
                 model.body_pos[ids] = rest[ids] * (1.0 + body.growth[i, s])
@@ -337,10 +325,10 @@ class World:
         """(N, 3) moment about the root frame's origin, N·m, of the weight of all links and of the payload."""
         model = copy(self.compile(False, None))  # its payload changes
         data = mujoco.MjData(model)
-        carried, address = model.body("payload").id, self.address(model)
+        address = self.address(model)
         moments = np.empty((len(q), 3))
         for i in range(len(q)):
-            model.body_mass[carried] = payload[i]
+            _carry(model, data, payload[i])
             data.qpos[address] = self.coupling @ q[i] + self.rest
             mujoco.mj_kinematics(model, data)
             moments[i] = np.cross(model.body_mass @ data.xipos, model.opt.gravity)
@@ -431,6 +419,14 @@ class World:
             model.body_quat[body] = quaternion(rotation)
 
 
+def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
+    """Let the tool carry so many kg."""
+    carried = model.body("payload").id
+    if model.body_mass[carried] != payload:
+        model.body_mass[carried] = payload
+        mujoco.mj_setConst(model, data)
+
+
 def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return what holds every coordinate against gravity."""
     held = np.zeros(model.nv)
@@ -466,22 +462,17 @@ def cross_axes(direction: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the target's place in the root frame, M rows.
+    """Derivatives of the target's place in the root frame, M rows, about the sound robot.
 
     Attributes
     ----------
-    poses
-        (M, 4, 4) of the sound robot's tool frame.
-    target
-        (3,) in it, m.
-    joints
-        (M, 3, n) by each joint that is commanded, with all that follow it.
-    torque
-        (M, n) what holds them, N·m.
-    placements
-        (M, 3, S', 6) by the placement of each joint of the chain, in its own frame.
-    growth
-        (M, 3, S) by the relative growth of each segment.
+    poses, target
+        (M, 4, 4) of the tool frame, and (3,) the target in it, m.
+    joints, torque
+        (M, 3, n) by each joint that is commanded, with all that follow it; (M, n) what holds them, N·m.
+    placements, growth
+        (M, 3, S', 6) by the placement of each joint of the chain, in its own frame; (M, 3, S) by the relative growth
+        of each segment.
     bow, sag
         (M, 3, S, 2) by the curvature of each segment, 1/m, and by its bending compliance, 1/(N·m²).
     """
@@ -514,13 +505,9 @@ def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
     model = copy(world.compile(True, None))  # its payload changes
     data = mujoco.MjData(model)
     address, nodes = world.address(model), world.nodes(model)
-    tool, carried = model.body(f"link:{world.tool_frame}").id, model.body("payload").id
-    rows, heaviness = [], np.nan
+    tool, rows = model.body(f"link:{world.tool_frame}").id, []
     for command, weight in zip(q, payload, strict=True):
-        if weight != heaviness:
-            heaviness = weight
-            model.body_mass[carried] = weight
-            mujoco.mj_setConst(model, data)
+        _carry(model, data, weight)
         data.qpos[:] = 0.0
         data.qpos[address] = world.coupling @ command + world.rest
         held = _held(model, data)
