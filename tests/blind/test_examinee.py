@@ -54,14 +54,6 @@ def test_the_answer_holds_the_diagnosis_and_where_its_model_has_the_fresh_sample
     assert json.loads(json.dumps(reply, allow_nan=False)) == reply
 
 
-def test_what_the_library_does_not_have_need_not_be_taken_from_it(directory):
-    reply = answer(request(directory / "campaigns" / "c1", without=["unheard_of"]))
-    assert reply["error"] is None
-    assert reply["said"]["verdict"]["effects"] == ["thermal_elongation"]
-    reply = answer(request(directory / "campaigns" / "c1", only=["drift", "joint_gain"], without=["drift"]))
-    assert "drift" not in {effect["name"] for effect in reply["said"]["effects"]}
-
-
 def test_whatever_goes_wrong_becomes_the_error_of_the_reply(directory, tmp_path):
     reply = answer(request(tmp_path, asks="wear"))
     assert reply["error"].startswith("the wear failed: CampaignError: ")

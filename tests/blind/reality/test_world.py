@@ -44,21 +44,10 @@ def test_a_sound_robot_stands_where_pinocchio_has_it(name):
     world = World(robot.urdf, tool)
     q = drawn(world, 60, 1)
     assert world.names == robot.joint_names
+    assert world.slides.tolist() == [j.kind == "prismatic" for j in world.joints]
     poses, torque = world.poses(q, np.zeros(60), world.sound(60))
     np.testing.assert_allclose(poses, tool_poses(robot, q), atol=1e-9)
     np.testing.assert_allclose(torque, gravity_torques(robot, q), atol=1e-8)
-
-
-def test_a_joint_that_slides_is_known_as_one():
-    world = World(AWKWARD, "tip")
-    assert dict(zip(world.names, world.slides, strict=True)) == {
-        "lift": True,
-        "turret": False,
-        "slide": True,
-        "roll_joint": False,
-        "rail_joint": True,
-        "hand_joint": False,
-    }
 
 
 def test_the_overturning_moment_is_weight_times_lever(beam):
