@@ -82,6 +82,7 @@ def score(records: Sequence[Record]) -> Plain:
     alone = [r for r in records if r["kind"] not in SEVERAL]
     tables = {name: confusion(records, kinds) for name, kinds in CONFUSIONS.items()}
     beside = (*of_kind["unlisted"], *of_kind["both"])
+    seconds = [float(r["seconds"]) for r in alone if r.get("seconds") is not None]
     return {
         "schema": SCHEMA,
         "cases": len(records),
@@ -99,7 +100,7 @@ def score(records: Sequence[Record]) -> Plain:
         "calibration": calibration(alone),
         "confusion": {name: table for name, table in tables.items() if table["rows"]},
         "detection": detection(alone),
-        "seconds": _seconds([float(r["seconds"]) for r in alone if r.get("seconds") is not None]),
+        "seconds": _quantiles(seconds, median=0.5, q95=0.95, longest=1.0),
         "real": [_real(r) for r in of_kind["real"]],
         "misses": [_miss(r) for r in records if is_miss(r)],
     }
@@ -167,10 +168,6 @@ def _kind(kind: str, records: Sequence[Record]) -> Plain:
 
 def _quantiles(values: Sequence[float], **shares: float) -> dict[str, float | None]:
     return {name: float(np.quantile(values, share)) if len(values) else None for name, share in shares.items()}
-
-
-def _seconds(values: Sequence[float]) -> Plain:
-    return _quantiles(values, median=0.5, q95=0.95, longest=1.0)
 
 
 def _real(record: Record) -> Plain:

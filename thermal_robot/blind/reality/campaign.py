@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.blind.cases import LISTED, Case, Several
 from thermal_robot.blind.reality.fault import FAULTS, Fault
@@ -32,10 +31,9 @@ from thermal_robot.blind.reality.sizes import (
     truth,
 )
 from thermal_robot.blind.reality.unlisted import known
-from thermal_robot.blind.reality.world import World, anywhere
+from thermal_robot.blind.reality.world import Array, World, anywhere
 from thermal_robot.files import write_text
 
-Array = NDArray[np.float64]
 AtWork = list[tuple[Fault, Array]]
 
 

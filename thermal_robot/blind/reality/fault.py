@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.world import Body
+from thermal_robot.blind.reality.world import Array, Body
 
-Array = NDArray[np.float64]
 Place = tuple[str, str]
 Draw = Callable[[Setting, np.random.Generator], Array]
 Does = Callable[[Setting, Array], Array]
@@ -400,10 +398,6 @@ def _creep(setting: Setting, values: Array) -> Array:
     return np.asarray(grown[:, None] * values[0, :6])
 
 
-def _draw_creep(setting: Setting, rng: np.random.Generator) -> Array:
-    return np.append(1e-4 * rng.normal(size=6), np.exp(rng.uniform(*np.log(_SETTLES))))[None]
-
-
 def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
     """How far the base has gone in the last row that was measured."""
     last = setting.time[setting.given][-1] - setting.time[0]
@@ -532,7 +526,15 @@ _ALL = (
         wants=("sensor:links",),
         quantities=warmths,
     ),
-    at("base", "drift", _draw_creep, _creep, quantities=clock, known_as=_crept, fixed=((6, (1e3, 5e3, 1e6)),)),
+    at(
+        "base",
+        "drift",
+        lambda s, rng: np.append(1e-4 * rng.normal(size=6), np.exp(rng.uniform(*np.log(_SETTLES))))[None],
+        _creep,
+        quantities=clock,
+        known_as=_crept,
+        fixed=((6, (1e3, 5e3, 1e6)),),
+    ),
     at("base", "base_compliance", _draw_tip, _tip, quantities=weights, known_as=_tipped, fixed=((2, (0.0, 1.0)),)),
     adds(
         "scale",

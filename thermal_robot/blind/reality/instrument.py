@@ -16,10 +16,8 @@ from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.sizes import Gauge, place
-from thermal_robot.blind.reality.world import free_columns, from_vector
+from thermal_robot.blind.reality.world import Array, free_columns, from_vector
 from thermal_robot.files import write_text
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

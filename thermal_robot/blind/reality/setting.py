@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from thermal_robot.blind.reality.world import World
-
-Array = NDArray[np.float64]
-
+from thermal_robot.blind.reality.world import Array, World
 
 _PAUSE = 1.0  # s between two steps in which warmth is integrated
 _HOLDS = (2.4e6, 3.8e6)  # J/(m³ K), heat capacity by volume: aluminium 2.4e6, cast iron 3.3e6, steel 3.8e6

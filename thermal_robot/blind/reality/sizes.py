@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.fault import FAULTS, Fault, Place
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.world import Slopes, World, free_columns, slopes
-
-Array = NDArray[np.float64]
-
+from thermal_robot.blind.reality.world import Array, Slopes, World, free_columns, slopes
 
 _ROUNDS = 8
 _NEAR = 0.01  # of a size, as a share of it

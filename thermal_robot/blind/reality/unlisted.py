@@ -31,9 +31,8 @@ from thermal_robot.blind.reality.fault import (
     within,
 )
 from thermal_robot.blind.reality.setting import Setting
+from thermal_robot.blind.reality.world import Array
 from thermal_robot.errors import EffectError
-
-Array = NDArray[np.float64]
 
 SLOW = (1.0, 2.5)
 """Orders a turn: of what comes round hardly more often than the joint, but no whole number of times."""

@@ -77,9 +77,9 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
     figure = Drawing(2.3 + 0.37 * len(columns), 1.9 + 0.3 * len(rows))
     axes = figure.subplots()
     for line, (name, counts) in enumerate(zip(rows, table["counts"], strict=True)):
-        total = sum(counts)
+        total, answer = sum(counts), "unexplained" if name == "unlisted" or which == "removed" else name
         for column, number in enumerate(counts):
-            right = columns[column] == _right(name, which)
+            right = columns[column] == answer
             axes.add_patch(_cell(column, line, number / total, right))
             if number:
                 colour = PAPER if number / total > _DARK else INK
@@ -100,10 +100,6 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
         spine.set_visible(False)
     title(axes, _HEADINGS.get(which, which))
     return figure
-
-
-def _right(row: str, which: str) -> str:
-    return "unexplained" if row == "unlisted" or which == "removed" else row
 
 
 def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:

@@ -326,14 +326,11 @@ def _both(detection: Plain) -> Iterator[str]:
     columns = [m for m in range(len(detection["samples"])) if any(row[m]["trials"] for row in table)]
     if len(lines) < 2 or len(columns) < 2:
         return
-    yield "  size over the noise" + "".join(f"{_brief(detection['samples'][m]):>9}" for m in columns) + " rows"
+    steps = (step(detection["samples"][m]).replace(" and more", "+").replace(" to ", "–") for m in columns)
+    yield "  size over the noise" + "".join(f"{rows:>9}" for rows in steps) + " rows"
     for k in lines:
         cells = (f"{r['successes']}/{r['trials']}" if r["trials"] else "·" for r in (table[k][m] for m in columns))
         yield f"    {step(detection['ratio'][k]):17}" + "".join(f"{cell:>9}" for cell in cells)
-
-
-def _brief(bounds: Plain) -> str:
-    return f"{bounds['low']:g}+" if bounds["high"] is None else f"{bounds['low']:g}–{bounds['high']:g}"
 
 
 def _real(cases: list[Plain]) -> Iterator[str]:
