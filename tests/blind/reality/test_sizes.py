@@ -8,7 +8,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.plan import robots
 from thermal_robot.blind.reality import FAULTS, UNLISTED, make, sizes
-from thermal_robot.blind.reality.fault import Fault, joints
+from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import (
     GROWS_ONLY,
@@ -99,12 +99,6 @@ def test_alignment_takes_a_rigid_motion_and_a_shifted_target_away(setting, gauge
     assert gauge.rms(gauge.left(moved.ravel())) < 1e-8
     known = Gauge(setting, np.arange(setting.samples), gauge.target, False, False)
     np.testing.assert_array_equal(known.left(moved.ravel()), moved.ravel())
-
-
-def test_what_frames_take_away_cannot_be_seen(gauge):
-    nothing = Fault("nothing", lambda s, rng: np.ones((6, 1)), lambda *_: None, joints)
-    with pytest.raises(Unseen, match="nothing cannot be seen"):
-        sized(gauge, nothing, np.ones((6, 1)), 1e-4)
 
 
 def test_places_come_with_what_each_does_alone_largest_first(gauge):
