@@ -245,15 +245,12 @@ SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0,
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
     """Return robots with their URDF's text, so that nothing else has to find it again.
 
-    Parameters
-    ----------
-    chosen
-        Name, URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and tool frame of each.
+    Of each a name, a URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and the tool frame.
 
     Raises
     ------
     RobotError
-        If one cannot be loaded, or if gravity moves nothing in it.
+        If one cannot be loaded, or has fewer than four joints.
     """
     found = []
     for name, urdf, tool_frame in chosen:
@@ -271,30 +268,22 @@ def plan(
     only_effects: Sequence[str] = (),
     unlisted: Sequence[str] = (),
 ) -> tuple[Case, ...]:
-    """Draw the cases of a trial.
+    """Draw the cases of a trial from its seed, in a drawn order, so that a case's number tells nothing.
 
     Parameters
     ----------
-    seed
-        Of the trial.
     counts
-        Number of cases by kind (:data:`~thermal_robot.blind.cases.Kind` without ``real``).
+        Number of cases by kind (:data:`~thermal_robot.blind.cases.Kind` without ``real``); those of several campaigns
+        come after the others.
     robots
         Each as probable as any other in every case.
-    only_effects
-        Effects to ask for; all of formats.md where empty.
-    unlisted
-        Causes that no library knows; all of them where empty.
-
-    Returns
-    -------
-    tuple of Case
-        In a drawn order, so that a case's number tells nothing; those of several campaigns after the others.
+    only_effects, unlisted
+        Effects to ask for, and causes that no library knows; all of them where empty.
 
     Raises
     ------
     EffectError
-        If a kind or an effect is not known.
+        If a kind or an effect is not known, or no case of a kind can be made of these effects.
     """
     from thermal_robot.blind.reality import FAULTS, UNLISTED
 

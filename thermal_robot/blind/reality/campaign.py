@@ -53,12 +53,8 @@ _TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment t
 def make(case: Case, folder: Path) -> dict[str, Any]:
     """Write a case's campaign, or its several campaigns, into a folder and return the answers.
 
-    Parameters
-    ----------
-    case
-        What is asked; everything that is drawn follows from its seed.
-    folder
-        Where campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers) go.
+    The folder gets campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers);
+    everything that is drawn follows from the case's seed.
 
     Returns
     -------

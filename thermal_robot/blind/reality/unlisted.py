@@ -386,12 +386,7 @@ UNLISTED: dict[str, Fault] = {fault.name: fault for fault in (*_ALONE, *INTERPLA
 
 
 def load(where: str) -> Fault:
-    """Load a :class:`Fault` that a Python file defines.
-
-    Parameters
-    ----------
-    where
-        ``file.py:NAME``: the file, and the name of the fault, or of something that returns it when called.
+    """Load a :class:`Fault` that a Python file defines, from ``file.py:NAME``, or what returns it when called.
 
     Raises
     ------
