@@ -79,6 +79,7 @@ class Real:
 
     id: str
     control: str | None = None
+    kind: str = "real"
 
     def make(self, folder):
         return {"robot": "arm", **light(case(self.id), folder), "asked": "untouched", "fresh_position": None}

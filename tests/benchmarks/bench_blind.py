@@ -93,7 +93,7 @@ def main() -> int:
     options = parser.parse_args()
     directory = options.directory or Path(f"blind-{options.seed}")
     records = run_trial(plan(options.seed, COUNTS, robots()), directory, workers=options.workers)
-    found = score([record for record in records if "withdrawn" not in record]).to_dict()
+    found = score([record for record in records if "withdrawn" not in record])
     lines = judged({kind["kind"]: kind["rates"] for kind in found["kinds"]})
     print(text(found), f"\nseed {options.seed}", *(line for line, _ in lines), sep="\n")
     return int(not all(passes for _, passes in lines))

@@ -11,6 +11,7 @@ from blind_fakes import Real, case
 
 from thermal_robot import cli
 from thermal_robot.blind import command, trial
+from thermal_robot.errors import EffectError
 
 SEAL = "5ea1" * 16
 SHORT, FULL = {"single": 3, "hard": 2, "null": 1}, {"single": 30}
@@ -42,7 +43,7 @@ def asked(monkeypatch):
         return [{"id": c.id, **withdrawn.get(c.id, {})} for c in cases]
 
     def score(records):
-        return SimpleNamespace(to_dict=lambda: {"right": len(records)})
+        return {"right": len(records)}
 
     def fake(name, **content):
         monkeypatch.setitem(sys.modules, f"thermal_robot.{name}", SimpleNamespace(**content))
@@ -78,10 +79,8 @@ def test_the_commitment_is_told_before_the_score(run, asked):
     assert asked["counts"] == SHORT
     assert asked["robots"] == ROBOTS
     assert (asked["seed"], asked["directory"], asked["effects"]) == (7, "blind-7", ())
-
-
-def test_a_seed_is_drawn_and_told(run, asked):
-    _, out, _ = run()
+    # without one a seed is drawn and told
+    out = run()[1]
     assert f"Seed {asked['seed']}: " in out
     assert asked["directory"] == f"blind-{asked['seed']}"
 
@@ -172,9 +171,8 @@ def test_fleets_without_pyarrow_are_refused_before_anything_is_made(run, asked, 
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "pyarrow" else name)
     assert run("--seed", 1)[0] == 0
     asked.pop("cases")
-    fleets = SimpleNamespace(plan=lambda *_: (replace(case("s1"), kind="fleet"),), robots=tuple, ROBOTS=ROBOTS)
-    monkeypatch.setitem(
-        sys.modules, "thermal_robot.blind.plan", SimpleNamespace(**vars(fleets), SHORT=SHORT, FULL=FULL)
+    monkeypatch.setattr(
+        sys.modules["thermal_robot.blind.plan"], "plan", lambda *_: (replace(case("s1"), kind="fleet"),)
     )
     status, _, err = run("--seed", 1)
     assert (status, "cases" in asked) == (2, False)
@@ -188,3 +186,88 @@ def test_other_commands_load_nothing_of_the_trial():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# ---- a fault of the user's own
+
+FAULT = """
+import numpy as np
+from thermal_robot.blind.reality import Fault
+from thermal_robot.blind.reality.fault import joints
+
+def draw(setting, rng):
+    values = np.zeros((setting.world.n, 1))
+    values[2] = 1e-3
+    return values
+
+def act(body, setting, values):
+    body.joints += values[:, 0] * np.sign(setting.q - setting.q.mean(axis=0))
+
+MINE = Fault("two_positions", draw, act, joints, few=True)
+IDLE = Fault("idle", lambda s, rng: np.ones((s.world.n, 1)), lambda *_: None, joints)
+NUMBER = 3
+
+def made():
+    return MINE
+
+def broken():
+    raise RuntimeError("no such gear")
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
+    (tmp_path / "mine.py").write_text(FAULT)
+    return tmp_path / "mine.py"
+
+
+def test_a_fault_of_ones_own_is_put_into_campaigns(file, tmp_path):
+    from thermal_robot.blind.plan import ROBOTS, plan, robots
+    from thermal_robot.blind.reality import make
+
+    arms = robots(ROBOTS[:2])
+    cases = command._with_faults(plan(1, {"null": 2}, arms), [f"{file}:MINE"], 1, arms)
+    mine = cases[2:]
+    assert len(mine) == command.OWN_CASES
+    assert {case.robot.name for case in mine} == {arm.name for arm in arms}
+    assert all(case.kind == "unlisted" and case.unlisted == "two_positions" for case in mine)
+    truth = make(mine[0], tmp_path / "campaign")["truth"]
+    assert truth["unlisted"] == "two_positions"
+    assert truth["places"] == [{"kind": "joint", "name": "joint_3"}]
+    assert truth["parts"]["two_positions"]["ratio"] > 2.0
+    # a case that no draw can show is withdrawn and says why
+    idle = replace(mine[0], own=f"{file}:IDLE", unlisted="idle", samples=(30, 32))
+    assert make(idle, tmp_path / "idle") == {"withdrawn": "idle cannot be seen in this campaign"}
+    assert not (tmp_path / "idle").exists()
+
+
+def test_a_name_means_the_trials_own_fault_unless_a_file_is_given(file):
+    from thermal_robot.blind.reality import FAULTS, UNLISTED
+    from thermal_robot.blind.reality.unlisted import known
+
+    assert known("drift") is FAULTS["drift"]
+    assert known("slip") is UNLISTED["slip"]
+    for name in ("MINE", "made"):
+        assert known("drift", f"{file}:{name}").name == "two_positions"
+
+
+@pytest.mark.parametrize(
+    ("where", "words"),
+    [
+        ("{}/mine.py:NUMBER", "is a int, not a Fault"),
+        ("{}/mine.py:ABSENT", "AttributeError.*ABSENT"),
+        ("{}/mine.py:broken", "RuntimeError: no such gear"),
+        ("{}/bad.py:MINE", "ModuleNotFoundError"),
+        ("{}/bad.txt:MINE", "not a Python file"),
+        ("nowhere.py:MINE", "there is no file 'nowhere.py'; expected file.py:NAME"),
+        ("MINE", "there is no file ''"),
+    ],
+)
+def test_what_is_no_fault_is_refused_with_its_name_and_reason(file, where, words):
+    from thermal_robot.blind.reality.unlisted import load
+
+    (file.parent / "bad.py").write_text("import nothing_of_this_name\n")
+    (file.parent / "bad.txt").write_text("MINE = 1")
+    with pytest.raises(EffectError, match=words):
+        load(where.format(file.parent))

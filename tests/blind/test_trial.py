@@ -2,30 +2,27 @@
 
 import hashlib
 import json
+import os
+import secrets
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from pathlib import Path
 
 import pytest
 from blind_fakes import AtOnce, Real, alive, case, light, put_examinee, rms, simulated
 
+from thermal_robot import cli
 from thermal_robot.blind import supervise, trial
 from thermal_robot.blind.cases import Several
-from thermal_robot.blind.trial import canonical, run_trial
+from thermal_robot.blind.trial import KEY_BYTES, canonical, open_seal, run_trial, seal
 from thermal_robot.errors import SealError, ThermalRobotError
 
 
 def lines(path):
     return [json.loads(line) for line in path.read_text().splitlines()]
-
-
-def same_files(folder, other):
-    """Assert that a folder's files are in another one, too, to the byte; return their names."""
-    for file in folder.iterdir():
-        assert file.read_bytes() == (other / file.name).read_bytes(), file.name
-    return {file.name for file in folder.iterdir()}
 
 
 # ---- with the program itself
@@ -114,15 +111,6 @@ def test_an_effect_that_is_taken_from_the_library_is_described_less_well(tmp_pat
     assert records[0]["fresh"]["rms_after"] < 0.7 * records[1]["fresh"]["rms_after"]
 
 
-def test_a_campaign_is_made_twice_to_the_same_byte(whole, tmp_path):
-    directory, cases, _, _ = whole
-    for asked in cases:
-        again = tmp_path / asked.id
-        again.mkdir()
-        simulated(asked, again)
-        assert same_files(again, directory / "campaigns" / asked.id) >= {"campaign.toml", "measurements.csv"}
-
-
 def test_a_campaign_of_the_trials_own_world_is_made_twice_to_the_same_byte(tmp_path):
     pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
     from thermal_robot.blind import reality
@@ -137,8 +125,9 @@ def test_a_campaign_of_the_trials_own_world_is_made_twice_to_the_same_byte(tmp_p
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         assert pool.submit(reality.make, asked, tmp_path / "twice").result() == once
     assert json.loads(canonical(once)) == once
-    files = {"campaign.toml", "fresh.csv", "measurements.csv", "robot.urdf"}
-    assert same_files(tmp_path / "once", tmp_path / "twice") == files
+    made = sorted((tmp_path / "once").iterdir())
+    assert [file.name for file in made] == ["campaign.toml", "fresh.csv", "measurements.csv", "robot.urdf"]
+    assert all(file.read_bytes() == (tmp_path / "twice" / file.name).read_bytes() for file in made)
 
 
 # ---- with an examinee that does what it is told
@@ -195,6 +184,9 @@ def test_a_crash_and_a_late_answer_are_errors_of_one_case_only(fake):
     assert errors[4].startswith("the diagnosis failed: its reply cannot be read")
     for record in records[::2]:
         assert record["said"] is record["fresh"] is record["seconds"] is None
+    processes = [int(line.split()[1]) for line in (fake / "asked.txt").read_text().splitlines()]
+    assert len(set(processes)) == 4  # each of the three is replaced
+    assert not any(map(alive, processes))
 
 
 def test_a_stopped_trial_goes_on_where_it_was(fake):
@@ -285,3 +277,168 @@ def test_an_examinee_that_does_not_start_is_no_error_of_a_case(fake, monkeypatch
     monkeypatch.setattr(supervise, "command", lambda _: [sys.executable, "-c", "raise SystemExit('no such library')"])
     with pytest.raises(RuntimeError, match="does not start: the process ended with status 1: no such library"):
         run_trial(told(""), fake, light)
+
+
+# ---- examinees
+
+
+def test_no_more_examinees_are_started_than_there_are_workers(fake):
+    run_trial(told("", "", "", ""), fake, light, workers=2, timeout=30.0)
+    processes = {line.split()[1] for line in (fake / "asked.txt").read_text().splitlines()}
+    assert sorted(asked(fake)) == ["c0", "c1", "c2", "c3"]
+    assert 1 <= len(processes) <= 2
+    assert not [pid for pid in processes if alive(int(pid))]
+
+
+def test_who_stops_asking_has_nobody_else_started(fake, monkeypatch):
+    started = []
+    command = supervise.command
+    monkeypatch.setattr(supervise, "command", lambda directory: started.append(directory) or command(directory))
+    requests = {}
+    for name, do in (("c0", ""), ("c1", "hang"), ("c2", "hang")):
+        (fake / name).mkdir(parents=True)
+        (fake / name / "campaign.toml").write_text(do)
+        requests[name] = {"folder": str(fake / name), "without": [], "only": []}
+    replies = supervise.examine(requests, fake, workers=1, timeout=100.0)
+    start = time.perf_counter()
+    assert next(replies)[0] == "c0"
+    replies.close()
+    assert time.perf_counter() - start < 20.0
+    assert len(started) == 1
+    assert set(asked(fake)) <= {"c0", "c1"}
+
+
+def test_ending_an_examinee_twice_does_no_harm(fake):
+    examinee = supervise.Examinee(fake.parent)
+    examinee.start()
+    examinee.end()
+    examinee.end()
+    with pytest.raises(supervise.Lost, match="the process ended with status"):
+        examinee.ask({}, 1.0)
+    examinee.close()
+    examinee.close()
+
+
+def test_an_examinee_is_given_no_more_of_the_environment_than_it_needs(monkeypatch, tmp_path):
+    monkeypatch.setenv("ANSWERS", "backlash")
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    given = supervise.environment()
+    assert set(given) <= {"PATH", "HOME", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONSAFEPATH", "OMP_NUM_THREADS"}
+    root = Path(supervise.__file__).parents[2]
+    own = [] if root.name in ("site-packages", "dist-packages") else [str(root)]
+    assert given["PYTHONPATH"].split(os.pathsep) == [*own, "elsewhere"]
+    # an installed package does not stand before Python's own
+    installed = tmp_path / "site-packages" / "thermal_robot" / "blind" / "supervise.py"
+    monkeypatch.setattr(supervise, "__file__", str(installed))
+    assert supervise.environment()["PYTHONPATH"] == "elsewhere"
+    assert supervise.command(tmp_path)[1:] == ["-m", "thermal_robot.blind.examinee", str(tmp_path.resolve())]
+
+
+# ---- the seal
+
+ANSWERS = {"c002": {"truth": {"effects": ["backlash"], "unlisted": None}, "noise": 2.5e-5}, "c001": {"Größe": [1, 2.5]}}
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    path, key = tmp_path / "answers.sealed", secrets.token_bytes(KEY_BYTES)
+    return path, key, seal(ANSWERS, path, key)
+
+
+def test_what_was_sealed_is_opened_with_the_key_and_the_file_alone_tells_only_its_length(sealed, tmp_path):
+    path, key, commitment = sealed
+    assert open_seal(*sealed) == ANSWERS
+    assert commitment == hashlib.sha256(key + canonical(ANSWERS)).hexdigest()
+    content = path.read_bytes()
+    assert len(content) == len(canonical(ANSWERS))
+    assert not any(word in content for word in (b"backlash", b"c001", b"truth", b"effects"))
+    other = seal(ANSWERS, tmp_path / "other", secrets.token_bytes(KEY_BYTES))
+    assert other != commitment
+    assert (tmp_path / "other").read_bytes() != content
+    # the commitment hashes key and text without a mark between them: the length of the key is the mark
+    with pytest.raises(ValueError, match="32 bytes"):
+        seal(ANSWERS, tmp_path / "sealed", b"short")
+
+
+def test_the_text_is_canonical():
+    assert canonical({"b": [1, 2.5, None], "a": "ö"}) == b'{"a":"\\u00f6","b":[1,2.5,null]}'
+    assert canonical(dict(reversed(ANSWERS.items()))) == canonical(ANSWERS)
+    with pytest.raises(ValueError, match="JSON compliant"):
+        canonical({"a": float("nan")})
+
+
+def test_bytes_of_the_file_are_spread_like_noise(tmp_path):
+    seal({"a": "0" * 100_000}, tmp_path / "sealed", bytes(range(KEY_BYTES)))
+    content = (tmp_path / "sealed").read_bytes()
+    expected = len(content) / 256
+    # chi square with 255 degrees of freedom: mean 255, standard deviation 22.6
+    assert abs(sum((content.count(bytes([k])) - expected) ** 2 / expected for k in range(256)) - 255) < 5 * 22.6
+
+
+def test_an_altered_file_is_refused(sealed):
+    path, _, commitment = sealed
+    content = path.read_bytes()
+    flipped = [content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :] for at in (0, 40, len(content) - 1)]
+    for other in (*flipped, content[:-1], content + b"0", b""):
+        path.write_bytes(other)
+        with pytest.raises(SealError, match="not the answers that were sealed"):
+            open_seal(*sealed)
+    # answers cannot be exchanged together with the key
+    key = secrets.token_bytes(KEY_BYTES)
+    seal({"c001": {}}, path, key)
+    with pytest.raises(SealError):
+        open_seal(path, key, commitment)
+    path.unlink()
+    with pytest.raises(SealError, match="cannot be read"):
+        open_seal(*sealed)
+    assert issubclass(SealError, ThermalRobotError)
+
+
+# ---- the whole command, and the golden answers
+
+
+def test_two_robots_that_nobody_has_seen_are_examined(tmp_path, capsys):
+    pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
+    options = ["--seed", "1", "--count", "single=1", "null=1", "real=0", "--effect", "drift", "--workers", "1"]
+    robot = ["--robot", "builtin:rv_m2", "--tool", "tool0"]
+    files = ["--directory", str(tmp_path / "trial"), "--json", str(tmp_path / "s.json")]
+    assert cli.main(["blind", *options, *robot, *files]) == 0
+    out = capsys.readouterr().out
+    opened = json.loads((tmp_path / "trial" / "opened.json").read_text())
+    # what was told before the first diagnosis is the hash of what was opened after the last
+    commitment = hashlib.sha256(bytes.fromhex(opened["key"]) + canonical(opened["answers"])).hexdigest()
+    assert f"sealed before the first diagnosis: sha256 {commitment}" in out
+    plain = json.loads((tmp_path / "s.json").read_text())
+    assert (plain["cases"], plain["failed"], plain["misses"]) == (2, 0, [])
+    assert {k["kind"]: k["rates"]["exact"]["successes"] for k in plain["kinds"]} == {"single": 1, "null": 1}
+    single = next(a for a in opened["answers"].values() if a["truth"]["effects"])
+    assert single["truth"]["effects"] == ["drift"]
+    assert plain["shrinkage"]["pairs"][0]["real"] > 0.9
+
+
+@pytest.fixture
+def golden():
+    return json.loads((Path(__file__).parent / "golden_answers.json").read_text(encoding="utf-8"))
+
+
+def test_the_golden_answers_are_to_the_cases_that_the_seed_draws(golden):
+    pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
+    from blind.record import COUNTS, SEED
+
+    from thermal_robot.blind.plan import plan, robots
+
+    cases = {case.id: case for case in plan(SEED, COUNTS, robots())}
+    assert set(golden) == set(cases)
+    for name, said in golden.items():
+        case = cases[name]
+        drawn = (case.kind, case.robot.name, list(case.effects), case.unlisted)
+        assert (said["kind"], said["robot"], said["effects"], said["unlisted"]) == drawn
+    assert not any(said.get("failed") for said in golden.values())
+
+
+@pytest.mark.slow
+def test_fixed_robots_are_answered_as_they_were(golden, tmp_path):
+    from blind.record import answers
+
+    found = answers(tmp_path / "trial", workers=2)
+    assert not {name: (golden[name], found[name]) for name in golden if found[name] != golden[name]}

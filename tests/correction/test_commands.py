@@ -202,21 +202,21 @@ def on_the_floor(robot, effect, seed, folder, monkeypatch):
 
     The reality is MuJoCo's, with physics of its own: it shares no formula with the program.
     """
-    from thermal_robot.blind.reality import campaign as reality
+    from thermal_robot.blind.reality import instrument, make
 
-    kept, place = [], reality.place
+    kept, place = [], instrument.place
 
     def noted(setting, faults, target, pose):
         kept.append((setting, faults, target, pose))
         return place(setting, faults, target, pose)
 
-    monkeypatch.setattr(reality, "place", noted)
+    monkeypatch.setattr(instrument, "place", noted)
     source, tool = ROBOTS[robot]
     case = Case(
         "proof", seed, "single", RobotChoice(robot, load_robot(source, tool).urdf, tool), (effect,), samples=(120, 120)
     )
     folder.mkdir(exist_ok=True)
-    answers = reality.make(case, folder)
+    answers = make(case, folder)
     assert "withdrawn" not in answers
     setting, faults, target, pose = kept[-1]
     others = np.flatnonzero(~setting.given)

@@ -62,7 +62,7 @@ def test_a_bayes_factor_is_as_often_right_as_it_says():
         said.append(1.0 / (1.0 + np.exp(-factor)))
         true.append(seed % 2)
     found = reliability(np.array(said), np.array(true, dtype=bool))
-    assert found.error < 0.07  # of perfect probabilities in ten bins of sixty: 0.03
+    assert found["error"] < 0.07  # of perfect probabilities in ten bins of sixty: 0.03
 
 
 @pytest.mark.slow

@@ -56,17 +56,7 @@ LISTED = "campaigns.csv"
 
 @dataclass(frozen=True)
 class RobotChoice:
-    """A robot of the trial.
-
-    Attributes
-    ----------
-    name
-        As shown.
-    urdf
-        A path, ``builtin:<name>`` or ``example-robot-data:<name>``.
-    tool_frame
-        Link that carries the target.
-    """
+    """A robot of the trial: its name, its URDF (a path, ``builtin:<name>`` ... or text), the link with the target."""
 
     name: str
     urdf: str
@@ -81,10 +71,8 @@ class Several:
     ----------
     campaigns
         How many: drawn between the two.
-    how
-        What is true of them; empty where nothing changes, and where nothing is shared.
-    moves
-        The effect of which one parameter changes, or that is shared.
+    how, moves
+        What is true of them, and the effect of which one parameter changes or that is shared; both may be empty.
     change
         How large a change is: deviations of the difference between two campaigns for ``changes``, of one campaign
         else; drawn between the two, evenly in its logarithm.
@@ -105,22 +93,14 @@ class Case:
 
     Attributes
     ----------
-    id
-        Name of its folder: tells nothing.
-    seed
-        Everything else that is drawn follows from it.
-    kind
-        What is asked.
-    robot
-        Whose fault it is.
-    effects
-        Those really at work and large.
-    unlisted
-        Name of a cause that no library knows, or ``None``.
-    without
-        Effects taken out of the library before the diagnosis.
-    hidden
-        Columns (``temperature`` stands for ``temperature.<link>`` too) taken out of the table.
+    id, seed
+        Name of its folder, which tells nothing; everything else that is drawn follows from the seed.
+    kind, robot
+        What is asked, and whose fault it is.
+    effects, unlisted
+        Those really at work and large, and the name of a cause that no library knows, or ``None``.
+    without, hidden
+        Effects taken out of the library, and columns out of the table (``temperature`` stands for each link's, too).
     ratio
         Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn between the two,
         evenly in its logarithm.

@@ -20,7 +20,7 @@ from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import require_free, write_one, write_text
 
 if TYPE_CHECKING:
-    from thermal_robot.blind.trial import RealCase
+    from thermal_robot.blind.real import RealCase
 
 DOES = "run the blind trial: effects are withheld, then named"
 EXAMPLE = " --seed 7 --report trial.html"
@@ -77,20 +77,9 @@ def run(options: argparse.Namespace) -> None:
             print(text, file=notes, flush=True)
 
     cases = _cases(options, seed, tell)
-    if any(getattr(case, "kind", "") == "fleet" for case in cases):  # it would fail after the last campaign
+    if any(case.kind == "fleet" for case in cases):  # it would fail after the last campaign
         _require("pyarrow", "fleets in the trial need")
     tell(f"Seed {seed}: {len(cases)} cases in {directory}")
-    records = _records(cases, directory, seed, options, tell)
-    _tell(records, options)
-
-
-def _records(
-    cases: Sequence[Case | RealCase],
-    directory: Path,
-    seed: int,
-    options: argparse.Namespace,
-    tell: Callable[[str], None],
-) -> list[dict[str, Any]]:
     from thermal_robot.blind.trial import run_trial
 
     def sealed(commitment: str) -> None:
@@ -98,11 +87,12 @@ def _records(
 
     try:
         with counted(options.loudness) as progress:
-            return run_trial(cases, directory, workers=options.workers, progress=progress, sealed=sealed)
+            records = run_trial(cases, directory, workers=options.workers, progress=progress, sealed=sealed)
     except KeyboardInterrupt:
         again = f"--seed {seed} --directory {directory}"
         print(f"thermal-robot: stopped; the same command with {again} continues", file=sys.stderr)
         raise SystemExit(1) from None
+    _tell(records, options)
 
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
@@ -114,7 +104,7 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     withdrawn = [record for record in records if "withdrawn" in record]
     for record in withdrawn:
         note(f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}", options.loudness)
-    found = score([record for record in records if record not in withdrawn]).to_dict()
+    found = score([record for record in records if record not in withdrawn])
     written = json.dumps(found, indent=2, ensure_ascii=False)
     if not options.printed:
         print(markdown(found) if options.markdown else text(found))

@@ -25,7 +25,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.blind.cases import LISTED
@@ -35,7 +34,7 @@ from thermal_robot.datasets import demo_directory
 from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import library
 from thermal_robot.fleet.compare import compare
-from thermal_robot.fleet.listed import Listed, campaigns
+from thermal_robot.fleet.listed import campaigns
 from thermal_robot.fleet.many import TABLE, diagnosed
 from thermal_robot.fleet.rows import write_rows
 from thermal_robot.fleet.summary import summarise
@@ -44,6 +43,8 @@ from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.registration import register
 from thermal_robot.observations import Observations, observe
 
+Plain = dict[str, Any]
+CAMPAIGN, FRESH, MODEL = "campaign.toml", "fresh.csv", "model.json"
 MOST = 6
 """Effects of which every subset is fitted: 64 fits."""
 _ROUNDS = 3  # after which noise and fit agree to a per cent
@@ -130,9 +131,6 @@ def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
     return np.asarray(fitted)
 
 
-CAMPAIGN, FRESH, MODEL = "campaign.toml", "fresh.csv", "model.json"
-
-
 class Fence:
     """An audit hook that refuses every file of the trial's directory except those of the folder in question.
 
@@ -142,7 +140,7 @@ class Fence:
 
     def __init__(self, directory: Path) -> None:
         self._directory = os.path.realpath(directory)
-        self._folder: str | None = None
+        self._folder = ""
 
     def allow(self, folder: Path) -> None:
         """Let this folder be read, and no longer the one before."""
@@ -158,47 +156,36 @@ class Fence:
             raise PermissionError(f"{path} is no business of the one who is examined")
 
 
-def answer(request: dict[str, Any]) -> dict[str, Any]:
+def answer(request: dict[str, Any]) -> Plain:
     """Diagnose a campaign and predict its fresh samples; whatever goes wrong becomes the reply's error."""
     folder, asks = Path(request["folder"]), request.get("asks", "diagnosis")
-    reply: dict[str, Any] = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
-    at = asks
+    reply: Plain = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
+    at, start = asks, time.perf_counter()
     try:
-        # what the library does not have need not be taken out of it
-        without = [name for name in request["without"] if name in library()]
-        start = time.perf_counter()
         if asks in ANSWERS:
             reply["said"] = ANSWERS[asks](folder, request["only"])
             reply["seconds"] = time.perf_counter() - start
             return reply
+        # what the library does not have need not be taken out of it
+        without = [name for name in request["without"] if name in library()]
         found = diagnose(folder / CAMPAIGN, only=request["only"] or None, without=without)
         reply["seconds"] = time.perf_counter() - start
         reply["said"] = found.to_dict()
         at = "prediction"
         if (folder / FRESH).is_file():
-            reply["predicted"] = _predict(found, folder)
+            # with the model as a user would have it: saved and loaded
+            found.model.save(folder / MODEL)
+            model = CorrectedModel.load(folder / MODEL)
+            position, _ = model.predict(model.samples(folder / FRESH))
+            if not np.all(np.isfinite(position)):
+                raise ValueError("a predicted position is not a number")
+            reply["predicted"] = position.round(9).tolist()  # to a nanometre
             at = "refit of its parts"
-            samples = found.model.samples(folder / FRESH)
-            parts = refitted(found, read_campaign(folder / CAMPAIGN), samples)
-            reply["refitted"] = {names: _plain(position) for names, position in parts.items()}
+            parts = refitted(found, read_campaign(folder / CAMPAIGN), found.model.samples(folder / FRESH))
+            reply["refitted"] = {names: position.round(9).tolist() for names, position in parts.items()}
     except Exception as error:
         reply["error"] = f"the {at} failed: {type(error).__name__}: {error}"
     return reply
-
-
-def _predict(found: Diagnosis, folder: Path) -> list[list[float]]:
-    """Predict with the model as a user would have it: saved and loaded."""
-    found.model.save(folder / MODEL)
-    model = CorrectedModel.load(folder / MODEL)
-    position, _ = model.predict(model.samples(folder / FRESH))
-    if not np.all(np.isfinite(position)):
-        raise ValueError("a predicted position is not a number")
-    return _plain(position)
-
-
-def _plain(position: NDArray[np.float64]) -> list[list[float]]:
-    """Return positions in m as plain numbers, to a nanometre."""
-    return [[float(value) for value in row] for row in position.round(9)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -224,9 +211,6 @@ def _within(path: str, folder: str) -> bool:
     return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
 
 
-Plain = dict[str, Any]
-
-
 def comparison(folder: Path, only: Sequence[str]) -> Plain:
     """Compare the campaigns that are listed in a folder: ``thermal-robot/comparison/1``."""
     listed = campaigns(folder / LISTED)
@@ -249,15 +233,14 @@ def fleet(folder: Path, only: Sequence[str]) -> Plain:
     the fence, and outlive an examinee that is ended.
     """
     listed = campaigns(folder / LISTED)
-    write_rows(folder / TABLE, listed.names, _rows(listed, only))
+
+    def rows() -> Iterator[Plain]:
+        for name, labels in listed.campaigns:
+            named = {"campaign": name, **dict(zip(listed.names, labels, strict=True))}
+            yield from ({**named, **row} for row in diagnosed(listed.folder(name), only, ())[0])
+
+    write_rows(folder / TABLE, listed.names, rows())
     return summarise(folder / TABLE, listed.names).to_dict()
-
-
-def _rows(listed: Listed, only: Sequence[str]) -> Iterator[Plain]:
-    for name, labels in listed.campaigns:
-        rows, _ = diagnosed(listed.folder(name), only, ())
-        named = {"campaign": name, **dict(zip(listed.names, labels, strict=True))}
-        yield from ({**named, **row} for row in rows)
 
 
 ANSWERS = {"comparison": comparison, "wear": followed, "fleet": fleet}

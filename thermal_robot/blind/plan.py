@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import combinations, product
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, get_args
 
@@ -53,97 +54,6 @@ CONDITION = {
 _FRAMES = ("base_frame", "tool_frame")
 
 
-def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield what is asked in cases of one kind of a single campaign, without end, of these effects and unlisted causes.
-
-    Raises
-    ------
-    EffectError
-        If no case of this kind can be made of them.
-    """
-    apart = [name for name in effects if name not in (*RANDOM, *_FRAMES)]
-    if kind == "mixed":
-        return _mixtures([name for name in effects if name not in _FRAMES], causes, rng)
-    if kind == "many":
-        return _together(apart, rng)
-    menu = _menu(kind, effects, apart, causes)
-    if not menu or (kind == "both" and not apart):
-        raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}")
-    return _beside(menu, apart, rng) if kind == "both" else in_turn(menu, rng)
-
-
-def _menu(kind: str, effects: Sequence[str], apart: Sequence[str], causes: Sequence[str]) -> list[Asked]:
-    # contained effects are no loss where the library keeps the container
-    contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
-    menus: dict[str, list[Asked]] = {
-        "null": [{}],
-        "single": [{"effects": (name,)} for name in effects],
-        "large": [{"effects": (name,), "ratio": LARGE} for name in effects],
-        "visits": [{"effects": (n,), "wants": ("repeats",)} for n in effects if n == "encoder_resolution"],
-        "lags": [{**asked, "ratio": LAGGING} for asked in LAGS if asked["effects"][0] in effects],
-        "hard": [{"effects": (name,), **HARD} for name in apart],
-        "pair": [{"effects": chosen} for chosen in combinations(apart, 2) if not alike(chosen)],
-        # one that the library does not have yet needs not be taken out
-        "removed": [{"effects": (n,), "without": (n,) if n in library() else ()} for n in apart if n not in contained],
-        "hidden": [{"effects": (name,), "hidden": CONDITION[name]} for name in apart if name in CONDITION],
-        "unlisted": [{"unlisted": name} for name in causes],
-        "both": [{"unlisted": name} for name in causes],
-    }
-    return menus[kind]
-
-
-def in_turn(menu: Sequence[Asked], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield every item as often as any other."""
-    while True:
-        for k in rng.permutation(len(menu)):
-            yield menu[k]
-
-
-def _beside(menu: Sequence[Asked], apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield causes in turn, each with one or two effects by chance."""
-    for asked in in_turn(menu, rng):
-        yield {**asked, "effects": _several(apart, int(rng.integers(1, 3)), rng)}
-
-
-def _together(apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield sets of many effects, each number of them as often as any other."""
-    if len(apart) < MANY[1]:
-        raise EffectError(f"many effects together are up to {MANY[1]}, of {', '.join(apart) or 'none'}")
-    while True:
-        yield {"effects": _several(apart, int(rng.integers(MANY[0], MANY[1] + 1)), rng)}
-
-
-def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tuple[str, ...]:
-    while True:
-        chosen = tuple(apart[k] for k in sorted(rng.permutation(len(apart))[:number]))
-        if not alike(chosen):
-            return chosen
-
-
-def _mixtures(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield cases in which every effect has a chance of its own: something to hold probabilities against.
-
-    Sets in which one contains another are drawn again.
-    """
-    while True:
-        repeated = bool(rng.random() < REPEATED)
-        asked = [n for n in effects if repeated or n != "excess_repeatability"]
-        drawn = tuple(name for name in asked if rng.random() < rng.uniform(0.0, CHANCE))
-        if not _containing(drawn):
-            strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < STRANGE else None
-            wants = (*EVERYTHING, *(("repeats",) if repeated else ()))
-            yield {"effects": drawn, "unlisted": strange, "wants": wants, **MIXED}
-
-
-def _containing(chosen: Sequence[str]) -> bool:
-    return any(inner in CONTAINS.get(outer, ()) for outer in chosen for inner in chosen)
-
-
-def alike(chosen: Sequence[str]) -> bool:
-    """Whether one of them contains another, or can do nearly the same."""
-    return _containing(chosen) or any(inner in IMITATES.get(outer, ()) for outer in chosen for inner in chosen)
-
-
 LOCAL = ("joint_offset", "joint_gain", "backlash", "joint_compliance")
 """Effects with one number a joint that formats.md defines: of such a number it can be asked whether it changed, and of
 which joint. Of a bent link's six numbers some are a joint's zero as well."""
@@ -160,64 +70,136 @@ APART = (2, 4)
 """Fewest and most robots of a fleet with a fault of their own."""
 PLACES = 2
 """Joints between the first and the last of the arm with the fewest: so many faults of one kind have room in a fleet."""
+_WAYS: tuple[How, ...] = ("begins", "jumps", "grows")
 _FLEETS: tuple[How, ...] = ("all", "hall", "")
 
 
-def turns_of_several(kind: str, effects: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield what is asked in cases of one kind of several campaigns, without end, of these effects.
+def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield what is asked in cases of one kind, without end, of these effects and unlisted causes, each in turn.
 
     Raises
     ------
     EffectError
         If no case of this kind can be made of them.
     """
-    local = [name for name in LOCAL if name in effects]
-    always = [name for name in BESIDE if name in effects]
-    if not (always if kind in ("same", "steady") else local):
-        raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}; it takes {', '.join(LOCAL)}")
+    menu = _menu(kind, effects, causes)
+    if not menu or (kind == "both" and not _apart(effects)):
+        takes = f"; it takes {', '.join(LOCAL)}" if kind in SEVERAL else ""
+        raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}{takes}")
+    return _in_turn(kind, menu, effects, causes, rng)
+
+
+def _in_turn(
+    kind: str, menu: Sequence[Asked], effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator
+) -> Iterator[Asked]:
+    while True:
+        for k in rng.permutation(len(menu)):
+            yield {**menu[k], **_beside(kind, menu[k], effects, causes, rng)}
+
+
+def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Asked]:
+    """Return what is asked in turn: every item as often as any other."""
+    # contained effects are no loss where the library keeps the container
+    contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
+    apart, local = _apart(effects), [name for name in LOCAL if name in effects]
+    alone: list[Asked] = [{"effects": (name,)} for name in effects]
+    always: list[Asked] = [{"effects": (name,)} for name in BESIDE if name in effects]
+    beyond: list[Asked] = [{"unlisted": name} for name in causes]
+    menus: dict[str, list[Asked]] = {
+        "null": [{}],
+        "many": [{}],
+        "mixed": [{}],
+        "single": alone,
+        "large": [{**asked, "ratio": LARGE} for asked in alone],
+        "visits": [{"effects": (n,), "wants": ("repeats",)} for n in effects if n == "encoder_resolution"],
+        "lags": [{**asked, "ratio": LAGGING} for asked in LAGS if asked["effects"][0] in effects],
+        "hard": [{"effects": (name,), **HARD} for name in apart],
+        "pair": [{"effects": chosen} for chosen in combinations(apart, 2) if not alike(chosen)],
+        # one that the library does not have yet needs not be taken out
+        "removed": [{"effects": (n,), "without": (n,) if n in library() else ()} for n in apart if n not in contained],
+        "hidden": [{"effects": (name,), "hidden": CONDITION[name]} for name in apart if name in CONDITION],
+        "unlisted": beyond,
+        "both": beyond,
+        "same": [{**asked, "several": Several(PAIR)} for asked in always],
+        "steady": [{**asked, "several": Several(DAYS)} for asked in always],
+    }
+    if kind in menus:
+        return menus[kind]
+    moving: dict[str, tuple[tuple[int, int], list[tuple[How, str]]]] = {
+        "changed": (PAIR, [("changes", name) for name in local]),
+        "series": (DAYS, [(how, name) for name in local for how in _WAYS]),
+        "fleet": (FLEET, [(how, name if how else "") for how in _FLEETS for name in local]),
+    }
+    campaigns, items = moving[kind]
+    return [
+        {"effects": (name,) if name else (), "several": Several(campaigns, how, name, SIZES.get(how, Several.change))}
+        for how, name in items
+    ]
+
+
+def _beside(kind: str, asked: Asked, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
+    """Draw what stands beside an item of the menu."""
+    apart, always = _apart(effects), [name for name in BESIDE if name in effects]
+    if kind == "both":
+        return {"effects": _several(apart, int(rng.integers(1, 3)), rng)}
+    if kind == "many":
+        if len(apart) < MANY[1]:
+            raise EffectError(f"many effects together are up to {MANY[1]}, of {', '.join(apart) or 'none'}")
+        return {"effects": _several(apart, int(rng.integers(MANY[0], MANY[1] + 1)), rng)}
+    if kind == "mixed":
+        return _mixture([name for name in effects if name not in _FRAMES], causes, rng)
     if kind == "fleet":
-        return _fleets(local, rng)
-    if kind in ("same", "steady"):
-        return _unchanged(PAIR if kind == "same" else DAYS, always, rng)
-    ways: tuple[How, ...] = ("changes",) if kind == "changed" else ("begins", "jumps", "grows")
-    campaigns = PAIR if kind == "changed" else DAYS
-    menu = [{"several": Several(campaigns, how, name, SIZES[how])} for name, how in product(local, ways)]
-    return _changing(menu, always, rng)
+        return {"several": replace(asked["several"], apart=_own(asked["effects"], effects, rng))}
+    return {"effects": _with_another(asked["effects"], always, rng)} if kind in SEVERAL else {}
 
 
-def _unchanged(campaigns: tuple[int, int], always: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield robots with one or two effects that stay."""
-    for asked in in_turn([{"effects": (name,)} for name in always], rng):
-        yield {"effects": _with_another(asked["effects"], always, rng), "several": Several(campaigns)}
+def _apart(effects: Sequence[str]) -> list[str]:
+    return [name for name in effects if name not in (*RANDOM, *_FRAMES)]
 
 
-def _changing(menu: Sequence[Asked], always: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield changes in turn, every second robot with another effect that stays."""
-    for asked in in_turn(menu, rng):
-        yield {**asked, "effects": _with_another((asked["several"].moves,), always, rng)}
+def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tuple[str, ...]:
+    while True:
+        chosen = tuple(apart[k] for k in sorted(rng.permutation(len(apart))[:number]))
+        if not alike(chosen):
+            return chosen
+
+
+def _mixture(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
+    """Draw each effect by a chance of its own: something to hold probabilities against.
+
+    Sets in which one contains another are drawn again.
+    """
+    while True:
+        repeated = bool(rng.random() < REPEATED)
+        asked = [n for n in effects if repeated or n != "excess_repeatability"]
+        drawn = tuple(name for name in asked if rng.random() < rng.uniform(0.0, CHANCE))
+        if not _holds(CONTAINS, drawn):
+            strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < STRANGE else None
+            wants = (*EVERYTHING, *(("repeats",) if repeated else ()))
+            return {"effects": drawn, "unlisted": strange, "wants": wants, **MIXED}
 
 
 def _with_another(first: tuple[str, ...], always: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Add another effect in every second case, by chance, unless the two do the same."""
+    """Add another effect that stays in every second case, by chance, unless the two do the same."""
     second = str(always[int(rng.integers(len(always)))])
     wanted = bool(rng.random() < 0.5)
     return first if not wanted or second in first or alike((*first, second)) else (*first, second)
 
 
-def _fleets(local: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield fleets in which all robots, those of one hall or none share a fault, and some have one of their own."""
-    menu: list[Asked] = [{"how": how, "moves": name} for how, name in product(_FLEETS, local)]
-    for asked in in_turn(menu, rng):
-        how, moves = asked["how"], asked["moves"] if asked["how"] else ""
-        effects = (moves,) if moves else ()
-        yield {"effects": effects, "several": Several(FLEET, how, moves, apart=_apart(effects, local, rng))}
-
-
-def _apart(shared: tuple[str, ...], local: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw faults of single robots, no more of one kind than every arm has places for."""
-    places = [name for name in local for _ in range(PLACES - shared.count(name))]
+def _own(shared: tuple[str, ...], effects: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw faults of single robots of a fleet, no more of one kind than every arm has places for."""
+    places = [name for name in LOCAL if name in effects for _ in range(PLACES - shared.count(name))]
     count = min(int(rng.integers(APART[0], APART[1] + 1)), len(places))
     return tuple(places[k] for k in rng.permutation(len(places))[:count])
+
+
+def _holds(contents: Mapping[str, set[str]], chosen: Sequence[str]) -> bool:
+    return any(inner in contents.get(outer, ()) for outer in chosen for inner in chosen)
+
+
+def alike(chosen: Sequence[str]) -> bool:
+    """Whether one of them contains another, or can do nearly the same."""
+    return _holds(CONTAINS, chosen) or _holds(IMITATES, chosen)
 
 
 ARMS = Path(__file__).parent / "reality" / "arms"
@@ -263,15 +245,12 @@ SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0,
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
     """Return robots with their URDF's text, so that nothing else has to find it again.
 
-    Parameters
-    ----------
-    chosen
-        Name, URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and tool frame of each.
+    Of each a name, a URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and the tool frame.
 
     Raises
     ------
     RobotError
-        If one cannot be loaded, or if gravity moves nothing in it.
+        If one cannot be loaded, or has fewer than four joints.
     """
     found = []
     for name, urdf, tool_frame in chosen:
@@ -289,30 +268,22 @@ def plan(
     only_effects: Sequence[str] = (),
     unlisted: Sequence[str] = (),
 ) -> tuple[Case, ...]:
-    """Draw the cases of a trial.
+    """Draw the cases of a trial from its seed, in a drawn order, so that a case's number tells nothing.
 
     Parameters
     ----------
-    seed
-        Of the trial.
     counts
-        Number of cases by kind (:data:`~thermal_robot.blind.cases.Kind` without ``real``).
+        Number of cases by kind (:data:`~thermal_robot.blind.cases.Kind` without ``real``); those of several campaigns
+        come after the others.
     robots
         Each as probable as any other in every case.
-    only_effects
-        Effects to ask for; all of formats.md where empty.
-    unlisted
-        Causes that no library knows; all of them where empty.
-
-    Returns
-    -------
-    tuple of Case
-        In a drawn order, so that a case's number tells nothing; those of several campaigns after the others.
+    only_effects, unlisted
+        Effects to ask for, and causes that no library knows; all of them where empty.
 
     Raises
     ------
     EffectError
-        If a kind or an effect is not known.
+        If a kind or an effect is not known, or no case of a kind can be made of these effects.
     """
     from thermal_robot.blind.reality import FAULTS, UNLISTED
 
@@ -325,40 +296,32 @@ def plan(
             raise EffectError(f"the trial cannot make {name!r}; it can make {', '.join((*FAULTS, *UNLISTED))}")
     effects = [name for name in (only_effects or FAULTS) if name in FAULTS]
     causes = list(unlisted or UNLISTED)
-    alone = {kind: count for kind, count in counts.items() if kind not in SEVERAL}
-    together = {kind: count for kind, count in counts.items() if kind in SEVERAL}
-    rng = np.random.default_rng([seed, 4])
-    drawn = _drawn(alone, lambda kind: turns(kind, effects, causes, rng))
-    cases = _cases("c", drawn, alone, robots, rng)
-    # a stream of their own: whoever asks for several campaigns, too, has the same single ones
-    own = np.random.default_rng([seed, 6])
-    drawn = _drawn(together, lambda kind: turns_of_several(kind, effects, own))
-    return (*cases, *_cases("s", drawn, together, robots, own))
-
-
-def _drawn(counts: Mapping[str, int], turn_of: Callable[[str], Iterator[Asked]]) -> list[Asked]:
-    """Draw what is asked, kind by kind."""
-    drawn: list[Asked] = []
-    for kind, count in counts.items():
-        turn = turn_of(kind)
-        drawn += [{"kind": kind, **next(turn)} for _ in range(count)]
-    return drawn
+    cases: list[Case] = []
+    # several campaigns have a stream of their own: whoever asks for them, too, has the same single ones
+    for letter, stream, several in (("c", 4, False), ("s", 6, True)):
+        asked = {kind: count for kind, count in counts.items() if (kind in SEVERAL) is several}
+        cases += _cases(letter, asked, robots, effects, causes, np.random.default_rng([seed, stream]))
+    return tuple(cases)
 
 
 def _cases(
     letter: str,
-    drawn: Sequence[Asked],
     counts: Mapping[str, int],
     robots: Sequence[RobotChoice],
+    effects: Sequence[str],
+    causes: Sequence[str],
     rng: np.random.Generator,
 ) -> Iterator[Case]:
     """Yield cases in a drawn order, each with a seed and a robot."""
+    drawn: list[Asked] = []
+    for kind, count in counts.items():
+        turn = turns(kind, effects, causes, rng)
+        drawn += [{"kind": kind, **next(turn)} for _ in range(count)]
     order = rng.permutation(len(drawn))
     seeds = rng.integers(2**62, size=len(drawn))
-    places = {kind: 0 for kind in counts}
+    places = dict.fromkeys(counts, 0)
     for number, k in enumerate(order):
-        asked = drawn[k]
-        turn_of_robot = places[str(asked["kind"])] + int(rng.integers(len(robots)))
-        places[str(asked["kind"])] += 1
-        robot = robots[turn_of_robot % len(robots)]
-        yield Case(f"{letter}{number:04d}", int(seeds[number]), robot=robot, **asked)
+        kind = drawn[k]["kind"]
+        robot = robots[(places[kind] + int(rng.integers(len(robots)))) % len(robots)]
+        places[kind] += 1
+        yield Case(f"{letter}{number:04d}", int(seeds[number]), robot=robot, **drawn[k])

@@ -58,11 +58,6 @@ def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Ca
     return replace(campaign, q=q)
 
 
-def with_scale(campaign: Campaign, scale: float) -> Campaign:
-    """Return the campaign with measured = (1 + scale)·true about the instrument's origin."""
-    return replace(campaign, position=measured(campaign) * (1.0 + scale))
-
-
 def with_approaches(campaign: Campaign) -> Campaign:
     """Return the campaign with the side from which each joint came, the rows being in the order of measurement.
 
@@ -88,12 +83,6 @@ def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
     turned = moved @ frames.base[:3, :3].T
     known = {name: v for name, v in campaign.covariates.items() if name.split(".")[0] != "temperature"}
     return replace(campaign, position=measured(campaign) + turned, covariates=known)
-
-
-def with_temperature(campaign: Campaign, warmer: Array) -> Campaign:
-    """Return the campaign with the column ``temperature``: its reference temperature + ``warmer``."""
-    temperature = campaign.reference_temperature + warmer
-    return replace(campaign, covariates={**campaign.covariates, "temperature": temperature})
 
 
 def warm_up(rng: np.random.Generator, samples: int) -> Array:
@@ -160,8 +149,7 @@ def judged(fault: str, record: Record, control: Record | None, remainder: float)
     said = record.get("said")
     if said is None:
         return False, str(record.get("error") or "no diagnosis")
-    named = " ".join(said["verdict"]["effects"]) or "no effect"
-    after = (record.get("fresh") or {}).get("rms_after")
+    after, before = (((of or {}).get("fresh") or {}).get("rms_after") for of in (record, control))
     if fault == "backlash":
         right, more = _backlash(said, record["truth"])
     elif fault == "slip":
@@ -183,18 +171,17 @@ def judged(fault: str, record: Record, control: Record | None, remainder: float)
         right = _names(said, "geometric") and after <= WORSE * remainder
         more = f"leaves {1e3 * after:.3f} mm, README {1e3 * remainder:.3f} mm"
     else:
-        before = ((control or {}).get("fresh") or {}).get("rms_after")
         cause = {"offset": "joint_offset", "scale": "instrument_scale"}[fault]
         covered = _names(said, "geometric") or _names(said, cause)
         right = covered and before is not None and after < WORSE * before
         than = "no control" if before is None else f"control {1e3 * before:.3f} mm"
         more = f"leaves {1e3 * after:.3f} mm, {than}"
+    named = " ".join(said["verdict"]["effects"]) or "no effect"
     return bool(right), f"{named}; {more}" if more else named
 
 
 def _finding(said: Record, effect: str) -> Record:
-    found: list[Record] = [e for e in said["effects"] if e["name"] == effect]
-    return found[0] if found else {}
+    return next((e for e in said["effects"] if e["name"] == effect), {})
 
 
 def _names(said: Record, effect: str) -> bool:
@@ -237,15 +224,16 @@ REMAINDERS = {"ur5_jacobi": 0.113e-3, "wam_jacobi": 2.567e-3, "ipa_ur10_a": 0.43
 """Campaigns, with the rms distance (m) that a full geometry leaves on random held-out rows, as their READMEs say."""
 
 # how often each is asked, and of whom: the WAM's cables leave ten times what its links could grow
-_PLAN: tuple[tuple[Fault, int, tuple[str, ...]], ...] = (
-    ("offset", 2, tuple(REMAINDERS)),
-    ("scale", 1, tuple(REMAINDERS)),
-    ("backlash", 2, tuple(REMAINDERS)),
-    ("slip", 2, tuple(REMAINDERS)),
-    ("temperature", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
-    ("hidden", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
-    ("later", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
-)
+_STIFF = tuple(name for name in REMAINDERS if name != "wam_jacobi")
+_PLAN: dict[Fault, tuple[int, tuple[str, ...]]] = {
+    "offset": (2, tuple(REMAINDERS)),
+    "scale": (1, tuple(REMAINDERS)),
+    "backlash": (2, tuple(REMAINDERS)),
+    "slip": (2, tuple(REMAINDERS)),
+    "temperature": (2, _STIFF),
+    "hidden": (2, _STIFF),
+    "later": (2, _STIFF),
+}
 # what a fault leaves after the best frames, over the campaign's remainder: drawn between the two
 _RATIO: dict[Fault, tuple[float, float]] = {
     "offset": (3.0, 6.0),
@@ -260,26 +248,16 @@ _EARLY = 0.7
 
 @dataclass(frozen=True)
 class RealCase:
-    """A real campaign with what was done to it.
+    """A real campaign with what was done to it; its ``id`` names its folder and tells nothing.
 
     Attributes
     ----------
-    id
-        Name of its folder: tells nothing.
-    seed
-        Of the trial: the rows of a campaign are the same in all cases of a trial.
-    draw
-        Number of the draw that settles joint and size.
-    data
-        The folder of measured campaigns.
-    campaign
-        Which of them.
-    fault
-        What is done to it.
+    seed, draw
+        Of the trial: the rows of a campaign are the same in all its cases. Number of the draw of joint and size.
+    data, campaign, fault
+        The folder of measured campaigns, which of them, and what is done to it.
     control
         ``id`` of the case with the same campaign untouched; ``None`` for that case itself.
-    kind
-        Always ``"real"``.
     """
 
     id: str
@@ -292,12 +270,10 @@ class RealCase:
     kind: Literal["real"] = "real"
 
     def make(self, folder: Path) -> Answers:
-        """Write what the diagnosis sees, and return the answers.
+        """Write what the diagnosis sees, and return the answers: what of the record is known before the diagnosis.
 
-        The folder gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
-        Returned is what of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with
-        a ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m in
-        the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the nominal
+        ``truth`` has a ``size`` (SI) in its parts; ``noise`` is what a full geometry leaves, per axis. Both (N, 3) m in
+        the measurement frame or ``None``: ``fresh_position``, measured, and ``fresh_before``, predicted by the nominal
         robot in the frames that fit the diagnosed rows best.
         """
         # in the order of measurement, from here on
@@ -343,7 +319,7 @@ def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCas
     present = [name for name in REMAINDERS if (data / name / "campaign.toml").is_file()]
     rng = np.random.default_rng([seed, 0])
     planned: list[tuple[Fault, str]] = []
-    for fault, times, campaigns in _PLAN:
+    for fault, (times, campaigns) in _PLAN.items():
         fit = [name for name in campaigns if name in present]
         planned += [(fault, str(name)) for name in rng.permutation(fit)[:times]]
     cases: list[RealCase] = []
@@ -430,7 +406,8 @@ def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float) -> Ma
     shift = measured(campaign) @ seen.frames.base[:3, :3]
     size = float(rng.choice([-1.0, 1.0])) * ratio * remainder / leaves(seen, shift)
     asked = f"instrument off by {1e6 * size:.0f} µm/m"
-    return with_scale(campaign, size), _truth("instrument_scale", ratio, size), asked
+    changed = replace(campaign, position=measured(campaign) * (1.0 + size))
+    return changed, _truth("instrument_scale", ratio, size), asked
 
 
 def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told: bool) -> Made:
@@ -441,7 +418,8 @@ def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told
     shift = (measured(changed) - measured(campaign)) @ seen.frames.base[:3, :3]
     ratio, highest = leaves(seen, shift) / remainder, float(warmer.max())
     if told:
-        changed = with_temperature(changed, warmer)
+        recorded = {"temperature": campaign.reference_temperature + warmer}
+        changed = replace(changed, covariates={**changed.covariates, **recorded})
     truth = _truth("thermal_elongation", ratio, highest)
     if not told:
         # how the temperature goes with time is all that the table can show of it

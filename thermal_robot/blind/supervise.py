@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import os
-import queue
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any
 
 START_TIMEOUT = 180.0
 """Seconds for imports and the warm-up, on a busy machine."""
+NO_ANSWER: dict[str, Any] = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
+"""The reply of one who was not heard."""
 _KEPT = ("PATH", "HOME", "LD_LIBRARY_PATH")  # a Pinocchio that came with ROS or conda is found by the last
 
 
@@ -70,11 +73,9 @@ class Examinee:
         """End it and give everything back."""
         self.end()
         for stream in (self._process.stdin, self._process.stdout, self._complaints):
-            try:
+            with suppress(BrokenPipeError):  # what it never read
                 if stream:
                     stream.close()
-            except BrokenPipeError:  # what it never read
-                pass
 
     def _line(self, timeout: float) -> str:
         late = threading.Event()
@@ -127,69 +128,36 @@ def examine(
     Yields name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving
     the loop early ends all of them.
     """
-    shared = _Shared(requests, directory, timeout)
-    for name in requests:
-        shared.todo.put(name)
-    threads = [threading.Thread(target=shared.serve, daemon=True) for _ in range(min(workers, len(requests)))]
-    for thread in threads:
-        thread.start()
-    try:
-        for _ in requests:
-            item = shared.done.get()
-            if isinstance(item, Exception):
-                raise item
-            yield item
-    finally:
-        shared.stop.set()
-        _end_all(threads, shared.running)
+    idle: SimpleQueue[Examinee] = SimpleQueue()
+    started: list[Examinee] = []
+    stopped = threading.Event()
 
-
-@dataclass(frozen=True)
-class _Shared:
-    """What the supervisor's threads share; each of them has one examinee at a time."""
-
-    requests: Mapping[str, Mapping[str, Any]]
-    directory: Path
-    timeout: float
-    todo: queue.SimpleQueue[str] = field(default_factory=queue.SimpleQueue)
-    done: queue.SimpleQueue[tuple[str, dict[str, Any]] | Exception] = field(default_factory=queue.SimpleQueue)
-    stop: threading.Event = field(default_factory=threading.Event)
-    running: list[Examinee] = field(default_factory=list)
-
-    def serve(self) -> None:
-        """Have requests answered until there are no more, or it is told to stop."""
-        examinee: Examinee | None = None
+    def answered(name: str) -> tuple[str, dict[str, Any]]:
         try:
-            while not self.stop.is_set():
-                name = self.todo.get_nowait()
-                if examinee is None:
-                    examinee = Examinee(self.directory)
-                    self.running.append(examinee)
-                    examinee.start()
-                try:
-                    self.done.put((name, examinee.ask(self.requests[name], self.timeout)))
-                except Lost as why:
-                    examinee.close()
-                    self.running.remove(examinee)
-                    examinee = None
-                    self.done.put((name, no_answer(f"the diagnosis failed: {why}")))
-        except queue.Empty:
-            pass
-        except Exception as error:
-            self.done.put(error)
-        finally:
-            if examinee is not None:
-                examinee.close()
+            examinee = idle.get_nowait()
+        except Empty:
+            examinee = Examinee(directory)
+            started.append(examinee)
+            if stopped.is_set():  # it was started while the others were ended
+                examinee.end()
+            examinee.start()
+        try:
+            reply = examinee.ask(requests[name], timeout)
+        except Lost as why:
+            examinee.close()
+            return name, {**NO_ANSWER, "error": f"the diagnosis failed: {why}"}
+        idle.put(examinee)
+        return name, reply
 
-
-def no_answer(error: str) -> dict[str, Any]:
-    """Return the reply that stands for one that never came."""
-    return {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": error}
-
-
-def _end_all(threads: Sequence[threading.Thread], running: Sequence[Examinee]) -> None:
-    while any(thread.is_alive() for thread in threads):
-        for examinee in tuple(running):  # one may just have been started
+    pool = ThreadPoolExecutor(max(1, min(workers, len(requests))))
+    try:
+        for task in as_completed([pool.submit(answered, name) for name in requests]):
+            yield task.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        stopped.set()
+        for examinee in tuple(started):
             examinee.end()
-        for thread in threads:
-            thread.join(0.1)
+        pool.shutdown()
+        for examinee in started:
+            examinee.close()

@@ -16,7 +16,7 @@ from contextlib import closing
 from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot.blind.cases import ASKS, Case
 from thermal_robot.blind.score import shares
@@ -24,30 +24,19 @@ from thermal_robot.blind.supervise import examine
 from thermal_robot.errors import SealError, ThermalRobotError
 from thermal_robot.files import write_bytes, write_text
 
+if TYPE_CHECKING:
+    from thermal_robot.blind.real import RealCase
+
 KEY_BYTES = 32
 
 
 def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
-    """Write answers so that whoever has only the file reads nothing.
+    """Write answers under a stream cipher, and return their commitment: SHA-256 of key and text, in hexadecimal.
 
-    The text is added, byte by byte, to a keystream that SHAKE-256 draws from the key. The key stays in the memory of
-    the process that made the answers: without it the file is noise, and only its length is told. A key must serve
-    once, since two texts under one keystream would betray their difference. The commitment says that the answers were
-    fixed when it was told: nobody finds another text, or another key, with the same hash.
-
-    Parameters
-    ----------
-    answers
-        Plain values; they are written as canonical JSON (see :func:`canonical`).
-    path
-        File to write.
-    key
-        32 random bytes.
-
-    Returns
-    -------
-    str
-        The commitment, in hexadecimal: SHA-256 of the key followed by the plain text.
+    The text, :func:`canonical` JSON, is added to a keystream that SHAKE-256 draws from the 32 random bytes of the key.
+    The key stays in the memory of the process that made the answers: without it the file tells only its length. A key
+    must serve once, since two texts under one keystream would betray their difference. The commitment says that the
+    answers were fixed when it was told: nobody finds another text, or another key, with the same hash.
     """
     if len(key) != KEY_BYTES:
         raise ValueError(f"a key has {KEY_BYTES} bytes, not {len(key)}")
@@ -57,19 +46,7 @@ def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
 
 
 def open_seal(path: Path, key: bytes, commitment: str) -> dict[str, Any]:
-    """Read what :func:`seal` wrote.
-
-    Parameters
-    ----------
-    path, key
-        As given to :func:`seal`.
-    commitment
-        As it returned.
-
-    Returns
-    -------
-    dict
-        The answers.
+    """Read the answers that :func:`seal` wrote, with the same key and the commitment that it returned.
 
     Raises
     ------
@@ -112,24 +89,6 @@ Make = Callable[[Case, Path], Plain]
 _FRESH = ("fresh_position", "fresh_before")  # of the answers: what they give is in the record as two numbers
 
 
-class RealCase(Protocol):
-    """A case that makes its own campaign and judges its own record; a frozen dataclass."""
-
-    @property
-    def id(self) -> str:
-        """Name of its folder."""
-
-    @property
-    def control(self) -> str | None:
-        """``id`` of the case that its record is judged against."""
-
-    def make(self, folder: Path) -> Plain:
-        """Write the campaign, return the answers."""
-
-    def judge(self, record: Plain, control: Plain | None) -> Plain:
-        """Return the record with ``right``, ``asked`` and ``answer``."""
-
-
 def run_trial(
     cases: Sequence[Case | RealCase],
     directory: str | Path,
@@ -148,21 +107,16 @@ def run_trial(
 
     Parameters
     ----------
-    cases
-        What is asked.
-    directory
-        Is made if need be; keeps campaigns, sealed answers, replies, opened answers and records.
+    cases, directory
+        What is asked; what keeps campaigns, sealed answers, replies, opened answers and records, made if need be.
     make
         Writes the campaign of a :class:`Case` into a folder and returns the answers; must be picklable. That of
         :mod:`thermal_robot.blind.reality` by default.
-    workers
-        How many processes make campaigns, and then diagnose them.
-    progress
-        Called with ``"campaigns"`` or ``"diagnoses"``, how many are done, and how many there are.
-    sealed
-        Called with the commitment of :func:`~thermal_robot.blind.trial.seal` before the first diagnosis.
-    timeout
-        Seconds for one diagnosis.
+    workers, timeout
+        How many processes make campaigns, and then diagnose them; s for one diagnosis.
+    progress, sealed
+        Called with ``"campaigns"`` or ``"diagnoses"``, how many are done, and how many there are; called with the
+        commitment of :func:`seal` before the first diagnosis.
 
     Returns
     -------
@@ -199,14 +153,18 @@ def run_trial(
     opened = open_seal(folder / SEALED, key, commitment)
     # with the key, whoever noted the commitment can now check it
     _write(folder / OPENED, {"commitment": commitment, "key": key.hex(), "answers": opened})
-    records = _judged(cases, [join(case, opened[case.id], replies.get(case.id)) for case in cases])
+    records = [join(case, opened[case.id], replies.get(case.id)) for case in cases]
+    found = {record["id"]: record for record in records}
+    for k, case in enumerate(cases):
+        if not isinstance(case, Case):
+            records[k] = case.judge(records[k], found.get(case.control or ""))
     _write(folder / RECORDS, records)
     return records
 
 
 def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, Any] | None) -> Plain:
     """Join what was asked, what is true and what was said to a record."""
-    asked: Plain = {"id": case.id, "kind": getattr(case, "kind", "real")}
+    asked: Plain = {"id": case.id, "kind": case.kind}
     if isinstance(case, Case):
         asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
     if reply is None:
@@ -227,19 +185,10 @@ def _rms(positions: Sequence[Sequence[float]], true: Sequence[Sequence[float]]) 
     return math.sqrt(sum(math.dist(p, t) ** 2 for p, t in zip(positions, true, strict=True)) / len(true))
 
 
-def _judged(cases: Sequence[Case | RealCase], records: list[Plain]) -> list[Plain]:
-    found = {record["id"]: record for record in records}
-    return [
-        record if isinstance(case, Case) else case.judge(record, found.get(case.control or ""))
-        for case, record in zip(cases, records, strict=True)
-    ]
-
-
 def _request(case: Case | RealCase, folder: Path) -> Plain:
-    folder = folder / CAMPAIGNS / case.id
-    request = {"folder": str(folder), "without": list(getattr(case, "without", ())), "only": []}
-    several = isinstance(case, Case) and case.several is not None
-    return {**request, "asks": ASKS[case.kind]} if several else request  # type: ignore[union-attr]
+    without = list(case.without) if isinstance(case, Case) else []
+    request = {"folder": str(folder / CAMPAIGNS / case.id), "without": without, "only": []}
+    return {**request, "asks": ASKS[case.kind]} if case.kind in ASKS else request
 
 
 def _identity(cases: Sequence[Case | RealCase]) -> Plain:
@@ -248,14 +197,14 @@ def _identity(cases: Sequence[Case | RealCase]) -> Plain:
 
     if len({case.id for case in cases}) < len(cases) or not cases:
         raise ThermalRobotError("a trial needs cases, and each needs an id of its own")
-    drawn = json.dumps([asdict(case) for case in cases], sort_keys=True, default=str)  # type: ignore[arg-type]
+    drawn = json.dumps([asdict(case) for case in cases], sort_keys=True, default=str)
     return {
         "schema": SCHEMA,
         "version": __version__,
         # a program that was changed meanwhile would be judged by some of its predecessor's replies
         "program": _digest(Path(__file__).parents[1], "*.py"),
         "plan": hashlib.sha256(drawn.encode()).hexdigest(),
-        "kinds": dict(Counter(getattr(case, "kind", "real") for case in cases)),
+        "kinds": dict(Counter(case.kind for case in cases)),
         "robots": sorted({case.robot.name for case in cases if isinstance(case, Case)}),
     }
 

@@ -35,3 +35,24 @@ def gauge(setting):
 def body(setting):
     """The arm without a fault, to be spoilt."""
     return setting.world.sound(setting.samples)
+
+
+BEAM = """<robot name="beam"><link name="wall"/>
+  <link name="arm"><inertial><origin xyz="0.4 0 0"/><mass value="4"/></inertial></link><link name="end"/>
+  <joint name="turn" type="revolute"><parent link="wall"/><child link="arm"/><axis xyz="0 -1 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="tip" type="fixed"><parent link="arm"/><child link="end"/><origin xyz="0.8 0 0"/></joint></robot>"""
+
+
+@pytest.fixture(scope="session")
+def beam_urdf():
+    """The arm of :func:`beam`."""
+    return BEAM
+
+
+@pytest.fixture(scope="session")
+def beam():
+    """A uniform arm of 4 kg and 0.8 m that turns about a level axis."""
+    from thermal_robot.blind.reality import World
+
+    return World(BEAM, "end", payload_com=(0.0, 0.0, 0.0))

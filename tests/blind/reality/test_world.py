@@ -1,5 +1,6 @@
 """The robot in MuJoCo: Pinocchio's where nothing is wrong, textbook statics where something yields."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,16 @@ from conftest import AWKWARD
 
 from thermal_robot.blind.plan import PARALLELOGRAMS, ROBOTS
 from thermal_robot.blind.reality import World
-from thermal_robot.blind.reality.world import cross_axes
+from thermal_robot.blind.reality.world import (
+    anywhere,
+    cross_axes,
+    free_columns,
+    from_vector,
+    quaternion,
+    read,
+    rpy_matrix,
+    slopes,
+)
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects.compliance import overturning
 from thermal_robot.kinematics import gravity_torques, tool_poses
@@ -19,11 +29,6 @@ from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 
 NAMED = {name: (urdf, tool) for name, urdf, tool in ROBOTS}
-BEAM = """<robot name="beam"><link name="wall"/>
-  <link name="arm"><inertial><origin xyz="0.4 0 0"/><mass value="4"/></inertial></link><link name="end"/>
-  <joint name="turn" type="revolute"><parent link="wall"/><child link="arm"/><axis xyz="0 -1 0"/>
-    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
-  <joint name="tip" type="fixed"><parent link="arm"/><child link="end"/><origin xyz="0.8 0 0"/></joint></robot>"""
 
 
 def drawn(world, samples, seed):
@@ -39,27 +44,15 @@ def test_a_sound_robot_stands_where_pinocchio_has_it(name):
     world = World(robot.urdf, tool)
     q = drawn(world, 60, 1)
     assert world.names == robot.joint_names
+    assert world.slides.tolist() == [j.kind == "prismatic" for j in world.joints]
     poses, torque = world.poses(q, np.zeros(60), world.sound(60))
     np.testing.assert_allclose(poses, tool_poses(robot, q), atol=1e-9)
     np.testing.assert_allclose(torque, gravity_torques(robot, q), atol=1e-8)
 
 
-def test_a_joint_that_slides_is_known_as_one():
-    world = World(AWKWARD, "tip")
-    assert dict(zip(world.names, world.slides, strict=True)) == {
-        "lift": True,
-        "turret": False,
-        "slide": True,
-        "roll_joint": False,
-        "rail_joint": True,
-        "hand_joint": False,
-    }
-
-
-def test_the_overturning_moment_is_weight_times_lever():
+def test_the_overturning_moment_is_weight_times_lever(beam):
     """An arm of 4 kg, level, with its weight 0.4 m from the wall and a payload 0.8 m from it; upright, with none."""
-    world = World(BEAM, "end", payload_com=(0.0, 0.0, 0.0))
-    moments = world.overturning(np.array([[0.0], [0.0], [np.pi / 2]]), np.array([0.0, 2.0, 2.0]))
+    moments = beam.overturning(np.array([[0.0], [0.0], [np.pi / 2]]), np.array([0.0, 2.0, 2.0]))
     np.testing.assert_allclose(moments[:, 1], 9.81 * np.array([1.6, 3.2, 0.0]), atol=1e-12)
     np.testing.assert_allclose(moments[:, [0, 2]], 0.0, atol=1e-12)
 
@@ -75,15 +68,6 @@ def test_the_overturning_moment_varies_as_the_program_has_it(name):
     campaign = Campaign("commands", robot, q, covariates={"payload": payload}, payload_com=place, target=place)
     moments, program = world.overturning(q, payload), overturning(observe(campaign))
     np.testing.assert_allclose(moments - moments[0], program - program[0], atol=1e-8)
-
-
-def test_hinges_of_the_beams_move_nothing_while_they_are_stiff(ur10):
-    q = drawn(ur10, 30, 2)
-    body = ur10.sound(30)
-    body.bow[:] = 1e-300  # enough to build the beams, too little to bend them
-    np.testing.assert_allclose(
-        ur10.poses(q, np.zeros(30), body)[0], ur10.poses(q, np.zeros(30), ur10.sound(30))[0], atol=1e-12
-    )
 
 
 def test_stretching_a_sound_robot_leaves_no_trace_in_the_next_run(ur10):
@@ -110,10 +94,10 @@ def test_a_spring_yields_by_its_torque(ur10):
     assert np.abs(torque[:, 1]).max() > 50.0
 
 
-def test_a_cantilever_bends_as_the_textbook_says():
+def test_a_cantilever_bends_as_the_textbook_says(beam_urdf):
     """F L³/3EI, but for what lumping into three hinges leaves out: the midpoint rule, 1/4 of (1/3)²."""
     length, weight, stiffness = 0.8, 5.0, 4e3
-    urdf = BEAM.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 0 1"/>').replace('mass value="4"', 'mass value="0"')
+    urdf = beam_urdf.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 0 1"/>').replace('mass value="4"', 'mass value="0"')
     world = World(urdf, "end", payload_com=(0.0, 0.0, 0.0))
     body = world.sound(1)
     body.beams[:] = 1.0 / stiffness
@@ -123,18 +107,16 @@ def test_a_cantilever_bends_as_the_textbook_says():
     assert -pose[0, 2, 3] == pytest.approx(expected, rel=1e-4)
 
 
-def test_what_holds_an_arm_is_weight_times_arm():
-    world = World(BEAM, "end", payload_com=(0.0, 0.0, 0.0))
+def test_what_holds_an_arm_is_weight_times_arm(beam):
     angle, payload = np.array([0.0, 0.5, -1.2]), np.array([0.0, 3.0, 1.0])
-    torque = world.poses(angle[:, None], payload, world.sound(3))[1][:, 0]
+    torque = beam.poses(angle[:, None], payload, beam.sound(3))[1][:, 0]
     np.testing.assert_allclose(torque, 9.81 * np.cos(angle) * (4.0 * 0.4 + payload * 0.8), rtol=1e-12)
 
 
-def test_a_bowed_link_turns_its_end_by_curvature_times_length():
-    world = World(BEAM, "end")
-    body = world.sound(1)
+def test_a_bowed_link_turns_its_end_by_curvature_times_length(beam):
+    body = beam.sound(1)
     body.bow[0, 0] = 1e-3, 2e-3
-    turned = world.poses(np.zeros((1, 1)), np.zeros(1), body)[0][0, :3, :3]
+    turned = beam.poses(np.zeros((1, 1)), np.zeros(1), body)[0][0, :3, :3]
     angle = np.arccos((np.trace(turned) - 1.0) / 2.0)
     assert angle == pytest.approx(0.8 * np.hypot(1e-3, 2e-3), rel=1e-4)
 
@@ -148,12 +130,6 @@ def test_motions_of_base_and_target_are_made_one_after_the_other(ur10):
     np.testing.assert_array_equal(body.tool, np.tile(np.eye(4), (2, 1, 1)))
     body.move("tool", quarter)
     np.testing.assert_allclose(body.tool[0, :3, 0], [0.0, 1.0, 0.0], atol=1e-15)
-
-
-@pytest.mark.parametrize("direction", [[1.0, 0, 0], [0, -2.0, 0], [0.3, 0.3, 0.3]])
-def test_cross_axes_are_across(direction):
-    axes = np.array([np.array(direction) / np.linalg.norm(direction), *cross_axes(np.array(direction))])
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
 
 
 @pytest.fixture(scope="module")
@@ -210,3 +186,154 @@ def test_what_holds_a_driver_is_what_its_motion_lifts(parallelograms):
         slope = [(energy(q[row] + d) - energy(q[row] - d)) / (2 * step) for d in step * np.eye(world.n)]
         np.testing.assert_allclose(torque[row], slope, rtol=1e-5, atol=1e-4)
     model.body_mass[model.body("payload").id] = 0.0
+
+
+# ---- rigid motions
+
+RNG = np.random.default_rng(8)
+TWISTS = RNG.normal(size=(20, 6))
+
+
+def test_motions_are_rigid_and_turn_about_their_axis_by_its_length():
+    turns = from_vector(TWISTS)[:, :3, :3]
+    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.det(turns), 1.0)
+    np.testing.assert_allclose((turns @ TWISTS[:, 3:, None])[:, :, 0], TWISTS[:, 3:], atol=1e-12)
+    angle = np.linalg.norm(TWISTS[:, 3:], axis=1)
+    np.testing.assert_allclose(np.trace(turns, axis1=1, axis2=2), 1.0 + 2.0 * np.cos(angle))
+
+
+def test_turns_and_quaternions_follow_their_conventions():
+    motion = from_vector(np.array([[1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2]]))[0]
+    np.testing.assert_allclose(motion @ [1.0, 0.0, 0.0, 1.0], [1.0, 3.0, 3.0, 1.0], atol=1e-15)
+    # roll, pitch, yaw: about the fixed axes x, then y, then z
+    about = [from_vector(np.eye(6)[3 + k][None] * angle)[0, :3, :3] for k, angle in enumerate((0.3, -0.7, 1.1))]
+    np.testing.assert_allclose(rpy_matrix(np.array([0.3, -0.7, 1.1])), about[2] @ about[1] @ about[0], atol=1e-15)
+    # a quaternion has its scalar first
+    turned = quaternion(rpy_matrix(np.array([0.0, 0.0, 0.4])))
+    assert turned == pytest.approx([np.cos(0.2), 0.0, 0.0, np.sin(0.2)])
+    for direction in ([1.0, 0, 0], [0, -2.0, 0], [0.3, 0.3, 0.3]):
+        axes = np.array([np.array(direction) / np.linalg.norm(direction), *cross_axes(np.array(direction))])
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+    poses = np.array([anywhere(np.random.default_rng(seed), 2.0) for seed in range(400)])
+    assert np.abs(poses[:, :3, 3]).max() <= 2.0
+    np.testing.assert_allclose(np.linalg.det(poses[:, :3, :3]), 1.0)
+    # the mean of 400 unit vectors in no direction: 1/sqrt(400 · 3) a component
+    assert np.abs(poses[:, :3, :3].mean(axis=0)).max() < 4.5 / np.sqrt(1200.0)
+
+
+def test_columns_of_the_frames_are_what_a_small_motion_does():
+    points, turns, step = RNG.normal(size=(15, 3)), from_vector(RNG.normal(size=(15, 6)))[:, :3, :3], 1e-6
+    columns = free_columns(points, turns, True, True)
+    assert columns.shape == (45, 9)
+    centre = points.mean(axis=0)
+    for k, twist in enumerate(step * np.eye(6)):
+        motion = from_vector(twist[None])[0]
+        moved = (points - centre) @ motion[:3, :3].T + motion[:3, 3] + centre
+        np.testing.assert_allclose(columns[:, k], (moved - points).ravel() / step, atol=1e-5)
+    for k, offset in enumerate(np.eye(3)):
+        np.testing.assert_allclose(columns[:, 6 + k], (turns @ offset).ravel())
+    for base, tool, freedoms in ((True, False, 6), (False, True, 3), (False, False, 0)):
+        assert free_columns(points, turns, base, tool).shape == (45, freedoms)
+
+
+# ---- the reality's own reading of a URDF
+
+
+@pytest.fixture(scope="module")
+def tree():
+    return read('<?xml version="1.0" encoding="utf-8"?>' + AWKWARD)
+
+
+def test_joints_of_the_chain_lead_from_the_root_to_the_tool(tree):
+    chain = tree.chain("tip")
+    assert tree.root == chain[0].parent == "ground"
+    assert [j.child for j in chain[:-1]] == [j.parent for j in chain[1:]]
+    assert chain[-1].child == "tip"
+    assert [j.name for j in chain if j.movable] == ["lift", "turret", "slide", "roll_joint", "rail_joint", "hand_joint"]
+    assert tree.chain("ground") == ()
+    # a joint comes after the one that carries it
+    seen = {tree.root}
+    for joint in tree.joints:
+        assert joint.parent in seen
+        seen.add(joint.child)
+    assert seen == set(tree.mass)
+
+
+def test_axes_are_unit_vectors_and_along_x_where_none_is_given(tree):
+    axes = {j.name: j.axis for j in tree.joints}
+    np.testing.assert_allclose([np.linalg.norm(axis) for axis in axes.values()], 1.0)
+    np.testing.assert_allclose(axes["turret"], np.array([1.0, 2.0, -3.0]) / np.sqrt(14.0))
+    np.testing.assert_array_equal(axes["tip_joint"], [1.0, 0.0, 0.0])
+    # only a continuous joint has no limits
+    joints = {j.name: j for j in tree.joints}
+    assert (joints["turret"].lower, joints["turret"].upper) == (-2.0, 2.5)
+    assert (joints["hand_joint"].lower, joints["hand_joint"].upper) == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("lift", 0.2), ("branch_joint", -0.3), ("turret", 0.0), ("hand_joint", 0.0)]
+)
+def test_a_joint_that_nobody_moves_is_held_nearest_to_zero(tree, name, place):
+    assert next(j for j in tree.joints if j.name == name).held == place
+
+
+def test_a_link_without_inertia_weighs_nothing(tree):
+    assert tree.mass["rail"] == 0.0
+    np.testing.assert_array_equal(tree.centre["rail"], 0.0)
+    assert tree.mass["turret"] == 3.0
+    np.testing.assert_array_equal(tree.centre["turret"], [0.02, 0.0, 0.1])
+    # a link carries itself and all branches beyond it
+    assert tree.carried(tree.root) == pytest.approx(sum(tree.mass.values()))
+    assert tree.carried("slide") == pytest.approx(2.0 + 1.0 + 1.5 + 0.5)  # the held branch, too
+    assert tree.carried("tip") == 0.0
+
+
+# ---- slopes of a sound robot, against small faults of the whole one
+
+SMALL = 1e-6
+TARGET = np.array([0.03, -0.02, 0.11])
+
+
+@pytest.fixture(scope="module")
+def linear(setting):
+    return slopes(setting.world, setting.q, setting.payload, TARGET)
+
+
+def exact(setting, body):
+    poses, _ = setting.world.poses(setting.q, setting.payload, body)
+    poses = body.base @ poses @ body.tool
+    return (poses[:, :3, :3] @ TARGET + poses[:, :3, 3]) * (1.0 + body.scale)
+
+
+def spoilt(body, name, rng):
+    """The body with one kind of small error."""
+    if name == "move":
+        twists = SMALL * rng.normal(size=(2, len(body.joints), 6))
+        return replace(body, base=from_vector(twists[0]), tool=from_vector(twists[1]), scale=SMALL)
+    values = getattr(body, name)
+    size = 1e-9 if name in ("springs", "beams") else SMALL
+    return replace(body, **{name: size * rng.uniform(0.5, 1.0, values.shape)})
+
+
+@pytest.mark.parametrize("name", ["joints", "springs", "beams", "bow", "growth", "placements", "move"])
+def test_a_small_error_moves_the_target_by_its_slope(linear, setting, body, name):
+    sound = exact(setting, setting.world.sound(setting.samples))
+    wrong = spoilt(body, name, np.random.default_rng(5))
+    moved = exact(setting, wrong) - sound
+    assert np.abs(moved).max() > 1e-8
+    np.testing.assert_allclose(linear.place(wrong) - sound, moved, atol=2e-4 * np.abs(moved).max())
+
+
+def test_placements_that_come_and_go_count_in_their_rows(linear, setting, body):
+    late = np.arange(setting.samples) > 40
+    one = SMALL * np.ones((len(setting.world.chain), 6))
+    always = linear.place(replace(body, placements=one))
+    sometimes = linear.place(replace(body, placements=late[:, None, None] * one))
+    np.testing.assert_allclose(sometimes[late], always[late], atol=1e-15)
+    np.testing.assert_allclose(sometimes[~late], linear.place(body)[~late], atol=1e-15)
+
+
+def test_torque_is_that_of_the_robot(linear, setting):
+    np.testing.assert_allclose(linear.torque, setting.torque, atol=1e-9)
+    np.testing.assert_allclose(linear.poses, setting.poses, atol=1e-12)

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import date, timedelta
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.blind.cases import LISTED, Case, Several
 from thermal_robot.blind.reality.fault import FAULTS, Fault
-from thermal_robot.blind.reality.instrument import Instrument, Measured, measure, registered, write_folder
+from thermal_robot.blind.reality.instrument import Day, Instrument, measure, registered, write_folder
 from thermal_robot.blind.reality.setting import Setting, draw_setting, humidity
 from thermal_robot.blind.reality.sizes import (
     GROWS_ONLY,
@@ -30,15 +27,13 @@ from thermal_robot.blind.reality.sizes import (
     Unseen,
     deviation,
     draw_spot,
-    place,
     sized,
     truth,
 )
 from thermal_robot.blind.reality.unlisted import known
-from thermal_robot.blind.reality.world import World, anywhere
+from thermal_robot.blind.reality.world import Array, World, anywhere
 from thermal_robot.files import write_text
 
-Array = NDArray[np.float64]
 AtWork = list[tuple[Fault, Array]]
 
 
@@ -51,18 +46,15 @@ _VISITS = (2, 5)
 _NOISE = (10e-6, 30e-6)  # m, one sigma per axis
 _STATED = 0.85  # of cases: the file states the noise
 _SPOILT = (0.0, 0.03)  # share of rows
+_TARGET = ([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])  # m: in the tool frame
 _TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment to nearly Gauss' law
 
 
 def make(case: Case, folder: Path) -> dict[str, Any]:
     """Write a case's campaign, or its several campaigns, into a folder and return the answers.
 
-    Parameters
-    ----------
-    case
-        What is asked; everything that is drawn follows from its seed.
-    folder
-        Where campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers) go.
+    The folder gets campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers);
+    everything that is drawn follows from the case's seed.
 
     Returns
     -------
@@ -86,7 +78,7 @@ def make(case: Case, folder: Path) -> dict[str, Any]:
 def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
     main = [known(name, case.own) for name in (*case.effects, *([case.unlisted] if case.unlisted else ()))]
     wants = {*case.wants, *(want for fault in main for want in fault.wants)}
-    samples = int(rng.integers(case.samples[0], case.samples[1] + 1))
+    samples = _samples(case, rng)
     setting = draw_setting(
         world,
         samples,
@@ -105,15 +97,16 @@ def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -
     if case.ratio[0] > 1.0:  # of what is smaller than the noise nobody asks that it be told from the rest
         _require_apart(gauge, [(fault, values) for fault, values in done if fault.name in FAULTS], instrument.noise)
     background = _background(case, gauge, main, instrument.noise, rng)
-    seen, measured = write_day(folder, case, day, [*done, *background], rng, _gears(setting, done))
-    before, others = registered(setting, measured, gauge.rows, instrument), np.flatnonzero(~setting.given)
+    seen, measured, spoilt = measure(day, [*done, *background], rng)
+    write_folder(folder, case, day, measured, _gears(setting, done))
+    before = registered(day, measured[["x", "y", "z"]].to_numpy(), spoilt)
     return {
-        "truth": {**truth(case, gauge, done, background, instrument.noise), "outliers": list(measured.spoilt)},
+        "truth": {**truth(case, gauge, done, background, instrument.noise), "outliers": spoilt},
         "noise": instrument.noise,
         "samples": samples,
         "measures": "pose" if instrument.turning is not None else "position",
-        "fresh_position": seen[others].round(_DIGITS).tolist(),
-        "fresh_before": before[others].round(_DIGITS).tolist(),
+        "fresh_position": seen[~setting.given].round(_DIGITS).tolist(),
+        "fresh_before": before[~setting.given].round(_DIGITS).tolist(),
     }
 
 
@@ -140,7 +133,7 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
     base_known = "base_known" in wants or bool(rng.random() < 0.1)
     tool_known = "tool_known" in wants or bool(rng.random() < 0.1)
     pose = rng.random() < (1.0 if tool_known and "tool_known" in wants else 0.4)
-    target = rng.uniform([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])
+    target = rng.uniform(*_TARGET)
     return Instrument(
         pose=np.eye(4) if base_known else anywhere(rng, 3.0),
         target=target,
@@ -202,61 +195,24 @@ _SENSORS = ("robot", "links")
 """What may be recorded of the links: where only the air is, their lag would be another wall's each day."""
 
 
-@dataclass(frozen=True)
-class Habits:
-    """What is alike in all campaigns of a case: the instrument's noise (m, per axis), what is recorded of the links."""
+def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:
+    """Draw campaigns of positions; where base and target are nobody knows.
 
-    noise: float
-    stated: bool
-    sensor: str
-
-
-@dataclass(frozen=True, eq=False)
-class Day:
-    """One campaign: its day, its instrument, and the measure of displacements on its rows."""
-
-    setting: Setting
-    instrument: Instrument
-
-    @cached_property
-    def gauge(self) -> Gauge:
-        """Of the rows that are given."""
-        rows, known = np.flatnonzero(self.setting.given), self.instrument
-        return Gauge(self.setting, rows, known.target, not known.base_known, not known.tool_known)
-
-
-def draw_habits(rng: np.random.Generator) -> Habits:
-    """Draw what stays."""
-    return Habits(float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED), str(rng.choice(_SENSORS)))
-
-
-def draw_day(case: Case, world: World, habits: Habits, rng: np.random.Generator) -> Day:
-    """Draw a campaign of positions; where base and target are nobody knows."""
-    samples = int(rng.integers(case.samples[0], case.samples[1] + 1))
-    setting = draw_setting(world, samples, rng, sensor=habits.sensor)
-    target = rng.uniform([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])
-    pose, declared = anywhere(rng, 3.0), target + rng.uniform(-0.01, 0.01, 3)
-    spoilt = float(rng.choice(_SPOILT))
-    return Day(setting, Instrument(pose, target, declared, habits.noise, stated=habits.stated, spoilt=spoilt))
-
-
-def write_day(
-    folder: Path,
-    case: Case,
-    day: Day,
-    faults: AtWork,
-    rng: np.random.Generator,
-    gears: dict[str, float] | None = None,
-) -> tuple[Array, Measured]:
-    """Measure a robot with these faults on that day and write its campaign.
-
-    Returns where the target really is, (N, 3) m, and what was measured of the rows that are given.
+    Alike are the instrument's noise, whether it is stated, and what is recorded of the links.
     """
-    seen, turned = place(day.setting, faults, day.instrument.target, day.instrument.pose)
-    rows, others = day.gauge.rows, np.flatnonzero(~day.setting.given)
-    measured = measure(seen, turned, rows, day.instrument, rng)
-    write_folder(folder, case, day.setting, measured, rows, others, day.instrument, gears)
-    return seen, measured
+    noise, stated = float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED)
+    sensor, days = str(rng.choice(_SENSORS)), []
+    for _ in range(count):
+        setting = draw_setting(world, _samples(case, rng), rng, sensor=sensor)
+        target = rng.uniform(*_TARGET)
+        pose, declared = anywhere(rng, 3.0), target + rng.uniform(-0.01, 0.01, 3)
+        spoilt = float(rng.choice(_SPOILT))
+        days.append(Day(setting, Instrument(pose, target, declared, noise, stated=stated, spoilt=spoilt)))
+    return days
+
+
+def _samples(case: Case, rng: np.random.Generator) -> int:
+    return int(rng.integers(case.samples[0], case.samples[1] + 1))
 
 
 _HALLS = ("hall 1", "hall 2")
@@ -323,19 +279,18 @@ _LARGEST = 10.0  # × noise: a change that must leave more to be told is not ask
 def make_several(case: Case, several: Several, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
     """Write the campaigns of a case into a folder, and return its answers."""
     count = int(rng.integers(several.campaigns[0], several.campaigns[1] + 1))
-    habits = draw_habits(rng)
-    days = [draw_day(case, world, habits, rng) for _ in range(count)]
+    days = draw_days(case, world, count, rng)
     if case.kind == "fleet":
         labels, at_work, told = draw_fleet(case, several, days, rng)
     else:
         labels, at_work, told = _followed(case, several, days, rng)
     names = [f"{number + 1:02d}" for number in range(count)]
     for name, day, faults in zip(names, days, at_work, strict=True):
-        write_day(folder / name, case, day, faults, rng)
+        write_folder(folder / name, case, day, measure(day, faults, rng)[1])
     rows = [("campaign", *labels), *zip(names, *labels.values(), strict=True)]
     write_text(folder / LISTED, "".join(",".join(row) + "\n" for row in rows))
     whole, samples = {**told, "campaigns": count, "outliers": []}, sum(day.setting.samples for day in days)
-    return {"truth": whole, "noise": habits.noise, "samples": samples, "measures": "position"}
+    return {"truth": whole, "noise": days[0].instrument.noise, "samples": samples, "measures": "position"}
 
 
 def _followed(

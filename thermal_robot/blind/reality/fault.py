@@ -1,4 +1,4 @@
-"""What a fault is: how large it is drawn, what it does, which answers about it are right; and those of formats.md."""
+"""Faults: how large each is drawn, what it does, which answers about it are right; and those of formats.md."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.world import Body
-
-Array = NDArray[np.float64]
-
+from thermal_robot.blind.reality.world import Array, Body
 
 Place = tuple[str, str]
 Draw = Callable[[Setting, np.random.Generator], Array]
-Act = Callable[[Body, Setting, Array], None]
+Does = Callable[[Setting, Array], Array]
+"""(setting, values) → what a fault does in each row."""
 Quantities = Callable[[Setting, Sequence[Place]], Sequence[str]]
+Known = Callable[[Setting, Array], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Fault:
     wants
         What the campaign must be like: ``moving``, ``repeats``, ``sessions``, ``sensor:links``, ``base_known`` ...
     quantities
-        (setting) → names of columns, each a right answer to what it follows.
+        (setting, places) → names of columns, each a right answer to what it follows.
     random
         Whether it scatters anew at every visit.
     also
@@ -55,13 +53,13 @@ class Fault:
 
     name: str
     draw: Draw
-    act: Act
+    act: Callable[[Body, Setting, Array], None]
     places: Callable[[Setting], Sequence[Place]]
     few: bool = False
     wants: tuple[str, ...] = ()
     quantities: Quantities = lambda setting, places: ()
     random: bool = False
-    known_as: Callable[[Setting, Array], Mapping[str, float]] = lambda setting, values: {}
+    known_as: Known = lambda setting, values: {}
     also: tuple[tuple[str, tuple[int, ...]], ...] = ()
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
@@ -88,19 +86,29 @@ def parents(setting: Setting) -> list[Place]:
     return [("link", joint.parent) for joint in setting.world.chain]
 
 
-def base(setting: Setting) -> list[Place]:
-    """Return the base alone."""
-    return [("base", "base")]
+def adds(
+    to: str, name: str, draw: Draw, what: Does, places: Callable[[Setting], Sequence[Place]], **more: Any
+) -> Fault:
+    """Return a fault that adds something to one attribute of the body."""
+
+    def act(body: Body, setting: Setting, values: Array) -> None:
+        setattr(body, to, getattr(body, to) + what(setting, values))
+
+    return Fault(name, draw, act, places, **more)
 
 
-def tool(setting: Setting) -> list[Place]:
-    """Return the tool alone."""
-    return [("tool", "tool")]
+def in_joints(name: str, draw: Draw, err: Does, **more: Any) -> Fault:
+    """Return a fault of few joints, of an error in each row and joint, (N, n) or what broadcasts to it, rad or m."""
+    return adds("joints", name, draw, err, joints, few=True, **more)
 
 
-def in_joints(name: str, draw: Draw, act: Act, **more: Any) -> Fault:
-    """Return a fault of few joints."""
-    return Fault(name, draw, act, joints, few=True, **more)
+def at(where: str, name: str, draw: Draw, twist: Does, **more: Any) -> Fault:
+    """Return a fault of the ``base`` or the ``tool``, of (N, 6) or (1, 6) translations (m) and rotation vectors."""
+
+    def act(body: Body, setting: Setting, values: Array) -> None:
+        body.move(where, twist(setting, values))
+
+    return Fault(name, draw, act, **{"places": lambda setting: [(where, where)], **more})
 
 
 def own_position(setting: Setting, places: Sequence[Place]) -> list[str]:
@@ -127,47 +135,34 @@ def warmths(setting: Setting, places: Sequence[Place] = ()) -> list[str]:
     return ["temperature", *(f"temperature.{link}" for link in dict.fromkeys(setting.world.links))]
 
 
-def magnitude(values: Array) -> Array:
-    """Return (n,) the first of the numbers, without its sign."""
-    return np.abs(values[:, 0])
-
-
-def each_joint(label: str, of: Callable[[Array], Array] = magnitude) -> Callable[[Setting, Array], Mapping[str, float]]:
-    """Return one parameter a joint, its value a function of the (n, D) values."""
+def each_joint(label: str, of: Callable[[Array], Array] = lambda values: np.abs(values[:, 0])) -> Known:
+    """Return one parameter a joint: a function of the (n, D) values, the size of the first where it is left out."""
     return lambda setting, values: {
         f"{label}, {name}": float(value) for name, value in zip(setting.world.names, of(values), strict=True)
     }
 
 
-def twist(where: str) -> Callable[[Setting, Array], Mapping[str, float]]:
+def twist(where: str) -> Known:
     """Return the components of a twist in the first row of the values: translation, then rotation."""
     names = [f"{kind} {axis}, {where}" for kind in ("translation", "rotation") for axis in "xyz"]
     return lambda setting, values: dict(zip(names, values[0].tolist(), strict=True))
 
 
-def some(
-    size: float,
-    numbers: int = 1,
-    *,
-    first: bool = True,
-    last: bool = True,
-    positive: bool = False,
-    turning: bool = False,
-) -> Draw:
-    """Draw values for one to three joints; the first and last can be left out where frames would hide them.
+def some(size: float, numbers: int = 1, *, first: bool = True, positive: bool = False, turning: bool = False) -> Draw:
+    """Draw values for one to three joints but the last; the first is left out, too, where frames would hide it.
 
     ``turning`` leaves out those that slide.
     """
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
         n = setting.world.n
-        allowed = np.arange(0 if first else 1, n if last else n - 1)
+        allowed = np.arange(0 if first else 1, n - 1)
         if turning:
             allowed = allowed[~setting.world.slides[allowed]]
-        if not len(allowed):
-            return np.zeros((n, numbers))
-        chosen = rng.choice(allowed, min(int(rng.integers(1, 4)), len(allowed)), replace=False)
         values = np.zeros((n, numbers))
+        if not len(allowed):
+            return values
+        chosen = rng.choice(allowed, min(int(rng.integers(1, 4)), len(allowed)), replace=False)
         values[chosen] = size * rng.normal(size=(len(chosen), numbers))
         values[chosen[0]] += size * np.sign(values[chosen[0]])  # one of them is a real fault, not a draw near zero
         return np.abs(values) if positive else values
@@ -206,9 +201,21 @@ def within(low: float, high: float) -> Number:
     return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))
 
 
-def order(bounds: tuple[float, float]) -> Number:
-    """Draw an order evenly over its logarithm."""
-    return lambda setting, j, rng: float(np.exp(rng.uniform(*np.log(bounds))))
+def waves(name: str, orders: tuple[float, float]) -> Fault:
+    """Return the fault of one joint that errs by a wave of its own position, of an order drawn between two.
+
+    Teeth, balls or a motor's wheel come round; a joint that slides has rad/m. Evenly over the order's logarithm.
+    """
+
+    def ripple(setting: Setting, values: Array) -> Array:
+        size, order, phase = values.T
+        return np.asarray(size * np.sin(order * setting.q + phase))
+
+    def order(setting: Setting, j: int, rng: np.random.Generator) -> float:
+        return float(np.exp(rng.uniform(*np.log(orders))))
+
+    draw, fixed = one(milli, order, part(0.0, 2 * np.pi)), ((1, (1.0,)), (2, (0.0,)))
+    return in_joints(name, draw, ripple, quantities=own_position, fixed=fixed)
 
 
 # What these numbers rest on, and what of it is the trial's own choice: docs/blind.md, "What is shared".
@@ -224,46 +231,45 @@ _RATIOS = (30.0, 160.0)  # of gears, harmonic drives' among them
 _DELAY = (5e-4, 8e-3)  # s: half a cycle of a controller at 1 kHz, a whole one at 125 Hz
 _DRAG = (2e-5, 2e-4)
 """rad (m): what a loop without integral part leaves of dry friction, 1 to 10 N·m against 5e4 N·m/rad."""
+STEEL = 12e-6  # 1/K
+_SETTLES = (600.0, 72000.0)
+"""s, evenly over the logarithm. Fastest: ρ c d / h of a steel tube of 2 mm in still air, 3.6e6 · 0.002 / 12. Between:
+a laser tracker is stable two hours after it was switched on (Pollack Periodica 15 (3), 2020), three times 40 minutes.
+Slowest: 4 d² / (π² κ) of a concrete floor that is warm on one side, 0.35 m thick and with κ of 7e-7 m²/s."""
+_SPRINGS = (0.4, 1.6)  # of one another: what stands on a plate is up to four times as stiff about one axis; ours
+_DEPTHS = (0.0, 1.0)  # m: from the flange down to the floor under a pedestal
+_TEETH = (5.0, 200.0)  # a turn: of gear stages, teeth, balls and motors whose ratio nobody states
+_HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
-def offset(body: Body, setting: Setting, values: Array) -> None:
-    """Let each joint stand elsewhere by a constant."""
-    body.joints += values[:, 0]
-
-
-def gain(body: Body, setting: Setting, values: Array) -> None:
-    """Graduate each joint with too many lines a turn, from its zero on."""
-    body.joints += setting.q * values[:, 0]
-
-
-def wheels(body: Body, setting: Setting, values: Array) -> None:
+def _wheels(setting: Setting, values: Array) -> Array:
     """Read an angle on a disc whose centre is off, and turn an oval wheel: a ray of a circle, not a sine.
 
     The disc turns with the joint, or ``ratio`` times as fast with its motor.
     """
-    for j, (across, along, oval, phase, ratio) in enumerate(values):
-        angle = setting.q[:, j] * ratio
-        sine, cosine = np.sin(angle), np.cos(angle)
-        # the direction of the true mark from the centre that is off, seen from the mark itself
-        body.joints[:, j] += np.arctan2(along * sine - across * cosine, 1.0 - across * sine - along * cosine)
-        body.joints[:, j] += np.arctan2(oval * np.sin(2 * (angle + phase)), 1.0 + oval * np.cos(2 * (angle + phase)))
+    across, along, oval, phase, ratio = values.T
+    angle = setting.q * ratio
+    sine, cosine = np.sin(angle), np.cos(angle)
+    # the direction of the true mark from the centre that is off, seen from the mark itself
+    disc = np.arctan2(along * sine - across * cosine, 1.0 - across * sine - along * cosine)
+    return np.asarray(disc + np.arctan2(oval * np.sin(2 * (angle + phase)), 1.0 + oval * np.cos(2 * (angle + phase))))
 
 
-def draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
+def _draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
     """Draw how far discs are off, across and along, how oval wheels are, their phase (rad) and ratio.
 
     A joint that slides has no disc of its own, only its motor has: its ratio is in rad/m.
     """
     ratio = round(float(rng.uniform(*_RATIOS)), 2) if rng.random() < 0.2 else 1.0
-    values = some(1e-3, 5, last=False, turning=ratio == 1.0)(setting, rng)
+    values = some(1e-3, 5, turning=ratio == 1.0)(setting, rng)
     values[:, 2] *= rng.choice([0.0, 0.6])
     values[:, 3] = rng.uniform(0, np.pi)
     values[:, 4] = ratio
     return values
 
 
-def harmonics(setting: Setting, values: Array) -> dict[str, float]:
-    """Fourier's amplitudes of :func:`wheels`: a disc off by e adds eᵏ/k of order k, an oval one nearly order 2."""
+def _harmonics(setting: Setting, values: Array) -> dict[str, float]:
+    """Fourier's amplitudes of wheels: a disc off by e adds eᵏ/k of order k, an oval one nearly order 2."""
     found = {}
     for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
         disc = complex(along, -across)
@@ -274,41 +280,30 @@ def harmonics(setting: Setting, values: Array) -> dict[str, float]:
     return found
 
 
-def ripple(body: Body, setting: Setting, values: Array) -> None:
-    """Let teeth, balls or a motor's wheel come round: a wave of the joint's own position; one that slides has rad/m."""
-    size, order, phase = values.T
-    body.joints += size * np.sin(order * setting.q + phase)
-
-
-def waves(name: str, orders: tuple[float, float]) -> Fault:
-    """Return the fault of one joint that errs by a wave, of an order drawn between two."""
-    draw, fixed = one(milli, order(orders), part(0.0, 2 * np.pi)), ((1, (1.0,)), (2, (0.0,)))
-    return in_joints(name, draw, ripple, quantities=own_position, fixed=fixed)
-
-
-def play(body: Body, setting: Setting, values: Array) -> None:
+def _play(setting: Setting, values: Array) -> Array:
     """Lay teeth on the side to which the torque through them presses.
 
     A joint that arrived on its way s = ±1 is pushed there against dry friction F (N·m) while gravity wants the
     torque τ: its teeth carry τ + F s. The grease between them is pressed out gradually, over a share of F. One that
     has not moved yet, s = 0, stands in the middle of where the two ways would have left it.
     """
+    moved = np.zeros_like(setting.q)
     for j, (half, friction, soft) in enumerate(values):
-        if half == 0.0:
-            continue
-        load, way = setting.torque[:, j], setting.approach[:, j]
-        up, down = (np.tanh((load + side * friction) / (soft * friction)) for side in (1.0, -1.0))
-        body.joints[:, j] -= abs(half) * (up * (1.0 + way) + down * (1.0 - way)) / 2.0
+        if half:
+            load, way = setting.torque[:, j], setting.approach[:, j]
+            up, down = (np.tanh((load + side * friction) / (soft * friction)) for side in (1.0, -1.0))
+            moved[:, j] = -abs(half) * (up * (1.0 + way) + down * (1.0 - way)) / 2.0
+    return moved
 
 
-def draw_play(setting: Setting, rng: np.random.Generator) -> Array:
+def _draw_play(setting: Setting, rng: np.random.Generator) -> Array:
     """Draw half of each play, rad or m; friction, N·m or N; and the share of it over which teeth change sides.
 
     Gears of one arm are of one make and one grease: friction is one share of what each is built to hold, but for a
     fifth. Where gravity has its way in more than three rows of four, hardly anything is left of the play but an offset
     of the joint, that nobody can tell from one: such a share is not drawn.
     """
-    values = some(2e-4, 3, last=False, positive=True)(setting, rng)
+    values = some(2e-4, 3, positive=True)(setting, rng)
     size = ratings(setting) * np.exp(rng.normal(0.0, _ALIKE, setting.world.n))
     seldom = np.quantile(np.abs(setting.torque), _PLAYS, axis=0) / size
     least = np.append(seldom[values[:, 0] > 0.0], _FRICTION[0]).max()
@@ -332,15 +327,9 @@ def ratings(setting: Setting) -> Array:
     return np.maximum(held, _SMALLEST)
 
 
-def springs(body: Body, setting: Setting, values: Array) -> None:
-    """Put joints on springs."""
-    body.springs += np.abs(values[:, 0])
-
-
-def draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
+def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
     """Draw the compliance of every joint; now and then one worn gear among stiff ones."""
-    n = setting.world.n
-    values = np.abs(rng.normal(1.0, 0.5, (n, 1))) * 1e-5
+    values = np.abs(rng.normal(1.0, 0.5, (setting.world.n, 1))) * 1e-5
     if rng.random() < 0.4:  # one worn gear
         values *= 0.05
         loaded = np.argsort((setting.torque**2).mean(axis=0))[-3:]
@@ -348,7 +337,7 @@ def draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
     return values
 
 
-def servo(body: Body, setting: Setting, values: Array) -> None:
+def _servo(setting: Setting, values: Array) -> Array:
     """Follow the command late, dragged by dry friction.
 
     Of the delay T a share p is the loop's, which has a bandwidth, the rest the clock's, which is a dead time:
@@ -356,52 +345,35 @@ def servo(body: Body, setting: Setting, values: Array) -> None:
     """
     delay, friction, loop = values.T
     late = -setting.velocity * delay + setting.acceleration * (1.0 + loop**2) / 2.0 * delay**2
-    body.joints += late - friction * setting.approach
+    return np.asarray(late - friction * setting.approach)
 
 
-def lags(setting: Setting, values: Array) -> dict[str, float]:
+def _lags(setting: Setting, values: Array) -> dict[str, float]:
     """Delay, friction and what acceleration does, of each joint."""
     delay, friction, loop = values.T
-    names = setting.world.names
     each = (("delay", delay), ("friction", friction), ("effect of acceleration", (1.0 + loop**2) / 2.0 * delay**2))
-    return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(names, of, strict=True)}
+    return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(setting.world.names, of, strict=True)}
 
 
-def draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
+def _draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
     """Draw each joint's delay, s, what friction leaves, rad or m, and the loop's share of the delay."""
-    erring = some(1.0, last=False)(setting, rng) != 0.0
+    erring = some(1.0)(setting, rng) != 0.0
     low, high = np.log(np.array([_DELAY, _DRAG])).T
     values = np.exp(rng.uniform(low, high, (setting.world.n, 2)))
     return np.column_stack([values * erring, np.full(setting.world.n, rng.uniform())])
 
 
-def ticks(body: Body, setting: Setting, values: Array) -> None:
+def _ticks(setting: Setting, values: Array) -> Array:
     """Count in steps: the joint stands at the nearest one."""
-    for j, (step,) in enumerate(np.abs(values)):
-        if step:
-            body.joints[:, j] += np.round(setting.q[:, j] / step) * step - setting.q[:, j]
+    step = np.abs(values[:, 0])
+    known = np.where(step > 0.0, step, 1.0)
+    return np.where(step > 0.0, np.round(setting.q / known) * step - setting.q, 0.0)
 
 
-def scatter(body: Body, setting: Setting, values: Array) -> None:
+def _scatter(setting: Setting, values: Array) -> Array:
     """Scatter each joint anew at every visit: the same at any size, another in any campaign."""
     chance = np.random.default_rng(int(setting.time.sum() * 10) % 2**32)
-    body.joints += chance.normal(size=body.joints.shape) * np.abs(values[:, 0])
-
-
-STEEL = 12e-6  # 1/K
-_SETTLES = (600.0, 72000.0)
-"""s, evenly over the logarithm. Fastest: ρ c d / h of a steel tube of 2 mm in still air, 3.6e6 · 0.002 / 12. Between:
-a laser tracker is stable two hours after it was switched on (Pollack Periodica 15 (3), 2020), three times 40 minutes.
-Slowest: 4 d² / (π² κ) of a concrete floor that is warm on one side, 0.35 m thick and with κ of 7e-7 m²/s."""
-_SPRINGS = (0.4, 1.6)  # of one another: what stands on a plate is up to four times as stiff about one axis; ours
-_DEPTHS = (0.0, 1.0)  # m: from the flange down to the floor under a pedestal
-_TEETH = (5.0, 200.0)  # a turn: of gear stages, teeth, balls and motors whose ratio nobody states
-_HOLDS = 1e9  # N·m: friction against which no gravity helps
-
-
-def _manufacture(body: Body, setting: Setting, values: Array) -> None:
-    # the errors of manufacture are there before anything else, and stay
-    body.placements = body.placements + values
+    return np.asarray(chance.normal(size=setting.q.shape) * np.abs(values[:, 0]))
 
 
 def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
@@ -412,50 +384,31 @@ def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
     return np.asarray(values)
 
 
-def _beams(body: Body, setting: Setting, values: Array) -> None:
-    body.beams += np.abs(values)
-
-
-def _warm(body: Body, setting: Setting, values: Array) -> None:
-    body.growth += values[:, 0] * (setting.links - 20.0)
-
-
-def _bow(body: Body, setting: Setting, values: Array) -> None:
-    """The sun or a motor warms one side: the flanks differ as the link differs from the hall."""
-    body.bow += (setting.links - setting.air[:, None])[:, :, None] * values[None]
-
-
-def _creep(body: Body, setting: Setting, values: Array) -> None:
-    """A stand or floor warms through towards a hall that has changed: Newton's law of cooling."""
-    grown = -np.expm1(-(setting.time - setting.time[0]) / values[0, 6])
-    body.move("base", grown[:, None] * values[0, :6])
-
-
-def _draw_creep(setting: Setting, rng: np.random.Generator) -> Array:
-    return np.append(1e-4 * rng.normal(size=6), np.exp(rng.uniform(*np.log(_SETTLES))))[None]
-
-
 def _strains(setting: Setting, values: Array) -> dict[str, float]:
     """Only where each link's temperature is recorded: another sensor's kelvin is not the link's."""
     if setting.sensor != "links":
         return {}
-    world = setting.world
-    placed = zip(world.segments, values[:, 0], strict=True)
-    joints = ((world.chain[k], float(value)) for k, value in placed)
-    return {f"strain per kelvin of {joint.name}, {joint.parent}": value for joint, value in joints}
+    placed = zip((setting.world.chain[k] for k in setting.world.segments), values[:, 0], strict=True)
+    return {f"strain per kelvin of {joint.name}, {joint.parent}": float(value) for joint, value in placed}
 
 
-def _crept(setting: Setting, values: Array) -> dict[str, float]:
+def _creep(setting: Setting, values: Array) -> Array:
+    """A stand or floor warms through towards a hall that has changed: Newton's law of cooling."""
+    grown = -np.expm1(-(setting.time - setting.time[0]) / values[0, 6])
+    return np.asarray(grown[:, None] * values[0, :6])
+
+
+def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
     """How far the base has gone in the last row that was measured."""
     last = setting.time[setting.given][-1] - setting.time[0]
-    return dict(twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6])))
+    return twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6]))
 
 
-def _tip(body: Body, setting: Setting, values: Array) -> None:
+def _tip(setting: Setting, values: Array) -> Array:
     """A base on springs turns under the moment of all weights, about a point on the vertical through its origin."""
     springs, depth = np.abs(values[0, :2]), values[0, 2]
     turn = np.column_stack([setting.overturning[:, :2] * springs, np.zeros(setting.samples)])
-    body.move("base", np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn]))
+    return np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn])
 
 
 def _draw_tip(setting: Setting, rng: np.random.Generator) -> Array:
@@ -475,97 +428,127 @@ def _tipped(setting: Setting, values: Array) -> dict[str, float]:
     return found
 
 
-def _scale(body: Body, setting: Setting, values: Array) -> None:
-    body.scale += float(values[0, 0])
-
-
-def _misplaced(where: str) -> Callable[[Body, Setting, Array], None]:
-    def act(body: Body, setting: Setting, values: Array) -> None:
-        body.move(where, np.repeat(values, setting.samples, axis=0))
-
-    return act
-
-
 def _rigid(setting: Setting, rng: np.random.Generator) -> Array:
     return np.asarray(2e-3 * rng.normal(size=(1, 6)))
 
 
-def _draw_bow(setting: Setting, rng: np.random.Generator) -> Array:
-    return np.asarray(1e-4 * rng.normal(size=(len(setting.world.segments), 2)))
-
-
-def _signed(values: Array) -> Array:
-    return values[:, 0]
-
-
-def _all_segments(size: float, spread: tuple[float, float], numbers: int = 1) -> Callable[..., Array]:
+def _all_segments(size: float, spread: tuple[float, float], numbers: int = 1) -> Draw:
     return lambda setting, rng: size * rng.uniform(*spread, (len(setting.world.segments), numbers))
 
 
+def _always(setting: Setting, values: Array) -> Array:
+    return values
+
+
+def _signed(values: Array) -> Array:
+    return np.asarray(values[:, 0])
+
+
 _ALL = (
-    Fault("base_frame", _rigid, _misplaced("base"), base, wants=("base_known",), known_as=twist("base")),
-    Fault("tool_frame", _rigid, _misplaced("tool"), tool, wants=("tool_known",)),
-    in_joints("joint_offset", some(1e-3, first=False, last=False), offset, known_as=each_joint("zero offset", _signed)),
+    at("base", "base_frame", _rigid, _always, wants=("base_known",), known_as=twist("base")),
+    at("tool", "tool_frame", _rigid, _always, wants=("tool_known",)),
+    # each joint stands elsewhere by a constant
     in_joints(
-        "joint_gain", some(1e-3, last=False), gain, quantities=own_position, known_as=each_joint("gain error", _signed)
+        "joint_offset", some(1e-3, first=False), lambda s, v: v[:, 0], known_as=each_joint("zero offset", _signed)
+    ),
+    # each joint is graduated with too many lines a turn, from its zero on
+    in_joints(
+        "joint_gain",
+        some(1e-3),
+        lambda s, v: s.q * v[:, 0],
+        quantities=own_position,
+        known_as=each_joint("gain error", _signed),
     ),
     in_joints(
         "transmission_error",
-        draw_wheels,
-        wheels,
+        _draw_wheels,
+        _wheels,
         quantities=own_position,
-        known_as=harmonics,
+        known_as=_harmonics,
         fixed=((3, (0.0, np.pi / 4)), (4, (1.0,))),
     ),
     waves("joint_ripple", _TEETH),
     in_joints(
         "backlash",
-        draw_play,
-        play,
+        _draw_play,
+        _play,
         quantities=lambda s, places: [f"approach.{name}" for _, name in places],
-        known_as=each_joint("lost motion", lambda values: 2.0 * magnitude(values)),
+        known_as=each_joint("lost motion", lambda values: 2.0 * np.abs(values[:, 0])),
         fixed=((1, (_HOLDS,)), (2, (0.05,))),
     ),
-    Fault("joint_compliance", draw_springs, springs, joints, quantities=weights, known_as=each_joint("compliance")),
+    adds(
+        "springs",
+        "joint_compliance",
+        _draw_springs,
+        lambda s, v: np.abs(v[:, 0]),
+        joints,
+        quantities=weights,
+        known_as=each_joint("compliance"),
+    ),
     in_joints(
         "tracking_lag",
-        draw_servo,
-        servo,
+        _draw_servo,
+        _servo,
         wants=("moving",),
         quantities=lambda s, places: [f"velocity.{n}" for _, n in places] + [f"approach.{n}" for _, n in places],
         # a step of dry friction against the way is what formats.md calls lost motion
         also=(("backlash", (1,)),),
-        known_as=lags,
+        known_as=_lags,
         fixed=((2, (0.0, 1.0)),),
     ),
-    Fault("geometric", _draw_manufacture, _manufacture, parents, quantities=lambda s, places: s.world.names),
-    Fault("link_compliance", _all_segments(1e-6, (0.4, 1.6), 2), _beams, segments, quantities=weights),
-    Fault(
+    # the errors of manufacture are there before anything else, and stay
+    adds("placements", "geometric", _draw_manufacture, _always, parents, quantities=lambda s, places: s.world.names),
+    adds(
+        "beams",
+        "link_compliance",
+        _all_segments(1e-6, (0.4, 1.6), 2),
+        lambda s, v: np.abs(v),
+        segments,
+        quantities=weights,
+    ),
+    adds(
+        "growth",
         "thermal_elongation",
         _all_segments(STEEL, (0.7, 1.7)),
-        _warm,
+        lambda s, v: v[:, 0] * (s.links - 20.0),
         segments,
         wants=("temperature",),
         quantities=warmths,
         known_as=_strains,
     ),
-    Fault("thermal_bending", _draw_bow, _bow, segments, wants=("sensor:links",), quantities=warmths),
-    Fault("drift", _draw_creep, _creep, base, quantities=clock, known_as=_crept, fixed=((6, (1e3, 5e3, 1e6)),)),
-    Fault("base_compliance", _draw_tip, _tip, base, quantities=weights, known_as=_tipped, fixed=((2, (0.0, 1.0)),)),
-    Fault(
+    # the sun or a motor warms one side: the flanks differ as the link differs from the hall
+    adds(
+        "bow",
+        "thermal_bending",
+        lambda s, rng: 1e-4 * rng.normal(size=(len(s.world.segments), 2)),
+        lambda s, v: (s.links - s.air[:, None])[:, :, None] * v[None],
+        segments,
+        wants=("sensor:links",),
+        quantities=warmths,
+    ),
+    at(
+        "base",
+        "drift",
+        lambda s, rng: np.append(1e-4 * rng.normal(size=6), np.exp(rng.uniform(*np.log(_SETTLES))))[None],
+        _creep,
+        quantities=clock,
+        known_as=_crept,
+        fixed=((6, (1e3, 5e3, 1e6)),),
+    ),
+    at("base", "base_compliance", _draw_tip, _tip, quantities=weights, known_as=_tipped, fixed=((2, (0.0, 1.0)),)),
+    adds(
+        "scale",
         "instrument_scale",
         lambda s, rng: np.array([[rng.choice([-1e-4, 1e-4])]]),
-        _scale,
+        lambda s, v: v[0, 0].item(),
         lambda s: [],
         known_as=lambda s, values: {"scale error, instrument": float(values[0, 0])},
     ),
-    in_joints(
-        "encoder_resolution", some(2e-4, last=False, positive=True), ticks, random=True, known_as=each_joint("step")
-    ),
+    in_joints("encoder_resolution", some(2e-4, positive=True), _ticks, random=True, known_as=each_joint("step")),
     in_joints(
         "excess_repeatability",
-        some(1e-4, last=False, positive=True),
-        scatter,
+        some(1e-4, positive=True),
+        _scatter,
         wants=("repeats",),
         random=True,
         known_as=each_joint("standard deviation"),

@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from thermal_robot.blind.reality.world import World
-
-Array = NDArray[np.float64]
-
+from thermal_robot.blind.reality.world import Array, World
 
 _PAUSE = 1.0  # s between two steps in which warmth is integrated
 _HOLDS = (2.4e6, 3.8e6)  # J/(m³ K), heat capacity by volume: aluminium 2.4e6, cast iron 3.3e6, steel 3.8e6
@@ -70,37 +67,27 @@ class Setting:
 
     Attributes
     ----------
-    world
-        The robot.
     given
         (N,) whether a row is measured; the others are commands of which a prediction is asked: the same day over again,
         spent on other poses.
     q, velocity, acceleration
         (N, n) joint positions at the instant of measurement, and how they change there (zero where it stands still).
-    time
-        (N,) s.
+    time, payload, speed
+        (N,) s, kg, and fraction of the maximum.
     approach
         (N, n) sign of the last move of each joint; 0 where it has not moved yet.
-    payload
-        (N,) kg.
     air, links
         (N,) temperature of the hall and (N, S) of each segment's link, °C.
     sensor
         What is recorded of it: ``robot`` (one sensor on the robot), ``links`` (one on each) or ``air``.
     moving
         Whether poses are measured in passing.
-    pose
-        (N,) number of the commanded pose where poses are repeated, else ``None``.
-    session
-        (N,) number of the session, or ``None``.
-    speed
-        (N,) fraction of the maximum.
+    pose, session
+        (N,) number of the commanded pose where poses are repeated, and of the session, or ``None``.
     extra
         Further columns by name, (N,) each.
-    torque
-        (N, n) what holds the sound robot's joints, N·m.
-    poses
-        (N, 4, 4) of the sound robot's tool frame.
+    torque, poses
+        (N, n) what holds the sound robot's joints, N·m, and (N, 4, 4) poses of its tool frame.
     """
 
     world: World

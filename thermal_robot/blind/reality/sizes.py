@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.fault import FAULTS, Fault, Place
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.world import Slopes, World, free_columns, slopes
-
-Array = NDArray[np.float64]
-
+from thermal_robot.blind.reality.world import Array, Slopes, World, free_columns, slopes
 
 _ROUNDS = 8
 _NEAR = 0.01  # of a size, as a share of it
@@ -29,18 +26,14 @@ class Unseen(Exception):
 
 @dataclass
 class Gauge:
-    """Measures displacements of the target on the rows that are given to the diagnosis.
+    """Measures displacements of the target on the (M,) rows that are given to the diagnosis.
 
     Attributes
     ----------
-    setting
-        The campaign's day.
-    rows
-        (M,) the rows.
     target
         (3,) the target in the tool frame, m.
-    frames
-        (3M, F) columns of the frames that are unknown.
+    base, tool
+        Whether these frames are unknown: what they can do leaves nothing.
     """
 
     setting: Setting

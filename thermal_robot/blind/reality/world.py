@@ -69,8 +69,8 @@ class Joint:
     xyz: Array
     rpy: Array
     axis: Array
-    lower: float
-    upper: float
+    lower: float = -np.inf
+    upper: float = np.inf
     mimic: tuple[str, float, float] | None = None
 
     @property
@@ -87,6 +87,11 @@ class Joint:
     def held(self) -> float:
         """Where a joint that is not commanded stands: 0, or its limit nearest to 0."""
         return float(np.clip(0.0, self.lower, self.upper))
+
+    def displaced(self, error: Array) -> tuple[Array, Array]:
+        """(3,) shift and (3, 3) rotation in the parent link of a placement that errs by (6,) m and rotation vector."""
+        rotation, motion = rpy_matrix(self.rpy), from_vector(error[None])[0]
+        return rotation @ motion[:3, 3], rotation @ motion[:3, :3]
 
 
 @dataclass(frozen=True)
@@ -115,14 +120,12 @@ class Tree:
 
 def read(text: str) -> Tree:
     """Read URDF text; meshes and everything that has no part in statics are passed over."""
-    text = re.sub(r"<\?xml[^>]*\?>", "", text)
-    robot = ElementTree.fromstring(text.strip())
+    robot = ElementTree.fromstring(re.sub(r"<\?xml[^>]*\?>", "", text).strip())
     mass, centre = {}, {}
     for link in robot.findall("link"):
-        name, inertial = str(link.attrib["name"]), link.find("inertial")
-        weight = None if inertial is None else inertial.find("mass")
+        name, weight = link.attrib["name"], link.find("inertial/mass")
         mass[name] = 0.0 if weight is None else float(weight.attrib["value"])
-        centre[name] = np.zeros(3) if inertial is None else _numbers(inertial.find("origin"), "xyz")
+        centre[name] = _numbers(link.find("inertial/origin"), "xyz")
     joints = {j.child: j for j in map(_joint, robot.findall("joint"))}
     root = next(name for name in mass if name not in joints)
     ordered: list[Joint] = []
@@ -136,30 +139,30 @@ def read(text: str) -> Tree:
 
 
 def _joint(node: ElementTree.Element) -> Joint:
-    axis = _numbers(node.find("axis"), "xyz") if node.find("axis") is not None else np.array([1.0, 0, 0])
-    limit, mimic, kind = node.find("limit"), node.find("mimic"), node.attrib["type"]
-    bounded = limit is not None and kind in ("revolute", "prismatic")
-    parent, child = node.find("parent"), node.find("child")
-    assert parent is not None  # a URDF joint has both
-    assert child is not None
+    part = {name: node.find(name) for name in ("parent", "child", "origin", "limit", "mimic")}
+    told = {name: {} if found is None else found.attrib for name, found in part.items()}
+    axis, limit, mimic, kind = (
+        _numbers(node.find("axis"), "xyz", "1 0 0"),
+        told["limit"],
+        told["mimic"],
+        node.attrib["type"],
+    )
+    bounds = {side: float(limit.get(side, 0.0)) for side in ("lower", "upper")}
     return Joint(
         name=node.attrib["name"],
         kind=kind,
-        parent=parent.attrib["link"],
-        child=child.attrib["link"],
-        xyz=_numbers(node.find("origin"), "xyz"),
-        rpy=_numbers(node.find("origin"), "rpy"),
+        parent=told["parent"]["link"],
+        child=told["child"]["link"],
+        xyz=_numbers(part["origin"], "xyz"),
+        rpy=_numbers(part["origin"], "rpy"),
         axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
-        lower=float(limit.get("lower", 0.0)) if bounded and limit is not None else -np.inf,
-        upper=float(limit.get("upper", 0.0)) if bounded and limit is not None else np.inf,
-        mimic=None
-        if mimic is None
-        else (mimic.attrib["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))),
+        mimic=(mimic["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))) if mimic else None,
+        **(bounds if part["limit"] is not None and kind in ("revolute", "prismatic") else {}),
     )
 
 
-def _numbers(node: ElementTree.Element | None, name: str) -> Array:
-    written = "0 0 0" if node is None else node.get(name, "0 0 0")
+def _numbers(node: ElementTree.Element | None, name: str, absent: str = "0 0 0") -> Array:
+    written = absent if node is None else node.get(name, "0 0 0")
     return np.array(written.split(), dtype=float)
 
 
@@ -176,19 +179,16 @@ class Body:
 
     Attributes
     ----------
-    joints
-        (N, n) by how much each joint stands elsewhere than commanded, rad or m.
-    springs
-        (n,) compliance of each joint, rad/(N·m).
-    beams
-        (S, 2) bending compliance 1/(E I) of each segment about its two cross axes, 1/(N·m²).
-    bow
-        (N, S, 2) curvature that each segment has by itself about the same axes, 1/m.
+    joints, springs
+        (N, n) by how much each joint stands elsewhere than commanded, rad or m; (n,) its compliance, rad/(N·m).
+    beams, bow
+        (S, 2) bending compliance 1/(E I) of each segment about its two cross axes, 1/(N·m²); (N, S, 2) curvature that
+        it has by itself about the same axes, 1/m.
     growth
         (N, S) relative growth of each segment.
     placements
-        (N, S', 6) or (S', 6) displacement of the placements of the joints of the chain (m, then rotation vector), in
-        their own frames; S' counts every joint of the chain.
+        (N, S', 6) or (S', 6) displacement of the placements of the S' joints of the chain (m, then rotation vector), in
+        their own frames.
     base, tool
         (N, 4, 4) motion of the base as seen by the instrument, of the target on the tool frame.
     scale
@@ -207,24 +207,12 @@ class Body:
 
     def take(self, rows: NDArray[np.int64]) -> Body:
         """Return the same over some of the rows."""
-        placements = self.placements if self.placements.ndim == 2 else self.placements[rows]
-        return replace(
-            self,
-            joints=self.joints[rows],
-            bow=self.bow[rows],
-            growth=self.growth[rows],
-            placements=placements,
-            base=self.base[rows],
-            tool=self.tool[rows],
-        )
+        each = {name: getattr(self, name)[rows] for name in ("joints", "bow", "growth", "base", "tool")}
+        return replace(self, **each, placements=self.placements[rows] if self.placements.ndim == 3 else self.placements)
 
     def move(self, where: str, twists: Array) -> None:
         """Move the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
-        motion = from_vector(twists)
-        if where == "base":
-            self.base = self.base @ motion
-        else:
-            self.tool = self.tool @ motion
+        setattr(self, where, getattr(self, where) @ from_vector(twists))
 
 
 class World:
@@ -232,19 +220,15 @@ class World:
 
     Parameters
     ----------
-    urdf
-        XML text.
-    tool_frame
-        Link that carries the target.
+    urdf, tool_frame
+        XML text, and the link that carries the target.
     payload_com
         (3,) centre of mass of what it carries, in the tool frame, m.
 
     Attributes
     ----------
-    joints
-        The n joints of the chain that are commanded.
-    chain
-        All its joints, fixed ones and those that follow another one too.
+    joints, chain
+        The n joints of the chain that are commanded; all its joints, fixed ones and those that follow another one too.
     coupling, rest
         (m, n) and (m,) where the m movable joints of the chain stand, those that follow another one among them:
         coupling · q + rest.
@@ -263,11 +247,12 @@ class World:
         self.names = tuple(j.name for j in self.joints)
         self.slides = np.array([j.kind == "prismatic" for j in self.joints])
         self.segments = tuple(k for k, j in enumerate(self.chain) if np.linalg.norm(j.xyz) > _SHORTEST)
-        self.links = tuple(self.chain[k].parent for k in self.segments)
+        self.grown = tuple(self.chain[k] for k in self.segments)
+        self.links = tuple(joint.parent for joint in self.grown)
         self.lower = np.array([j.lower for j in self.joints])
         self.upper = np.array([j.upper for j in self.joints])
         self.n = len(self.joints)
-        self.pieces = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
+        self.pieces = np.array([np.linalg.norm(joint.xyz) for joint in self.grown]) / NODES
         self.coupling, self.rest = self._coupling()
         self._com = payload_com
         self._sound: dict[bool, mujoco.MjModel] = {}
@@ -311,9 +296,9 @@ class World:
         model = copy(self.compile(bending, body.placements if body.placements.ndim == 2 else None))
         data = mujoco.MjData(model)
         tool = model.body(f"link:{self.tool_frame}").id
-        carried = model.body("payload").id
         address = self.address(model)
-        steps = [self._steps(model, k, bending) for k in self.segments]
+        pieces_of = [[f"{j.name}/{node}" for node in range(NODES * bending)] + [f"link:{j.child}"] for j in self.grown]
+        steps = [[int(model.body(name).id) for name in names] for names in pieces_of]
         rest = model.body_pos.copy()
         nodes = self.nodes(model) if bending else np.zeros((0, 2, NODES), dtype=int)
         pieces = self.pieces[: len(nodes)]
@@ -322,13 +307,9 @@ class World:
         compliance[np.ix_(address, address)] = (self.coupling * body.springs) @ self.coupling.T
         compliance[nodes, nodes] = (body.beams[: len(nodes)] * pieces[:, None])[:, :, None]
         poses, torque = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros((len(q), self.n))
-        heaviness = np.nan
         each = body.placements if body.placements.ndim == 3 else None
         for i in range(len(q)):
-            if payload[i] != heaviness:
-                heaviness = payload[i]
-                model.body_mass[carried] = heaviness
-                mujoco.mj_setConst(model, data)
+            _carry(model, data, payload[i])
             model.body_pos[:] = rest
             for s, ids in enumerate(steps):
                 model.body_pos[ids] = rest[ids] * (1.0 + body.growth[i, s])
@@ -344,10 +325,10 @@ class World:
         """(N, 3) moment about the root frame's origin, N·m, of the weight of all links and of the payload."""
         model = copy(self.compile(False, None))  # its payload changes
         data = mujoco.MjData(model)
-        carried, address = model.body("payload").id, self.address(model)
+        address = self.address(model)
         moments = np.empty((len(q), 3))
         for i in range(len(q)):
-            model.body_mass[carried] = payload[i]
+            _carry(model, data, payload[i])
             data.qpos[address] = self.coupling @ q[i] + self.rest
             mujoco.mj_kinematics(model, data)
             moments[i] = np.cross(model.body_mass @ data.xipos, model.opt.gravity)
@@ -372,11 +353,10 @@ class World:
         bodies = {self.tree.root: self._body(spec.worldbody, self.tree.root, np.zeros(3), np.eye(3))}
         for joint in self.tree.joints:
             k = in_chain.get(joint.name)
-            rotation, offset = rpy_matrix(joint.rpy), joint.xyz
+            offset, rotation = joint.xyz, rpy_matrix(joint.rpy)
             if k is not None and placements is not None:
-                error = from_vector(placements[k][None])[0]
-                offset = offset + rotation @ error[:3, 3]
-                rotation = rotation @ error[:3, :3]
+                shift, rotation = joint.displaced(placements[k])
+                offset = offset + shift
             parent = bodies[joint.parent]
             if bending and k in self.segments:
                 parent = self._beam(parent, joint, offset)
@@ -426,30 +406,25 @@ class World:
                 parent.add_joint(name=name, type=kind, axis=vector, armature=_ROTOR)
         return parent
 
-    def _steps(self, model: mujoco.MjModel, k: int, bending: bool) -> list[int]:
-        joint = self.chain[k]
-        names = [f"{joint.name}/{node}" for node in range(NODES)] if bending else []
-        return [int(model.body(name).id) for name in (*names, f"link:{joint.child}")]
-
     def nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
         """(S, 2, NODES) addresses of the hinges of the beams."""
-        return np.array(
-            [
-                [
-                    [int(model.joint(f"{self.chain[k].name}/{node}/{axis}").qposadr[0]) for node in range(NODES)]
-                    for axis in (0, 1)
-                ]
-                for k in self.segments
-            ]
-        )
+        names = [[[f"{j.name}/{node}/{axis}" for node in range(NODES)] for axis in (0, 1)] for j in self.grown]
+        return np.array([[[int(model.joint(n).qposadr[0]) for n in line] for line in pair] for pair in names])
 
     def _place(self, model: mujoco.MjModel, placements: Array) -> None:
         """Displace placements of this row; a fault that comes and goes cannot be compiled once for all."""
-        for k, joint in enumerate(self.chain):
-            body, rotation = model.body(f"link:{joint.child}").id, rpy_matrix(joint.rpy)
-            error = from_vector(placements[k][None])[0]
-            model.body_pos[body] += rotation @ error[:3, 3]
-            model.body_quat[body] = quaternion(rotation @ error[:3, :3])
+        for joint, error in zip(self.chain, placements, strict=True):
+            body, (shift, rotation) = model.body(f"link:{joint.child}").id, joint.displaced(error)
+            model.body_pos[body] += shift
+            model.body_quat[body] = quaternion(rotation)
+
+
+def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
+    """Let the tool carry so many kg."""
+    carried = model.body("payload").id
+    if model.body_mass[carried] != payload:
+        model.body_mass[carried] = payload
+        mujoco.mj_setConst(model, data)
 
 
 def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
@@ -487,22 +462,17 @@ def cross_axes(direction: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the target's place in the root frame, M rows.
+    """Derivatives of the target's place in the root frame, M rows, about the sound robot.
 
     Attributes
     ----------
-    poses
-        (M, 4, 4) of the sound robot's tool frame.
-    target
-        (3,) in it, m.
-    joints
-        (M, 3, n) by each joint that is commanded, with all that follow it.
-    torque
-        (M, n) what holds them, N·m.
-    placements
-        (M, 3, S', 6) by the placement of each joint of the chain, in its own frame.
-    growth
-        (M, 3, S) by the relative growth of each segment.
+    poses, target
+        (M, 4, 4) of the tool frame, and (3,) the target in it, m.
+    joints, torque
+        (M, 3, n) by each joint that is commanded, with all that follow it; (M, n) what holds them, N·m.
+    placements, growth
+        (M, 3, S', 6) by the placement of each joint of the chain, in its own frame; (M, 3, S) by the relative growth
+        of each segment.
     bow, sag
         (M, 3, S, 2) by the curvature of each segment, 1/m, and by its bending compliance, 1/(N·m²).
     """
@@ -535,13 +505,9 @@ def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
     model = copy(world.compile(True, None))  # its payload changes
     data = mujoco.MjData(model)
     address, nodes = world.address(model), world.nodes(model)
-    tool, carried = model.body(f"link:{world.tool_frame}").id, model.body("payload").id
-    rows, heaviness = [], np.nan
+    tool, rows = model.body(f"link:{world.tool_frame}").id, []
     for command, weight in zip(q, payload, strict=True):
-        if weight != heaviness:
-            heaviness = weight
-            model.body_mass[carried] = weight
-            mujoco.mj_setConst(model, data)
+        _carry(model, data, weight)
         data.qpos[:] = 0.0
         data.qpos[address] = world.coupling @ command + world.rest
         held = _held(model, data)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from thermal_robot.blind.judged import KNOWN
 from thermal_robot.blind.report import text
+from thermal_robot.blind.report.text import Plain
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
@@ -50,20 +51,10 @@ _GROUPS = {
 }
 
 
-def confusion_figure(score: Mapping[str, Any], which: str = "single") -> Figure:
-    """Draw how often each truth was answered by each name.
+def confusion_figure(score: Plain, which: str = "single") -> Figure:
+    """Draw the confusion matrix of a table of the score: how often each truth was answered by each name.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-    which
-        Name of a table of its ``confusion``.
-
-    Returns
-    -------
-    Figure
-        Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
+    Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
     """
     table = score["confusion"].get(which)
     if table is None:
@@ -72,9 +63,9 @@ def confusion_figure(score: Mapping[str, Any], which: str = "single") -> Figure:
     figure = Drawing(2.3 + 0.37 * len(columns), 1.9 + 0.3 * len(rows))
     axes = figure.subplots()
     for line, (name, counts) in enumerate(zip(rows, table["counts"], strict=True)):
-        total = sum(counts)
+        total, answer = sum(counts), "unexplained" if name == "unlisted" or which == "removed" else name
         for column, number in enumerate(counts):
-            right = columns[column] == _right(name, which)
+            right = columns[column] == answer
             axes.add_patch(_cell(column, line, number / total, right))
             if number:
                 colour = PAPER if number / total > _DARK else INK
@@ -97,10 +88,6 @@ def confusion_figure(score: Mapping[str, Any], which: str = "single") -> Figure:
     return figure
 
 
-def _right(row: str, which: str) -> str:
-    return "unexplained" if row == "unlisted" or which == "removed" else row
-
-
 def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
     edge = INK if right else FAINT
     cell = Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, edgecolor=edge, linewidth=1.0 if right else 0.5)
@@ -110,13 +97,10 @@ def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
     return cell
 
 
-def calibration_figure(score: Mapping[str, Any]) -> Figure:
-    """Draw how often effects were at work against how probable they were said to be, and how many there were.
+def calibration_figure(score: Plain) -> Figure:
+    """Draw the reliability diagram: how often effects were at work against how probable they were said to be.
 
-    Returns
-    -------
-    Figure
-        Above, for each bin of probabilities, the share that was at work with its 95 % bar; below, how many there were.
+    Above, for each bin of probabilities, the share with its 95 % bar; below, how many effects there were.
     """
     steps = score["calibration"]["all"]["bins"]
     if not any(b["present"]["trials"] for b in steps):
@@ -134,7 +118,7 @@ def calibration_figure(score: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+def _frequencies(axes: Axes, steps: Sequence[Plain]) -> None:
     """Draw the share at work of each bin against the mean probability in it, beside the line of a sound scale."""
     axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
     said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
@@ -149,7 +133,7 @@ def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
     axes.set_ylim(-3.0, 103.0)
 
 
-def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+def _numbers(axes: Axes, steps: Sequence[Plain]) -> None:
     """Draw how many effects each bin holds, on a logarithmic axis."""
     for b in steps:
         number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
@@ -165,7 +149,7 @@ def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
     axes.set_ylabel("effects")
 
 
-def _error(calibration: Mapping[str, Any]) -> str:
+def _error(calibration: Plain) -> str:
     all_, sure = calibration["all"], calibration["doubtful"]
     said = f"calibration error {units.percent(all_['error'])} over {all_['trials']} effects"
     if sure["trials"]:
@@ -173,7 +157,7 @@ def _error(calibration: Mapping[str, Any]) -> str:
     return said
 
 
-def shrinkage_figure(score: Mapping[str, Any]) -> Figure:
+def shrinkage_figure(score: Plain) -> Figure:
     """Draw what stays of the gap's mean square on fresh samples against what the diagnosis claims to stay."""
     pairs = score["shrinkage"]["pairs"]
     if not pairs:
@@ -220,34 +204,29 @@ def _empty(heading: str, why: str) -> Drawing:
 _LAST = 1.5  # times the lower bound: where a step without an upper one ends in the drawing
 
 
-def power_figure(score: Mapping[str, Any]) -> Figure:
-    """Draw the share of effects found against their size and against the number of rows.
+def power_figure(score: Plain) -> Figure:
+    """Draw the power of the diagnosis: the share of effects found, against their size and the number of rows.
 
-    Returns
-    -------
-    Figure
-        Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower
-        and the upper quartile of the other quantity.
+    Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower and
+    the upper quartile of the other quantity.
     """
     detection = score["detection"]
     figure = Drawing(9.6, 4.0)
-    left, right = figure.subplots(1, 2, sharey=True)
+    size, rows = figure.subplots(1, 2, sharey=True)
     curve = detection["curve"] or {"over_ratio": (), "over_samples": ()}
-    _panel(left, detection["ratio"], curve["over_ratio"], lambda rows: f"with {rows:.0f} rows")
-    left.set_xlabel("size: what it leaves over the noise, rms")
-    left.set_ylabel("found, 95 % bars (%)")
-    _panel(right, detection["samples"], curve["over_samples"], lambda size: f"{size:.2g} times the noise")
-    right.set_xlabel("rows of the campaign")
-    if left.lines:
-        left.text(-0.015, 106.0, "cases", transform=left.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
-    title(left, "Found, by size")
-    title(right, "Found, by number of rows")
+    _panel(size, detection["ratio"], curve["over_ratio"], lambda n: f"with {n:.0f} rows")
+    size.set_xlabel("size: what it leaves over the noise, rms")
+    size.set_ylabel("found, 95 % bars (%)")
+    _panel(rows, detection["samples"], curve["over_samples"], lambda n: f"{n:.2g} times the noise")
+    rows.set_xlabel("rows of the campaign")
+    if size.lines:
+        size.text(-0.015, 106.0, "cases", transform=size.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
+    title(size, "Found, by size")
+    title(rows, "Found, by number of rows")
     return figure
 
 
-def _panel(
-    axes: Axes, steps: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], other: Callable[[float], str]
-) -> None:
+def _panel(axes: Axes, steps: Sequence[Plain], lines: Sequence[Plain], other: Callable[[float], str]) -> None:
     told = [s for s in steps if s["found"]["trials"]]
     if not told:
         note(axes, "No case with one effect of known size.")
@@ -281,40 +260,22 @@ def _panel(
     tidy(axes, grid="y")
 
 
-Plain = Mapping[str, Any]
-_CHANGES = ("exact", "found", "way", "day", "false_alarm")
-
-
 def html(score: Plain, generated: str) -> str:
-    """Write a score as an HTML page that needs nothing beside itself and prints on A4.
+    """Write a score of the format ``thermal-robot/blind/1`` as a page that needs nothing beside itself, for A4.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-    generated
-        When it was made, in the words that shall stand in the footer; may be empty.
+    ``generated`` is when it was made, in the words that shall stand in the footer; may be empty.
     """
-    shown = {"score": score, "text": text, "figures": sys.modules[__name__], "groups": _groups(score)}
+    groups = [_groups(f"{of}, {more}", score[name], name) for name, of, more, _ in text.GROUPED if score[name]]
+    shown = {"score": score, "text": text, "figures": sys.modules[__name__], "groups": groups}
     return render("blind.html", shown, title="Blind trial", generated=generated)
 
 
-def _groups(score: Plain) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """Return the tables of rates by effect, robot and cause: heading, names of the columns, rows."""
-    groups = (
-        ("By effect, where one or several are at work", score["by_effect"], text.ASKED),
-        ("By robot, the same cases and those with nothing at work", score["by_robot"], text.ASKED),
-        ("Effect taken out of the library, by effect", score["removed"], text.ASKED),
-        ("Cause that no library knows, by cause", score["unlisted"], text.ASKED),
-        ("Campaigns of one robot, by what changes", score["changes"], _CHANGES),
-    )
-    tables = []
-    for heading, by_name, questions in groups:
-        asked = [q for q in questions if any(q in rates for rates in by_name.values())]
-        rows = [(name, *(_share(rates.get(q)) for q in asked)) for name, rates in by_name.items()]
-        if rows:
-            tables.append((heading, ("", *map(text.question, asked)), rows))
-    return tables
+def _groups(heading: str, groups: Plain, name: str) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heading, names of the columns and rows of a table of rates."""
+    questions = ("exact", "found", "way", "day", "false_alarm") if name == "changes" else text.ASKED
+    asked = [q for q in questions if any(q in rates for rates in groups.values())]
+    rows = [(group, *(_share(rates.get(q)) for q in asked)) for group, rates in groups.items()]
+    return heading, ("", *map(text.question, asked)), rows
 
 
 def _share(rate: Plain | None) -> str:

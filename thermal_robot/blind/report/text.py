@@ -8,6 +8,7 @@ from typing import Any
 
 from thermal_robot.report import units
 
+Plain = Mapping[str, Any]
 KINDS = {
     "single": "one effect",
     "large": "one large effect",
@@ -96,23 +97,33 @@ def effect(name: str) -> str:
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
-def count(rate: Mapping[str, Any]) -> str:
+def count(rate: Plain) -> str:
     """Write ``20 of 22``."""
     return f"{rate['successes']} of {rate['trials']}"
 
 
-def interval(rate: Mapping[str, Any]) -> str:
+def interval(rate: Plain) -> str:
     """Write a rate's 95 % interval in per cent; nothing without trials."""
     return f"{units.interval(rate['interval'])} %" if rate["interval"] else ""
 
 
-def step(bounds: Mapping[str, Any]) -> str:
+def lost(score: Plain) -> str:
+    """Say how many diagnoses failed; nothing where none did."""
+    return f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
+
+
+def left(of: Plain) -> str:
+    """Say what stays on fresh samples, rms per axis over the noise, of the cases of one kind."""
+    return f"{of['fresh']['median']:.2f} in the median, 90 % below {of['fresh']['q90']:.2f}"
+
+
+def step(bounds: Plain) -> str:
     """Write the bounds of a step: ``0.5 to 0.7``, ``200 and more``."""
     low, high = bounds["low"], bounds["high"]
     return f"{low:g} and more" if high is None else f"{low:g} to {high:g}"
 
 
-def needed(curve: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+def needed(curve: Plain, wanted: Plain) -> str:
     """Say how many rows find an effect of some size in 90 % of cases, and whether data reach so far."""
     size = f"{wanted['ratio']:g} times the noise"
     if wanted["samples"] is None:
@@ -124,7 +135,7 @@ def needed(curve: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     return f"an effect of {size}: {number}{guess}"
 
 
-def coefficients(curve: Mapping[str, Any]) -> str:
+def coefficients(curve: Plain) -> str:
     """Write the curve of detection with its standard deviations: where they are large, the cases do not tell."""
     names = ("ln size", "ln rows")
     terms = (
@@ -134,10 +145,11 @@ def coefficients(curve: Mapping[str, Any]) -> str:
     return f"logistic({curve['intercept']:.2g} + {' + '.join(terms)})".replace("-", "−")
 
 
-def facts(score: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+def facts(score: Plain) -> tuple[tuple[str, str], ...]:
     """Return the figures that stand alone: what they are, and their values."""
     all_, sure = score["calibration"]["all"], score["calibration"]["doubtful"]
-    gap, time, said = score["shrinkage"], score["seconds"], []
+    gap, time, held = score["shrinkage"], score["seconds"], score["coverage"]
+    said = []
     if all_["trials"]:
         said.append(("calibration error", f"{units.percent(all_['error'])} over {all_['trials']} effects and laws"))
     if sure["trials"]:
@@ -146,16 +158,6 @@ def facts(score: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     if gap["pairs"]:
         apart = f"apart by {units.percent(gap['median_absolute_difference'])} of the gap in the median"
         said.append(("shrinkage claimed against reached", f"{apart}, {len(gap['pairs'])} cases"))
-    said += _rates(score)
-    if time["median"] is not None:
-        most = f"95 % within {time['q95']:.2f} s, longest {time['longest']:.2f} s"
-        said.append(("time of a diagnosis", f"{time['median']:.2f} s in the median, {most}"))
-    return tuple(said)
-
-
-def _rates(score: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return laws that were sure, models that do harm, and intervals that hold."""
-    held = score["coverage"]
     rates = (
         ("laws printed at 90 % and more", score["laws"], "right"),
         ("corrected model worse than none", score["worse"], "on fresh samples"),
@@ -163,14 +165,17 @@ def _rates(score: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("95 % intervals of the shrinkage", held["shrinkage"], "hold that on fresh samples"),
         ("95 % intervals of shares", held["shares"], "hold those on fresh samples"),
     )
-    return [
-        (name, f"{count(rate)} {what}: {units.percent(rate['value'])}, 95 % interval {interval(rate)}")
-        for name, rate, what in rates
-        if rate["trials"]
-    ]
+    for name, rate, what in rates:
+        if rate["trials"]:
+            share = f"{units.percent(rate['value'])}, 95 % interval {interval(rate)}"
+            said.append((name, f"{count(rate)} {what}: {share}"))
+    if time["median"] is not None:
+        most = f"95 % within {time['q95']:.2f} s, longest {time['longest']:.2f} s"
+        said.append(("time of a diagnosis", f"{time['median']:.2f} s in the median, {most}"))
+    return tuple(said)
 
 
-def miss(case: Mapping[str, Any]) -> tuple[str, str]:
+def miss(case: Plain) -> tuple[str, str]:
     """Say what was true of a case that was answered wrongly, and what was said."""
     true = ", ".join(case["truth"]) or "nothing"
     if case["error"] is not None:
@@ -181,18 +186,10 @@ def miss(case: Mapping[str, Any]) -> tuple[str, str]:
     return true, " + ".join(part for part in (said, rest) if part) + sure
 
 
-def markdown(score: Mapping[str, Any]) -> str:
-    """Write the table of the README.
+def markdown(score: Plain) -> str:
+    """Write the table of the README, of a score of the format ``thermal-robot/blind/1``, as Markdown.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-
-    Returns
-    -------
-    str
-        Markdown without a newline at the end: one row for each kind of case, then the figures that stand alone.
+    One row for each kind of case, then the figures that stand alone; without a newline at the end.
     """
     lines = ["| case | number | right means | right | share | 95 % interval |", "|---|--:|---|--:|--:|--:|"]
     for of in score["kinds"]:
@@ -226,30 +223,25 @@ _TABLES = {
     "removed": "effect taken out of the library: unexplained is right",
 }
 
-Plain = Mapping[str, Any]
+GROUPED = (
+    ("by_effect", "By effect", "where one or several are at work", ASKED),
+    ("by_robot", "By robot", "the same cases and those with nothing at work", ASKED),
+    ("removed", "Effect taken out of the library", "by effect", ASKED),
+    ("unlisted", "Cause that no library knows", "by cause", ASKED),
+    ("changes", "Campaigns of one robot", "by what changes", _CHANGES),
+)
+"""Rates by group: their name in the score, what they are of, and the questions that are columns."""
 
 
 def text(score: Plain) -> str:
-    """Write a score for whoever ran the trial.
+    """Write a score of the format ``thermal-robot/blind/1`` for whoever ran the trial.
 
-    Parameters
-    ----------
-    score
-        Of the format ``thermal-robot/blind/1``.
-
-    Returns
-    -------
-    str
-        Plain text, at most 100 columns wide unless a name is longer, without a newline at the end.
+    At most 100 columns wide unless a name is longer, without a newline at the end.
     """
     blocks = [
-        [_heading(score)],
+        [f"Blind trial: {score['cases']} cases, {len(score['misses'])} answered wrongly{lost(score)}."],
         [f"{'HOW OFTEN':<64}{'share':>8}   95 % interval", *_kinds(score["kinds"])],
-        ["BY EFFECT, where one or several are at work", *_groups(score["by_effect"])],
-        ["BY ROBOT, the same cases and those with nothing at work", *_groups(score["by_robot"])],
-        ["EFFECT TAKEN OUT OF THE LIBRARY, by effect", *_groups(score["removed"])],
-        ["CAUSE THAT NO LIBRARY KNOWS, by cause", *_groups(score["unlisted"])],
-        ["CAMPAIGNS OF ONE ROBOT, by what changes", *_groups(score["changes"], _CHANGES)],
+        *([f"{of.upper()}, {more}", *_groups(score[name], asked)] for name, of, more, asked in GROUPED),
         *([f"NAMED FIRST: {_TABLES.get(k, k)}", *_confusion(table)] for k, table in score["confusion"].items()),
         ["PROBABILITIES", *_calibration(score["calibration"]["all"])],
         ["WHAT IT TAKES TO BE FOUND, one effect at work", *_detection(score["detection"])],
@@ -258,11 +250,6 @@ def text(score: Plain) -> str:
         ["MISSES", *_misses(score["misses"])],
     ]
     return "\n\n".join("\n".join(block) for block in blocks if len(block) > 1 or block is blocks[0])
-
-
-def _heading(score: Plain) -> str:
-    failed = f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
-    return f"Blind trial: {score['cases']} cases, {len(score['misses'])} answered wrongly{failed}."
 
 
 def _kinds(kinds: list[Plain]) -> Iterator[str]:
@@ -274,12 +261,10 @@ def _kinds(kinds: list[Plain]) -> Iterator[str]:
             asked = question(name, of["kind"])
             yield f"  {mark} {asked:46}{count(rate):>12}  {units.percent(rate['value']):>8}   {interval(rate)}".rstrip()
         if of["fresh"]["count"]:
-            left = of["fresh"]
-            spread = f"{left['median']:.2f} in the median, 90 % below {left['q90']:.2f}"
-            yield f"    left on fresh samples, over the noise: {spread}"
+            yield f"    left on fresh samples, over the noise: {left(of)}"
 
 
-def _groups(groups: Mapping[str, Plain], questions: Sequence[str] = ASKED) -> Iterator[str]:
+def _groups(groups: Mapping[str, Plain], questions: Sequence[str]) -> Iterator[str]:
     if not groups:
         return
     asked = [q for q in questions if any(q in rates for rates in groups.values())]
@@ -341,14 +326,11 @@ def _both(detection: Plain) -> Iterator[str]:
     columns = [m for m in range(len(detection["samples"])) if any(row[m]["trials"] for row in table)]
     if len(lines) < 2 or len(columns) < 2:
         return
-    yield "  size over the noise" + "".join(f"{_brief(detection['samples'][m]):>9}" for m in columns) + " rows"
+    steps = (step(detection["samples"][m]).replace(" and more", "+").replace(" to ", "–") for m in columns)
+    yield "  size over the noise" + "".join(f"{rows:>9}" for rows in steps) + " rows"
     for k in lines:
         cells = (f"{r['successes']}/{r['trials']}" if r["trials"] else "·" for r in (table[k][m] for m in columns))
         yield f"    {step(detection['ratio'][k]):17}" + "".join(f"{cell:>9}" for cell in cells)
-
-
-def _brief(bounds: Plain) -> str:
-    return f"{bounds['low']:g}+" if bounds["high"] is None else f"{bounds['low']:g}–{bounds['high']:g}"
 
 
 def _real(cases: list[Plain]) -> Iterator[str]:
