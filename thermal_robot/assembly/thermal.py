@@ -774,6 +774,6 @@ def _root(covariance: Array) -> Array:
     if not np.all(np.isfinite(covariance)):
         raise EstimationError("the noise of a measured component is not a finite number")
     try:
-        return np.linalg.cholesky(covariance)
+        return np.asarray(np.linalg.cholesky(covariance), dtype=float)
     except np.linalg.LinAlgError as error:
         raise EstimationError("the covariance of a measured displacement is not positive definite") from error

@@ -184,7 +184,7 @@ def compute(row: Mapping[str, Any], inputs: PaperInputs) -> Entry:
     if not verdict:
         bounds = {"low": found.get("low"), "high": found.get("high")}
         verdict = judge(figures, found.get("compared", values), otherwise=row["otherwise"], **bounds)
-    words, given = Words(), row | found | {"i": reading}
+    words, given = Words(), {**row, **found, "i": reading}
     computed, why = (words.vformat(row[name], (), given) for name in ("computed", "why"))
     depends = tuple(f.name for f in fields(inputs) if f.name in reading._read)
     return Entry(row["quantity"], row["where"], row["printed"], computed, values, verdict, why, depends)

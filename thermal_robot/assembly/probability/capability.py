@@ -188,7 +188,7 @@ def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Arr
         rows = row.astype(int)
         fails = law.rows(rows).chances(size[:, None] * proportion, shape, True)
         with np.errstate(divide="ignore"):
-            return np.clip(ndtri_exp(np.log(fails)), -_BOUND, _BOUND) - ndtri_exp(target)
+            return np.asarray(np.clip(ndtri_exp(np.log(fails)), -_BOUND, _BOUND) - ndtri_exp(target))
 
     rows = np.arange(len(largest))
     return np.asarray(find_root(excess, (np.zeros_like(largest), largest), args=(rows,)).x)

@@ -81,13 +81,13 @@ class Law:
 
     def flat(self, leading: tuple[int, ...]) -> Law:
         """Return the laws broadcast to a shape, one after the other."""
-        vectors = (np.broadcast_to(v, (*leading, 2)).reshape(-1, 2) for v in (self.means, self.segments))
-        return Law(np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2), *vectors, self.pieces)
+        means, segments = (np.broadcast_to(v, (*leading, 2)).reshape(-1, 2) for v in (self.means, self.segments))
+        matrices = np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2)
+        return Law(matrices, means, segments, self.pieces)
 
     def rows(self, chosen: npt.NDArray[np.bool_] | Rows) -> Law:
         """Return some of the laws that are flat."""
-        rows = (v[chosen] for v in (self.matrices, self.means, self.segments))
-        return Law(*rows, self.pieces)
+        return Law(self.matrices[chosen], self.means[chosen], self.segments[chosen], self.pieces)
 
     @property
     def size(self) -> Array:

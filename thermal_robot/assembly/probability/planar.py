@@ -151,7 +151,7 @@ def _poles(axes: Array, centre: Array, count: int) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         poles = np.stack([larger / lead, np.where(larger == 0.0, 0.0, low / larger)])
         power = poles**count
-        return np.sum((power / (1.0 + power)).real, axis=0)
+        return np.asarray(np.sum((power / (1.0 + power)).real, axis=0))
 
 
 def by_chords(matrices: Array, means: Array, half: Array, shape: str, ends: Array, outside: bool) -> Array:
@@ -179,7 +179,7 @@ def by_chords(matrices: Array, means: Array, half: Array, shape: str, ends: Arra
         offset = beside + width * share
         weight = np.exp(-0.5 * (offset / spread) ** 2) / (_ROOT_2PI * spread)
         chances = probability(owner, offset, before + width * share, after + width * rest)
-        return weight * 0.5 * np.pi * width * np.sin(np.pi * t) * chances
+        return np.asarray(weight * 0.5 * np.pi * width * np.sin(np.pi * t) * chances)
 
     result = integrate_panels(integrand, _breaks(law, region, low, span))
     if outside:
@@ -302,4 +302,4 @@ class Rectangle:
         here, rate = over * x[:, None] + along * y[:, None], over + along * slope[:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.concatenate([(side - here) / rate for side in (-half, half)], axis=1)
-        return np.nan_to_num(found.reshape(len(x), -1), posinf=0.0, neginf=0.0)
+        return np.asarray(np.nan_to_num(found.reshape(len(x), -1), posinf=0.0, neginf=0.0))
