@@ -1,14 +1,12 @@
-"""Normal plus uniform on a line against mpmath, the laws that bind it, and panels that halve themselves."""
+"""Normal plus uniform on a line: density, tails and intervals against mpmath, and the laws that bind them."""
 
 import mpmath as mp
 import numpy as np
 import pytest
-from scipy.special import erf
 
 from thermal_robot.assembly.probability.kernels import (
     density,
     inside_probability,
-    integrate_panels,
     log_density,
     log_tail,
     mills_ratio,
@@ -141,55 +139,3 @@ def test_arguments_broadcast_and_a_number_stays_a_number():
     assert density(1.0, 2.0, 0.5).shape == ()
     # a vectorised exponential may round otherwise than a single one
     assert table[1, 1] == pytest.approx(density(1.0, 2.0, 0.5), rel=1e-14)
-
-
-def alone(function, breakpoints, **options):
-    """One integral of a function of points only."""
-    return integrate_panels(lambda owner, t: function(t), np.array([breakpoints], dtype=float), **options)[0]
-
-
-def test_polynomials_need_no_halving_and_empty_panels_cost_nothing():
-    sizes = []
-
-    def cube(owner, t):
-        sizes.append(len(owner))
-        return t**3
-
-    np.testing.assert_allclose(integrate_panels(cube, np.array([[0.0, 0.0, 1.0, 4.0, 4.0]])), [64.0], rtol=1e-14)
-    assert sizes == [2, 4], "two panels, and once their halves"
-    np.testing.assert_array_equal(integrate_panels(cube, np.array([[1.0, 1.0], [2.0, 2.0]])), [0.0, 0.0])
-    assert alone(np.zeros_like, [0.0, 1.0, 2.0]) == 0.0
-
-
-@pytest.mark.parametrize("width", [1.0, 1e-2, 1e-5, 1e-9])
-def test_a_peak_is_found_by_panels_that_close_in_on_it(width):
-    ladder = 4.0 ** -np.arange(20.0)
-    points = 0.3 + np.concatenate([-ladder, [0.0], ladder[::-1]])
-    expected = width * np.sqrt(2.0 * np.pi) * erf(1.0 / width / np.sqrt(2.0))
-    found = alone(lambda t: np.exp(-0.5 * ((t - 0.3) / width) ** 2), points)
-    assert found == pytest.approx(expected, rel=1e-13 + 1e-16 / width, abs=0.0)
-
-
-def test_kinks_jumps_and_roots_inside_a_panel():
-    assert alone(lambda t: np.abs(t - 1.0 / 3.0), [0.0, 1.0]) == pytest.approx(5.0 / 18.0, rel=1e-13)
-    assert alone(np.sqrt, [0.0, 4.0]) == pytest.approx(16.0 / 3.0, rel=1e-11)
-    assert alone(lambda t: (t > 1.0 / 3.0).astype(float), [0.0, 1.0]) == pytest.approx(2.0 / 3.0, rel=1e-12)
-    # The edge of a jump is placed to 2^-depth of the panel: 1/3 has no finite binary fraction.
-    for depth in (3, 10, 20):
-        found = alone(lambda t: (t > 1.0 / 3.0).astype(float), [0.0, 1.0], depth=depth)
-        assert 0.0 < abs(found - 2.0 / 3.0) < 2.0**-depth
-
-
-def test_each_integral_has_its_own_function_size_and_ends():
-    sizes = 10.0 ** np.arange(-300.0, 300.0, 25.0)
-    ends = np.linspace(1.0, 3.0, len(sizes))
-    breakpoints = np.stack([np.zeros_like(ends), 0.1 * ends, ends], axis=1)
-    found = integrate_panels(lambda owner, t: sizes[owner][:, None] * np.exp(t), breakpoints)
-    np.testing.assert_allclose(found, sizes * np.expm1(ends), rtol=1e-13)
-    kinks = ends / 7.0  # each in a place of its own: panels that are halved stay with their integral
-    found = integrate_panels(lambda owner, t: sizes[owner][:, None] * np.abs(t - kinks[owner][:, None]), breakpoints)
-    np.testing.assert_allclose(found, sizes * (kinks**2 + (ends - kinks) ** 2) / 2.0, rtol=1e-12)
-
-
-def test_more_panels_than_are_held_at_once_are_all_counted():
-    assert alone(lambda t: 3.0 * t**2, np.linspace(0.0, 1.0, 20_001)) == pytest.approx(1.0, rel=1e-12)

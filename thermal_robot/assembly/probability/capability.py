@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
 from thermal_robot.arrays import Array
@@ -15,12 +17,14 @@ from thermal_robot.assembly.probability.joining import (
     Shape,
     Thermal,
     check_covariance,
+    failing_probability,
 )
+from thermal_robot.assembly.probability.planar import disc_clearances
 from thermal_robot.assembly.probability.spread import UniformSpread
 
 Convention = Literal["two_sided", "one_sided"]
 
-_BOUND = 100.0  # standard normal quantile beyond every one that a double can hold
+_SMALLEST = 700.0  # factors of e below the size of the errors at which a clearance is taken for zero
 
 
 def capability(
@@ -169,29 +173,66 @@ def required_clearance(
     law = law.flat(leading)
     found = np.full(len(law.means), 0.0 if target == 0.0 else np.inf)
     if target < 0.0 and np.isfinite(target):
-        found = _clearances(law, target, shape, np.ones(1) if shape == "circle" else proportion)
+        found = _clearances(law, target, shape, proportion)
     return found.reshape(leading) if leading else float(found[0])
 
 
 def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Array:
-    """Return clearances ``(N,)`` by bracketing: the normal quantile of failing is nearly linear in the clearance."""
-    # Imported here: it brings scipy's optimisers, which a probability alone does not need.
-    from scipy.optimize.elementwise import find_root
+    """Return clearances ``(N,)``: all at once where cheap integrals resolve them, one after the other elsewhere."""
+    found = np.full(len(law.means), np.nan)
+    pieces = () if law.spread is None else law.spread.pieces
+    if shape == "circle" and len(pieces) < 2 and all(piece.generators.shape[1] < 2 for piece in pieces):
+        means, segments = law.means, law.segments
+        for piece in pieces:
+            means = means + piece.centre
+            segments = np.broadcast_to(piece.generators[:, 0], means.shape) if piece.generators.shape[1] else segments
+        found = disc_clearances(law.matrices, means, target, segments)
+    for k in np.flatnonzero(np.isnan(found)):
+        found[k] = _one_clearance(law.rows(np.array([k])), target, shape, proportion)
+    return found
 
-    wide = np.sqrt(np.linalg.eigvalsh(law.matrices)[:, 1].clip(0.0))
-    # No deviation is longer than its mean, its uniform part and a normal deviation as wide all round as the widest way.
-    largest = 4.0 * (law.size + wide * np.sqrt(-2.0 * target)) / np.min(proportion)
-    if np.any(largest == 0.0):
+
+def _one_clearance(law: Law, target: float, shape: Shape, proportion: Array) -> float:
+    """Return the clearance of a single law, by Brent's method."""
+
+    def excess(log_size: float) -> float:
+        size = np.exp(log_size) * (1.0 if shape == "circle" else proportion)
+        fails = float(
+            failing_probability(
+                law.matrices[0], size, law.means, shape=shape, thermal=law.spread, segments=law.segments
+            )[0]
+        )
+        # Bounded below so that a bounded law, which stops failing altogether, still has a change of sign.
+        return max(float(np.log(fails)) if fails > 0.0 else -np.inf, -1e4) - target
+
+    return _solve(excess, np.log(_typical_size(law)))
+
+
+def _typical_size(law: Law) -> float:
+    """Start the search at the size of the errors."""
+    square = float(np.trace(law.matrices[0])) + float(np.sum(np.square(law.means)))
+    if law.spread is not None:
+        square += float(np.trace(law.spread.covariance) + np.sum(law.spread.mean**2))
+    if law.segments is not None:
+        square += float(np.sum(np.square(law.segments)))
+    if square == 0.0:
         raise ValueError("without any error every clearance will do")
+    return 4.0 * float(np.sqrt(square))
 
-    def excess(size: Array, row: Array) -> Array:
-        rows = row.astype(int)
-        fails = law.rows(rows).chances(size[:, None] * proportion, shape, True)
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.clip(ndtri_exp(np.log(fails)), -_BOUND, _BOUND) - ndtri_exp(target))
 
-    rows = np.arange(len(largest))
-    return np.asarray(find_root(excess, (np.zeros_like(largest), largest), args=(rows,)).x)
+def _solve(excess: Callable[[float], float], start: float) -> float:
+    """Root of a decreasing function of the logarithm of the size: widen the bracket by doubling, then Brent."""
+    low = high = start
+    step = np.log(2.0)
+    while excess(high) > 0.0:
+        low, high, step = high, high + step, 1.5 * step
+    step = np.log(2.0)
+    while excess(low) < 0.0:
+        high, low, step = low, low - step, 1.5 * step
+        if low < start - _SMALLEST:
+            return 0.0
+    # The failing probability carries rounding of its own; asking for less than 1e-14 of the size finds nothing more.
+    return float(np.exp(brentq(excess, low, high, xtol=1e-15, rtol=1e-15 * 8)))
 
 
 def _share(value: npt.ArrayLike | None) -> Array:

@@ -5,45 +5,35 @@ Several independent uniform parts are Gauss-Legendre sums, as fine as the normal
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial.chebyshev import chebpts1, chebvander
 
 from thermal_robot.arrays import Array
+from thermal_robot.assembly.probability.compiled import circle_chances
 from thermal_robot.assembly.probability.kernels import integrate_panels
-from thermal_robot.assembly.probability.planar import Rows, across, planar_probability
+from thermal_robot.assembly.probability.planar import planar_probability
 from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
 
 Randomised = Literal["uniform", "normal"]
-Shape = Literal["circle", "rectangle"]
 Thermal = UniformSpread | npt.ArrayLike | None
-
-_FAR = 50.0
-# Standard deviations beyond which the normal part is zero in double precision; stands for an infinite clearance.
-_SMOOTH = 6.0
-# Longest second generator, in standard deviations of the normal part, for which a fixed sum is the cheaper way.
-_LARGEST, _LARGEST_GRID = 400_000, 10_000  # nodes
-_REACH, _REACH_MANY = 38.0, 9.0
-# Standard deviations of the normal part within which the sums are exact to rounding: all of double precision for one
-# generator, and as far as a failing probability of 1e-20 where sums multiply.
 
 
 @dataclass(frozen=True)
 class Law:
     """Laws of planar errors; their leading axes broadcast.
 
-    Covariances ``(..., 2, 2)`` and means ``(..., 2)`` of the normal parts; uniform parts, one of each from
-    ``-segment`` to ``segment``, ``(..., 2)``, and a mixture of parallelotopes that all have in common.
+    Covariances ``(..., 2, 2)`` and means ``(..., 2)`` of the normal parts; a uniform ``spread`` of all of them, or one
+    of each, from ``-segment`` to ``segment``, ``(..., 2)``.
     """
 
     matrices: Array
     means: Array
-    segments: Array
-    pieces: tuple[Parallelotope, ...]
+    spread: UniformSpread | None = None
+    segments: Array | None = None
 
     @classmethod
     def of(
@@ -56,58 +46,41 @@ class Law:
     ) -> Law:
         """Check what `joining_probability` is given, and put the thermal part where it belongs."""
         matrices = check_covariance(covariance)
-        ends = np.zeros(2) if segments is None else _vectors(segments, "segments")
+        ends = None if segments is None else _vectors(segments, "segments")
+        if ends is not None and isinstance(thermal, UniformSpread):
+            raise ValueError("a uniform part is one for all, as thermal, or one of each, as segments, not both")
         nothing = np.ndim(mean) == 0 and float(np.asarray(mean)) == 0.0
         means = np.zeros(2) if nothing else _vectors(mean, "mean")
-        plain = (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
-        if not isinstance(thermal, UniformSpread):
-            return cls(
-                matrices, means if thermal is None else means + _vectors(thermal, "a thermal shift"), ends, plain
-            )
-        if segments is not None:
-            raise ValueError("a uniform part is one for all, as thermal, or one of each, as segments, not both")
-        if thermal.dimension != 2:
-            raise ValueError(f"the thermal part must be planar, not of dimension {thermal.dimension}")
-        if randomised == "normal":
-            return cls(matrices + thermal.covariance, means + thermal.mean, ends, plain)
-        if randomised == "uniform":
-            return cls(matrices, means, ends, thermal.pieces)
-        raise ValueError(f"randomised must be 'uniform' or 'normal', not {randomised!r}")
+        if isinstance(thermal, UniformSpread):
+            if thermal.dimension != 2:
+                raise ValueError(f"the thermal part must be planar, not of dimension {thermal.dimension}")
+            if randomised == "normal":
+                return cls(matrices + thermal.covariance, means + thermal.mean)
+            if randomised == "uniform":
+                return cls(matrices, means, thermal)
+            raise ValueError(f"randomised must be 'uniform' or 'normal', not {randomised!r}")
+        return cls(matrices, means if thermal is None else means + _vectors(thermal, "a thermal shift"), None, ends)
 
     @property
     def leading(self) -> tuple[int, ...]:
         """Shape of the laws."""
-        return np.broadcast_shapes(self.matrices.shape[:-2], self.means.shape[:-1], self.segments.shape[:-1])
+        own = () if self.segments is None else self.segments.shape[:-1]
+        return np.broadcast_shapes(self.matrices.shape[:-2], self.means.shape[:-1], own)
 
     def flat(self, leading: tuple[int, ...]) -> Law:
         """Return the laws broadcast to a shape, one after the other."""
-        means, segments = (np.broadcast_to(v, (*leading, 2)).reshape(-1, 2) for v in (self.means, self.segments))
-        matrices = np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2)
-        return Law(matrices, means, segments, self.pieces)
+        ends = self.segments
+        return Law(
+            np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2),
+            np.broadcast_to(self.means, (*leading, 2)).reshape(-1, 2),
+            self.spread,
+            None if ends is None else np.broadcast_to(ends, (*leading, 2)).reshape(-1, 2),
+        )
 
-    def rows(self, chosen: npt.NDArray[np.bool_] | Rows) -> Law:
+    def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Law:
         """Return some of the laws that are flat."""
-        return Law(self.matrices[chosen], self.means[chosen], self.segments[chosen], self.pieces)
-
-    @property
-    def size(self) -> Array:
-        """Largest distance of the mean from the origin, the uniform part included, of each law that is flat."""
-        common = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in self.pieces)
-        return np.asarray(np.linalg.norm(self.means, axis=1) + np.linalg.norm(self.segments, axis=1) + common)
-
-    def chances(self, sizes: Array, shape: Shape, outside: bool) -> Array:
-        """Probabilities ``(N,)`` of laws that are flat; zero and infinite clearances are settled here."""
-        far = _FAR * np.sqrt(np.trace(self.matrices, axis1=1, axis2=2)) + self.size
-        endless = np.all(np.isinf(sizes), axis=1)
-        result = np.where(endless ^ outside, 1.0, 0.0)
-        proper = np.flatnonzero(np.all(sizes > 0.0, axis=1) & ~endless)
-        sizes = np.where(np.isinf(sizes), 2.0 * far[:, None], sizes)[proper]
-        law, total = self.rows(proper), np.zeros(len(proper))
-        for piece in self.pieces:
-            moved = replace(law, means=law.means + piece.centre)
-            total += piece.weight * _piece(moved, sizes, shape, piece.generators, outside)
-        result[proper] = np.minimum(total, 1.0)
-        return result
+        ends = self.segments
+        return Law(self.matrices[chosen], self.means[chosen], self.spread, None if ends is None else ends[chosen])
 
 
 def _vectors(value: npt.ArrayLike, name: str) -> Array:
@@ -132,20 +105,10 @@ def check_covariance(covariance: npt.ArrayLike) -> Array:
     return np.stack([np.stack([a, middle], -1), np.stack([middle, d], -1)], -2)
 
 
-def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
-    """Diameters ``(..., 1)`` or side lengths ``(..., 2)``; refused where there are none."""
-    sizes = np.asarray(clearance, dtype=float)
-    if shape == "circle":
-        sizes = sizes[..., None]
-    elif shape == "rectangle":
-        sizes = np.broadcast_to(sizes, (2,)) if sizes.ndim == 0 else sizes
-        if sizes.shape[-1] != 2:
-            raise ValueError(f"the clearance of a rectangle has two sides, shape (..., 2), not {sizes.shape}")
-    else:
-        raise ValueError(f"shape must be 'circle' or 'rectangle', not {shape!r}")
-    if not np.all(sizes >= 0.0):
-        raise ValueError("clearance must not be negative or missing")
-    return sizes
+_LARGEST, _LARGEST_GRID = 400_000, 10_000  # nodes
+# Standard deviations of the normal part within which the sums are exact to rounding: all of double precision for one
+# generator, and as far as a failing probability of 1e-20 where sums multiply.
+_REACH, _REACH_MANY = 38.0, 9.0
 
 
 def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
@@ -157,19 +120,13 @@ def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
     """
     reach = _REACH if generators.shape[1] == 1 else _REACH_MANY
     lengths = generator_lengths(covariance, generators)
-    panels = np.maximum(1.0, np.ceil(lengths * (reach + lengths) / 12.0))
-    counts = _node_count(lengths / panels * (reach + lengths))
     # Counted before any node is made: next to a vanishing normal part there would be 1e12 of them.
-    if np.prod(panels * counts) > _LARGEST:
+    if np.prod([panels * count for panels, count in (_rule_size(v, reach) for v in lengths)], dtype=float) > _LARGEST:
         raise ValueError(_too_narrow(len(lengths) + 1))
-    points, shares = [], []
-    for number, count in zip(panels.astype(int), counts.astype(int), strict=True):
-        nodes, weights = np.polynomial.legendre.leggauss(count)
-        centres = (2.0 * np.arange(number) + 1.0) / number - 1.0
-        points.append((centres[:, None] + nodes / number).ravel())
-        shares.append(np.tile(weights / (2.0 * number), number))
-    units = np.array(list(product(*points))).reshape(-1, len(points))
-    return units @ generators.T, np.array([np.prod(w) for w in product(*shares)])
+    rules = [_rule(length, reach) for length in lengths]
+    units = np.array(list(product(*(rule[0] for rule in rules)))).reshape(-1, len(rules))
+    weights = np.array([np.prod(w) for w in product(*(rule[1] for rule in rules))])
+    return units @ generators.T, weights
 
 
 def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
@@ -187,39 +144,57 @@ def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Arra
     half = np.sum(np.abs(components), axis=1)
     half[half <= 1e-13 * np.max(half)] = 0.0
     lengths = generator_lengths(covariance, axes * half)
-    sizes = np.where(half == 0.0, 1.0, _node_count(lengths * (_REACH_MANY + lengths)))
-    if np.prod(sizes) > _LARGEST_GRID:
-        raise ValueError(_too_narrow(generators.shape[1] + 1))
-    counts = sizes.astype(int)
-    grids = [chebpts1(n) for n in counts]
-    to_grid = [
-        chebvander(g, n - 1) * np.where(np.arange(n) == 0, 1.0, 2.0) / n for g, n in zip(grids, counts, strict=True)
+    counts = [
+        1 if h == 0.0 else _node_count(length * (_REACH_MANY + length)) for h, length in zip(half, lengths, strict=True)
     ]
-    units, unit_weights = np.polynomial.legendre.leggauss(int(np.max(counts)))
+    if counts[0] * counts[1] > _LARGEST_GRID:
+        raise ValueError(_too_narrow(generators.shape[1] + 1))
+    angles = [np.pi * (np.arange(n) + 0.5) / n for n in counts]
+    to_grid = [np.cos(np.outer(np.arange(n), angle)) * (2.0 / n) for n, angle in zip(counts, angles, strict=True)]
+    for matrix in to_grid:
+        matrix[0] *= 0.5
+    units, unit_weights = np.polynomial.legendre.leggauss(max(counts))
     points, weights, reached = np.zeros((1, 2)), np.ones(1), np.zeros(2)
-    for generator in components.T:
-        points = (points[:, None, :] + units[:, None] * generator).reshape(-1, 2)
+    for k in range(generators.shape[1]):
+        points = (points[:, None, :] + units[:, None] * components[:, k]).reshape(-1, 2)
         weights = np.outer(weights, 0.5 * unit_weights).ravel()
         # The box of the sum so far; it must hold all points, since the next sum starts from its grid.
-        reached = reached + np.where(half > 0.0, np.abs(generator), 0.0)
-        scaled = np.clip(points / np.where(reached > 0.0, reached, np.inf), -1.0, 1.0)
-        one, two = (chebvander(scaled[:, k], n - 1) for k, n in enumerate(counts))
-        weights = (to_grid[0] @ (one.T @ (weights[:, None] * two)) @ to_grid[1].T).ravel()
-        points = np.stack(np.meshgrid(*(reached[k] * grids[k] for k in (0, 1)), indexing="ij"), -1).reshape(-1, 2)
+        reached = reached + np.where(half > 0.0, np.abs(components[:, k]), 0.0)
+        bases = []
+        for axis in (0, 1):
+            scaled = points[:, axis] / reached[axis] if reached[axis] > 0.0 else np.zeros(len(points))
+            bases.append(np.cos(np.outer(np.arccos(np.clip(scaled, -1.0, 1.0)), np.arange(counts[axis]))))
+        weights = (to_grid[0].T @ (bases[0].T @ (weights[:, None] * bases[1])) @ to_grid[1]).ravel()
+        axes_points = [reach * np.cos(angle) for reach, angle in zip(reached, angles, strict=True)]
+        points = np.stack(np.meshgrid(*axes_points, indexing="ij"), -1).reshape(-1, 2)
     return points @ axes.T, weights
 
 
-def generator_lengths(covariance: Array, generators: Array) -> Array:
+def generator_lengths(covariance: Array, generators: Array) -> list[float]:
     """Length of every generator in standard deviations of the normal part along it."""
     values, vectors = np.linalg.eigh(covariance)
     components = vectors.T @ generators
     floor = 1e-12 * max(float(values[-1]), float(np.max(np.sum(generators**2, axis=0))))
-    return np.asarray(np.sqrt(np.sum(components**2 / np.maximum(values, floor)[:, None], axis=0)))
+    return [float(v) for v in np.sqrt(np.sum(components**2 / np.maximum(values, floor)[:, None], axis=0))]
 
 
-def _node_count(rate: Array) -> Array:
+def _rule(length: float, reach: float) -> tuple[Array, Array]:
+    """Composite rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
+    panels, count = _rule_size(length, reach)
+    points, weights = np.polynomial.legendre.leggauss(count)
+    centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
+    return (centres[:, None] + points / panels).ravel(), np.tile(weights / (2.0 * panels), panels)
+
+
+def _rule_size(length: float, reach: float) -> tuple[int, int]:
+    """Panels of that rule, and points on each."""
+    panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
+    return panels, _node_count(length / panels * (reach + length))
+
+
+def _node_count(rate: float) -> int:
     """Points per panel [-1, 1] for functions that grow like ``exp(rate * u)``, to rounding."""
-    return np.ceil(7.0 + 0.8 * rate)
+    return int(np.ceil(7.0 + 0.8 * rate))
 
 
 def _too_narrow(count: int) -> str:
@@ -229,50 +204,12 @@ def _too_narrow(count: int) -> str:
     )
 
 
-def _piece(law: Law, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
-    """Probabilities ``(N,)`` with one parallelotope about each mean: its longest generator in closed form."""
-    if generators.shape[1] < 2:
-        segment = generators[:, 0] if generators.shape[1] else law.segments
-        return planar_probability(law.matrices, law.means, sizes, shape=shape, segment=segment, outside=outside)
-    # sums over several generators are as fine as the normal part demands: one covariance after the other
-    kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
-    result = np.empty(len(sizes))
-    for number in range(len(kinds)):
-        rows = np.flatnonzero(kind.reshape(-1) == number)
-        result[rows] = _several(law.rows(rows), sizes[rows], shape, generators, outside)
-    return result
+Shape = Literal["circle", "rectangle"]
 
-
-def _several(law: Law, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
-    """Take the longest generator in closed form, the others by sums; next to a narrow normal part the second adapts."""
-    covariance, second = law.matrices[0], generators[:, 1]
-
-    def shifted(owner: Rows, shifts: Array, left: Array) -> Array:
-        """Probabilities ``(P, n)`` of laws moved by ``(P, n, 2)``, with the generators that are left."""
-        every = np.repeat(owner, shifts.shape[1])
-        moved = replace(law.rows(every), means=law.means[every] + shifts.reshape(-1, 2))
-        return _piece(moved, sizes[every], shape, left, outside).reshape(shifts.shape[:2])
-
-    summed = 1 if generator_lengths(covariance, second[:, None])[0] < _SMOOTH else 2
-    if generators.shape[1] > summed:
-        shifts, weights = planar_link_nodes(covariance, generators[:, summed:])
-        every = np.arange(len(sizes))
-        return shifted(every, np.broadcast_to(shifts, (len(every), *shifts.shape)), generators[:, :summed]) @ weights
-
-    def integrand(owner: Rows, u: Array) -> Array:
-        return 0.5 * shifted(owner, u[..., None] * second, generators[:, :1])
-
-    # Panels end where the band that the first generator sweeps touches the region, and where the scatter reaches it.
-    normal = across(generators[:, 0] / np.linalg.norm(generators[:, 0]))
-    width = 0.5 * (sizes[:, 0] if shape == "circle" else sizes @ np.abs(normal))
-    touching = width[:, None] + np.sqrt(normal @ covariance @ normal) * np.array([-_REACH, -9.0, 0.0, 9.0, _REACH])
-    levels = (
-        np.concatenate([-touching, touching, np.zeros_like(width)[:, None]], axis=1) - (law.means @ normal)[:, None]
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        breaks = np.clip(np.nan_to_num(levels / (second @ normal)), -1.0, 1.0)
-    breaks = np.sort(np.pad(breaks, ((0, 0), (1, 1)), constant_values=(-1.0, 1.0)), axis=1)
-    return integrate_panels(integrand, breaks, tolerance=1e-12)
+# Beyond this many standard deviations the normal part is zero in double precision; stands for an infinite clearance.
+_FAR = 50.0
+# Longest second generator, in standard deviations of the normal part, for which a fixed sum is the cheaper way.
+_SMOOTH = 6.0
 
 
 def joining_probability(
@@ -319,7 +256,7 @@ def joining_probability(
     ValueError
         For wrong shapes, a covariance that is not symmetric positive semidefinite, a negative clearance.
     """
-    return _evaluate(Law.of(covariance, mean, thermal, randomised, segments), clearance, shape, outside=False)
+    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, segments, outside=False)
 
 
 def failing_probability(
@@ -337,11 +274,132 @@ def failing_probability(
     It keeps its digits (1e-10 relative) when ``P`` rounds to one. Parameters, shapes and errors as in
     `joining_probability`.
     """
-    return _evaluate(Law.of(covariance, mean, thermal, randomised, segments), clearance, shape, outside=True)
+    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, segments, outside=True)
 
 
-def _evaluate(law: Law, clearance: npt.ArrayLike, shape: Shape, *, outside: bool) -> Array:
+def _evaluate(
+    covariance: npt.ArrayLike,
+    clearance: npt.ArrayLike,
+    mean: npt.ArrayLike,
+    shape: Shape,
+    thermal: Thermal,
+    randomised: Randomised,
+    segments: npt.ArrayLike | None,
+    *,
+    outside: bool,
+) -> Array:
+    """Check, broadcast, and integrate all cases at once; compiled loops tell the plain ones of very many."""
+    plain = shape == "circle" and thermal is None and segments is None
+    chances = circle_chances(covariance, clearance, mean) if plain else None
+    quick: Array | None = None if chances is None else chances[int(outside)]
+    if quick is not None and not np.any(np.isnan(quick)):
+        return quick
+    law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
     leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
+    law = law.flat(leading)
     sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
-    return law.flat(leading).chances(sizes, shape, outside).reshape(leading)
+    if quick is None:
+        return _integrated(law, sizes, shape, outside).reshape(leading)
+    result: Array = quick.reshape(-1)
+    left = np.isnan(result)
+    result[left] = _integrated(law.rows(left), sizes[left], shape, outside)
+    return np.asarray(result.reshape(leading))
+
+
+def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
+    """Integrate cases that were checked, one after the other."""
+    if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
+        return _cases(law, sizes, shape, outside)
+    # sums over several generators are as fine as the normal part demands: one covariance after the other
+    kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
+    result = np.empty(len(sizes))
+    for number in range(len(kinds)):
+        chosen = kind.reshape(-1) == number
+        result[chosen] = _cases(law.rows(chosen), sizes[chosen], shape, outside)
+    return result
+
+
+def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
+    """Diameters ``(..., 1)`` or side lengths ``(..., 2)``."""
+    sizes = np.asarray(clearance, dtype=float)
+    if shape == "circle":
+        sizes = sizes[..., None]
+    elif shape == "rectangle":
+        sizes = np.broadcast_to(sizes, (2,)) if sizes.ndim == 0 else sizes
+        if sizes.shape[-1] != 2:
+            raise ValueError(f"the clearance of a rectangle has two sides, shape (..., 2), not {sizes.shape}")
+    else:
+        raise ValueError(f"shape must be 'circle' or 'rectangle', not {shape!r}")
+    if not np.all(sizes >= 0.0):
+        raise ValueError("clearance must not be negative or missing")
+    return sizes
+
+
+def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
+    """Return all cases; zero and infinite clearances are settled here."""
+    result = np.full(len(sizes), 1.0 if outside else 0.0)
+    pieces = law.spread.pieces if law.spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
+    reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)
+    far = _FAR * np.sqrt(np.trace(law.matrices, axis1=1, axis2=2)) + reach + np.linalg.norm(law.means, axis=1)
+    if law.segments is not None:
+        far = far + np.linalg.norm(law.segments, axis=1)
+    endless = np.all(np.isinf(sizes), axis=1)
+    result[endless] = 0.0 if outside else 1.0
+    sizes = np.where(np.isinf(sizes), 2.0 * far[:, None], sizes)
+    proper = np.all(sizes > 0.0, axis=1) & ~endless
+    if np.any(proper):
+        law, sizes, total = law.rows(proper), sizes[proper], np.zeros(int(np.sum(proper)))
+        for piece in pieces:
+            means = law.means + piece.centre
+            if piece.generators.shape[1] < 2:
+                ends = piece.generators[:, 0] if piece.generators.shape[1] else law.segments
+                found = planar_probability(law.matrices, means, sizes, shape=shape, segment=ends, outside=outside)
+            else:
+                found = _piece_probability(law.matrices[0], means, sizes, shape, piece.generators, outside)
+            total += piece.weight * found
+        result[proper] = np.minimum(total, 1.0)
+    return result
+
+
+def _piece_probability(
+    covariance: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool
+) -> Array:
+    """Take the longest generator in closed form, the others by sums; next to a narrow normal part the second adapts."""
+    count = generators.shape[1]
+    segment = generators[:, 0] if count else None
+    if count < 2:
+        return planar_probability(covariance, means, sizes, shape=shape, segment=segment, outside=outside)
+    smooth = generator_lengths(covariance, generators[:, 1:2])[0] < _SMOOTH
+    summed = 1 if smooth else 2
+    if count > summed:
+        shifts, weights = planar_link_nodes(covariance, generators[:, summed:])
+        shifted = (means[:, None, :] + shifts).reshape(-1, 2)
+        repeated = np.repeat(sizes, len(weights), axis=0)
+        values = _piece_probability(covariance, shifted, repeated, shape, generators[:, :summed], outside)
+        return np.asarray(values.reshape(len(means), -1) @ weights)
+    second = generators[:, 1]
+
+    def shifted_probability(owner: npt.NDArray[np.intp], u: Array) -> Array:
+        centres = (means[owner][:, None, :] + u[..., None] * second).reshape(-1, 2)
+        repeated = np.repeat(sizes[owner], u.shape[1], axis=0)
+        values = planar_probability(covariance, centres, repeated, shape=shape, segment=segment, outside=outside)
+        return 0.5 * values.reshape(u.shape)
+
+    return integrate_panels(shifted_probability, _second_breakpoints(generators, means, sizes), tolerance=1e-12)
+
+
+def _second_breakpoints(generators: Array, means: Array, sizes: Array) -> Array:
+    """Panels over the second generator, graded to where the first one's segment passes through the region's centre."""
+    first, second = generators[:, 0], generators[:, 1]
+    normal = np.array([-first[1], first[0]])
+    across = float(second @ normal)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centre = np.clip(np.nan_to_num(-(means @ normal) / across), -1.0, 1.0)[:, None]
+    finest = float(np.min(sizes)) / float(np.linalg.norm(second))
+    steps = int(np.clip(np.ceil(np.log2(4.0 / finest)), 1, 40)) if finest < 4.0 else 1
+    ladder = 2.0 * 2.0 ** -np.arange(steps + 1.0) if steps > 1 else np.array([])
+    points = np.concatenate(
+        [[-1.0, 0.0, 1.0] * np.ones((len(means), 1)), centre, centre - ladder, centre + ladder], axis=1
+    )
+    return np.sort(np.clip(points, -1.0, 1.0), axis=1)

@@ -29,6 +29,7 @@ _ROOT_HALF_PI = np.sqrt(np.pi / 2.0)
 _ROOT_HALF = np.sqrt(0.5)
 # Where the closed form 1 - t m(t) has lost a digit, the continued fraction needs forty terms; further out fewer.
 _FRACTIONS = ((4.0, 9.0, 44), (9.0, np.inf, 14))
+_UNDERFLOW = 39.0  # standard deviations beyond which the normal density is zero in double precision
 
 
 def mills_ratio(t: Array) -> Array:
@@ -54,6 +55,16 @@ def second_mills_ratio(t: Array) -> Array:
                 fraction = distance + term / fraction
             result[far] = ratio[far] / fraction
     return result
+
+
+def _integral(t: Array) -> Array:
+    """Return ``I(t)``, any sign of ``t``; zero where it underflows."""
+    size = np.abs(t)
+    result = np.zeros(t.shape)
+    within = size < _UNDERFLOW
+    near = size[within]
+    result[within] = np.exp(-0.5 * near**2 - _LOG_ROOT_2PI) * second_mills_ratio(near)
+    return result + np.maximum(t, 0.0)
 
 
 def _log_integral(t: Array) -> Array:
@@ -167,8 +178,20 @@ def density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -
 
 
 def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """P(X > x) with ``x`` measured from the mean; see `log_tail`."""
-    return np.exp(log_tail(x, sigma, half_width))
+    """P(X > x) with ``x`` measured from the mean; as `log_tail`, but cheaper, and zero below 1e-300."""
+    shape = _shape(x, sigma, half_width)
+    x, sigma, half_width = _split(x, sigma, half_width)
+    distance = np.abs(x)
+    result = np.empty(x.shape)
+    apart = (sigma > 0.0) & (half_width * np.maximum(sigma, distance) > sigma * sigma)
+    if np.any(apart):
+        scale = sigma[apart]
+        z, step = distance[apart] / scale, half_width[apart] / scale
+        result[apart] = (_integral(step - z) - _integral(-step - z)) / (2.0 * step)
+    rest = ~apart
+    if np.any(rest):
+        result[rest] = np.exp(log_tail(distance[rest], sigma[rest], half_width[rest]))
+    return np.where(x < 0.0, 1.0 - result, result).reshape(shape)
 
 
 def _either_tail(x: Array, sigma: Array, half_width: Array) -> Array:
