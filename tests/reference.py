@@ -7,16 +7,14 @@ which joint mimics which.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.kinematics import ChainFrames, Displacement, growing
+from thermal_robot.kinematics import ChainFrames, Displacement, augmented_model
 from thermal_robot.kinematics.links import to_pinocchio
-from thermal_robot.kinematics.model import unit_motion
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -62,7 +60,7 @@ def frame_jacobians(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0,
 def placement_sensitivities(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Regressor (N, 6, S, 6) by Pinocchio; see :func:`thermal_robot.kinematics.placement_sensitivities`."""
     # Pinocchio's kinematic regressor knows placements of joints only: hence the virtual ones of fixed frames.
-    augmented = Augmented(robot)
+    augmented = augmented_model(robot)
     tool = augmented.model.frames[augmented.tool]
     model, frame = _with_point(augmented.model, tool.parentJoint, tool.placement, point)
     data = model.createData()
@@ -75,70 +73,6 @@ def placement_sensitivities(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0
         # The regressor begins with the first joint, which is number 1.
         out[i] = turned.reshape(6, model.njoints - 1, 6)[:, np.array(augmented.placements) - 1]
     return out
-
-
-ELONGATION = "elongation of "
-
-
-class Augmented:
-    """The robot with M movable joints and S virtual prismatic ones, one before each placement with a length.
-
-    Its world is the root frame, and it knows positions only. ``joints``, ``elongations``: columns of both in a
-    configuration; ``placements``: for every segment the joint whose placement it is. A configuration is ``coupling``
-    times one in which mimicking joints are zero, plus ``offset``.
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        source, chain, self.model = robot.model, robot.chain, pin.Model()
-        directions = {segment.index: segment.direction for segment in robot.segments}
-        here, parent, placements = _pose_of_link(robot, robot.root_frame).placement, 0, {}
-        for k, name in enumerate(chain.names):
-            moves, number = source.existJointName(name), source.getJointId(name)
-            fixed = source.frames[source.getFrameId(name, pin.FrameType.FIXED_JOINT)] if not moves else None
-            at = fixed.placement if fixed else source.jointPlacements[number]
-            if k in directions and np.any(directions[k]):
-                joint = pin.JointModelPrismaticUnaligned(directions[k])
-                parent, here = self.model.addJoint(parent, joint, here.actInv(at), ELONGATION + name), at
-                placements[k] = parent
-            if moves:
-                joint = source.joints[number]  # a continuous one has two coordinates there, and one here
-                joint = joint if joint.nq == 1 else pin.JointModelRevoluteUnaligned(unit_motion(source, joint)[3:])
-                parent = self.model.addJoint(parent, joint, here.actInv(at), name)
-                placements.setdefault(k, parent)
-                here = pin.SE3.Identity()
-        end = here.actInv(_tool(robot).placement)
-        self.tool = self.model.addFrame(pin.Frame("the tool", parent, 0, end, pin.FrameType.OP_FRAME))
-        self.segments = tuple(robot.segments[s].name for s in growing(robot))
-        self.placements = [placements[segment.index] for segment in robot.segments]
-        self.elongations = self._columns(ELONGATION + name for name in self.segments)
-        rows = self._columns(chain.names[k] for k in chain.movable)
-        self.joints = rows[chain.coupling.driving]
-        self.coupling, self.offset = np.eye(self.model.nq), np.zeros(self.model.nq)
-        self.coupling[rows], self.offset[rows] = 0.0, chain.coupling.offset
-        self.coupling[np.ix_(rows, self.joints)] = chain.coupling.matrix
-
-    def _columns(self, names: Iterable[str]) -> NDArray[np.int64]:
-        return np.array([self.model.joints[self.model.getJointId(name)].idx_q for name in names], dtype=np.int64)
-
-    def configurations(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """(N, M + S) of joint positions (N, n), rad or m, and elongations (N, S), m."""
-        out = np.zeros((len(np.atleast_2d(q)), self.model.nq))
-        out[:, self.joints], out[:, self.elongations] = q, elongations
-        return out @ self.coupling.T + self.offset
-
-    def tool_poses(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Pose (N, 4, 4) of the tool in the root frame, m."""
-        data, poses = self.model.createData(), []
-        for row in self.configurations(q, elongations):
-            pin.forwardKinematics(self.model, data, row)
-            poses.append(pin.updateFramePlacement(self.model, data, self.tool).homogeneous)
-        return np.array(poses)
-
-    def jacobians(self, q: ArrayLike) -> Array:
-        """Twist (N, 6, M + S) of the tool, root axes, for a unit speed of each coordinate, followers with theirs."""
-        data, model, axes = self.model.createData(), self.model, pin.LOCAL_WORLD_ALIGNED
-        found = [pin.computeFrameJacobian(model, data, row, self.tool, axes) for row in self.configurations(q)]
-        return np.array(found).reshape(-1, 6, model.nv) @ self.coupling
 
 
 def gravity_torques(

@@ -1,71 +1,81 @@
-"""The verdict follows from what is printed and what is computed."""
+"""The verdict follows from what is printed and what is computed; the printed numbers are read from the text."""
 
 import numpy as np
 import pytest
 
-from thermal_robot.paper.entry import VERDICTS, Printed, floats, judge, numbers, rounds_to, truncates_to
+from thermal_robot.paper import PaperInputs, rows
+from thermal_robot.paper.entry import Printed, Words, judge, numbers
 
-FIGURE = Printed("1.33", (1.33,), 0.01)
-MINUS = Printed("−0.4", (-0.4,), 0.1)
+
+@pytest.mark.parametrize(
+    ("text", "values", "digit"),
+    [
+        ("16 17 / −21 µm", (16e-6, 17e-6, -21e-6), 1e-6),
+        (".008 .014 mm", (8e-6, 14e-6), 1e-6),
+        ("0.067 −0.406", (0.067, -0.406), 0.001),
+        ("24.81 %", (0.2481,), 1e-4),
+        # Eq 19 gives a variance: its unit should be the square of what is printed.
+        ("8.1e-5 mm", (8.1e-11,), 1e-12),
+        ("1.1; 17.8 %; +17.21 %", (1.1, 0.178, 0.1721), (0.1, 0.001, 0.0001)),
+        ("outside the critical set", (), ()),
+    ],
+)
+def test_numbers_are_those_of_the_text(text, values, digit):
+    found = Printed.of(text)
+    assert found.text == text
+    assert found.values == values
+    np.testing.assert_allclose(found.digits, np.broadcast_to(digit, len(values)), rtol=1e-14)
+
+
+def test_figures_that_are_printed_twice_are_the_same():
+    inputs = PaperInputs()
+    assert rows.printed("Table 1, experimental σ").values == tuple(np.ravel(inputs.experimental_sigma))
+    assert tuple(rows.printed(f"Table 2 row {n}, calculated").values for n in (1, 2)) == inputs.static_displacements
+    assert rows.printed("C_p at L = 0.145 mm, row 1").values == (inputs.capability,)
+    assert rows.printed("q3 of row 1").values[0] == inputs.poses[0][2]  # Table 1 gives row 1 its first q3
+    assert rows.printed("Eq 12, five unknowns").values[:5] == inputs.delta_l
 
 
 @pytest.mark.parametrize(
     ("figure", "computed", "rounded", "cut"),
     [
-        (FIGURE, 1.33, True, True),
-        (FIGURE, 1.3349, True, True),
-        (FIGURE, 1.3351, False, True),
-        (FIGURE, 1.3399, False, True),
-        (FIGURE, 1.3401, False, False),
-        (FIGURE, 1.3251, True, False),
-        (FIGURE, 1.3249, False, False),
-        (FIGURE, 1.325, True, False),
-        (FIGURE, -1.33, False, False),
-        (MINUS, -0.44, True, True),
-        (MINUS, -0.49, False, True),
-        (MINUS, -0.36, True, False),
-        (MINUS, 0.4, False, False),
+        ("1.33", 1.33, True, True),
+        ("1.33", 1.3349, True, True),
+        ("1.33", 1.3351, False, True),
+        ("1.33", 1.3399, False, True),
+        ("1.33", 1.3401, False, False),
+        ("1.33", 1.3251, True, False),
+        ("1.33", 1.3249, False, False),
+        ("1.33", -1.33, False, False),
+        ("−0.4", -0.44, True, True),
+        ("−0.4", -0.49, False, True),
+        ("−0.4", -0.36, True, False),
+        ("−0.4", 0.4, False, False),
+        # Half of a last digit counts on either side: 0.145 and 1.005 have no exact binary fraction.
+        ("0.14", 0.145, True, True),
+        ("0.15", 0.145, True, False),
+        ("1.00", 1.005, True, True),
+        ("1.01", 1.005, True, False),
+        # All figures count together.
+        ("8 14 µm", [8.4e-6, 14.3e-6], True, True),
+        ("8 14 µm", [8.4e-6, 14.7e-6], False, True),
+        ("8 14 µm", [7.6e-6, 14.7e-6], False, False),
     ],
 )
 def test_rounding_and_truncation(figure, computed, rounded, cut):
-    assert rounds_to(figure, computed) is rounded
-    assert truncates_to(figure, computed) is cut
     expected = "agrees" if rounded else "agrees when truncated" if cut else "erratum"
-    assert judge(figure, computed, otherwise="erratum") == expected
-
-
-def test_all_figures_count_together():
-    pair = Printed("8 14", (8e-6, 14e-6), 1e-6)
-    assert judge(pair, [8.4e-6, 14.3e-6], otherwise="erratum") == "agrees"
-    assert judge(pair, [8.4e-6, 14.7e-6], otherwise="erratum") == "agrees when truncated"
-    # One rounded up, the other cut off: neither habit gives both.
-    assert judge(pair, [7.6e-6, 14.7e-6], otherwise="erratum") == "erratum"
+    assert judge(Printed.of(figure), computed, otherwise="erratum") == expected
 
 
 def test_the_rounding_of_the_inputs_leaves_a_range():
-    assert judge(FIGURE, 1.30, low=1.26, high=1.34, otherwise="not reproducible") == "agrees"
-    assert judge(FIGURE, 1.30, low=1.28, high=1.32, otherwise="not reproducible") == "not reproducible"
-    mixed = Printed("1.1; 17.8 %", (1.1, 0.178), (0.1, 0.001))
-    assert rounds_to(mixed, [1.07, 0.16], [1.11, 0.19])
-    assert not rounds_to(mixed, [1.07, 0.16], [1.11, 0.17])
+    for low, high, verdict in ((1.26, 1.34, "agrees"), (1.28, 1.32, "erratum")):
+        assert judge(Printed.of("1.33"), 1.30, low=low, high=high, otherwise="erratum") == verdict
+    mixed, computed = Printed.of("1.1; 17.8 %"), [1.3, 0.1]
+    for most, verdict in ((0.19, "agrees"), (0.17, "erratum")):
+        assert judge(mixed, computed, low=[1.07, 0.16], high=[1.11, most], otherwise="erratum") == verdict
 
 
 def test_numbers_are_written_with_a_true_minus():
     assert numbers([[1e-6, -2e-6], [0.0, 3e-6]], 1, factor=1e6) == "1.0 −2.0 / 0.0 3.0"
-    assert numbers(-0.5, 2) == "−0.50"
-
-
-def test_half_of_a_last_digit_counts_as_rounding_on_either_side():
-    # 0.145 and 1.005 have no exact binary fraction; decimal arithmetic rounds them either way.
-    for shown, computed in ((0.14, 0.145), (0.15, 0.145), (1.0, 1.005), (1.01, 1.005)):
-        assert rounds_to(Printed("", (shown,), 0.01), computed)
-
-
-def test_verdicts_are_those_that_are_explained():
-    for computed in (1.33, 1.338, 1.5):
-        assert judge(FIGURE, computed, otherwise="not reproducible") in VERDICTS
-
-
-def test_numbers_of_any_shape_become_one_tuple():
-    assert floats(1, [2.5, 3], np.array([[4, 5], [6, np.inf]])) == (1.0, 2.5, 3.0, 4.0, 5.0, 6.0, np.inf)
-    assert floats() == ()
+    told = Words().format("{a:2u} {a:0c} {b:gm} {b:g} {c}", a=[-1e-6, 2.5e-6], b=0.15, c="x")
+    assert told == "−1.00 2.50 −0 0 150 0.15 x"

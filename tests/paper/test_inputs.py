@@ -11,41 +11,28 @@ from thermal_robot.paper.inputs import joints
 
 
 def test_the_hand_is_the_only_change_of_the_robot():
-    nominal, other = rv_m2_with_hand(), rv_m2_with_hand(0.123)
+    nominal, other = rv_m2_with_hand(PaperInputs().l5), rv_m2_with_hand(0.123)
+    assert nominal.segments[-1].length == rv_m2_with_hand().segments[-1].length
     assert [s.name for s in other.segments] == [s.name for s in nominal.segments]
     assert [s.length for s in other.segments[:-1]] == [s.length for s in nominal.segments[:-1]]
     assert (nominal.segments[-1].length, other.segments[-1].length) == (0.15, 0.123)
 
 
-def test_the_default_hand_is_the_robot_files():
-    assert rv_m2_with_hand(PaperInputs().l5).segments[-1].length == rv_m2_with_hand().segments[-1].length
-
-
-@pytest.mark.parametrize("l5", [0.0, -0.1, np.nan, np.inf])
-def test_a_hand_without_length_is_refused(l5):
-    with pytest.raises(RobotError, match="l5 must be a positive number of metres"):
-        PaperInputs(l5=l5)
-
-
-@pytest.mark.parametrize("l5", [5e-324, 1e-9, 1e3 + 1, 1e154, 1e308])
-def test_a_hand_that_arithmetic_does_not_bear_is_refused(l5):
-    with pytest.raises(RobotError, match=r"l5 must be from 0\.001 to 1000 m long"):
-        PaperInputs(l5=l5)
-
-
-@pytest.mark.parametrize("l5", ["1e308", "1e154", "1e999", "5e-324", "1e-9", "0", "-1", "nan", "inf", "-inf"])
-def test_the_command_says_so_in_one_line(capsys, l5):
+@pytest.mark.parametrize("l5", ["0", "-0.1", "nan", "inf", "5e-324", "1e-9", "1001", "1e154", "1e308"])
+def test_a_hand_that_arithmetic_does_not_bear_is_refused_in_one_line(capsys, l5):
+    words = (
+        "l5 must be from 0.001 to 1000 m long" if 0.0 < float(l5) < np.inf else "l5 must be a positive number of metres"
+    )
+    with pytest.raises(RobotError, match=words):
+        PaperInputs(l5=float(l5))
     assert cli.main(["paper", f"--l5={l5}"]) == 2
     out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("thermal-robot: l5 must be ")
-    assert err.count("\n") == 1
+    assert (out, err) == ("", f"thermal-robot: {words}, got {float(l5)}\n")
 
 
 def test_a_word_for_a_length_is_refused_in_one_line(capsys):
-    with pytest.raises(SystemExit) as stopped:
+    with pytest.raises(SystemExit, match="2"):
         cli.main(["paper", "--l5", "long"])
-    assert stopped.value.code == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 

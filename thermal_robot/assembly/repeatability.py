@@ -261,36 +261,24 @@ def _equations(
     """
     from scipy.special import chdtri, ndtri
 
-    pairs = [(a, b) for a in range(deviations.shape[1]) for b in range(a + 1)]
-    cells = [
-        (pose, a, b)
-        for pose in range(len(deviations))
-        for a, b in pairs
-        if np.isfinite(deviations[pose, a]) and (a == b or covariances is not None)
-    ]
-    risk_each = risk / len(cells)
+    components = deviations.shape[1]
+    paired = np.tri(components) if covariances is not None else np.eye(components)
+    pose, a, b = np.nonzero(np.isfinite(deviations)[:, :, None] & (paired > 0.0))
     largest = np.max(np.nan_to_num(deviations), axis=0)
-    rows = []
-    for pose, a, b in cells:
-        size = float(largest[a] * largest[b]) or 1.0
-        first, second = deviations[pose, a], deviations[pose, b]
-        value = first * second if a == b or covariances is None else covariances[pose, a, b]
-        if a == b:
-            low, high = max(first - rounding, 0.0) ** 2, (first + rounding) ** 2
-            if sample_size is not None:
-                freedom = sample_size - 1
-                low *= freedom / chdtri(freedom, risk_each / 2.0)
-                high *= freedom / chdtri(freedom, 1.0 - risk_each / 2.0)
-        else:
-            width = rounding * (first + second + rounding)
-            if sample_size is not None:
-                width -= ndtri(risk_each / 2.0) * np.sqrt(((first * second) ** 2 + value**2) / (sample_size - 1))
-            low, high = value - width, value + width
-        rows.append(
-            (*jacobian[pose, a] * jacobian[pose, b] / size, value / size, low / size - _EXACT, high / size + _EXACT)
-        )
-    table = np.array(rows)
-    return table[:, :-3], table[:, -3], table[:, -2], table[:, -1]
+    size = np.where(largest[a] * largest[b] > 0.0, largest[a] * largest[b], 1.0)
+    first, second, own = deviations[pose, a], deviations[pose, b], a == b
+    value = first * second if covariances is None else np.where(own, first * second, covariances[pose, a, b])
+    # of a variance
+    low, high = np.maximum(first - rounding, 0.0) ** 2, (first + rounding) ** 2
+    # of a product
+    width = rounding * (first + second + rounding)
+    if sample_size is not None:
+        freedom, each = sample_size - 1, risk / len(pose) / 2.0
+        low, high = low * freedom / chdtri(freedom, each), high * freedom / chdtri(freedom, 1.0 - each)
+        width = width - ndtri(each) * np.sqrt(((first * second) ** 2 + value**2) / freedom)
+    low, high = np.where(own, low, value - width), np.where(own, high, value + width)
+    design = jacobian[pose, a] * jacobian[pose, b] / size[:, None]
+    return design, value / size, low / size - _EXACT, high / size + _EXACT
 
 
 def _fit(design: Array, observed: Array, low: Array, high: Array) -> tuple[Array, float]:

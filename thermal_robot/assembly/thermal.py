@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -462,10 +462,8 @@ def _over_time(robot: Robot, ambient: PerSegment, rows: int) -> Array:
 Axes: TypeAlias = "str | Sequence[str]"
 """Letters among x, y and z that are measured at every pose, or a word of them for each pose."""
 
-RANK_TOLERANCE = 1e-9
-"""Singular values below this share of the largest are zero: between rounding and any geometry that can be built."""
-
-
+_RANK = 1e-9
+# Singular values below this share of the largest are zero: between rounding and any geometry that can be built.
 _LEAST_SHARE = 1e-6
 # Of an unknown in what the system cannot see: a millimetre there would be a nanometre here.
 
@@ -486,15 +484,15 @@ def measured(words: Sequence[str]) -> NDArray[np.bool_]:
     return np.array([[letter in word for letter in "xyz"] for word in words], dtype=bool).reshape(-1, 3)
 
 
-def visible(right_vectors: Array, rank: int) -> NDArray[np.bool_]:
-    """Whether each unknown is determined alone: no combination that the system cannot see holds it."""
-    unseen = np.sqrt(np.sum(right_vectors[rank:] ** 2, axis=0))
-    return np.asarray(unseen < _LEAST_SHARE)
+def pseudo_inverse(system: Array) -> tuple[Array, int, NDArray[np.bool_]]:
+    """Pseudo-inverse (S, m) of a system (m, S), its rank, and which unknowns it determines by themselves, (S,).
 
-
-def rank_of(singular: Array) -> int:
-    """Return how many singular values, largest first, are not zero."""
-    return int(np.sum(singular > RANK_TOLERANCE * singular[0])) if len(singular) and singular[0] > 0.0 else 0
+    An unknown is determined alone where no combination that the system cannot see holds it.
+    """
+    left, singular, right = np.linalg.svd(system, full_matrices=True)
+    rank = int(np.sum(singular > _RANK * np.max(singular, initial=0.0)))
+    known = np.linalg.norm(right[rank:], axis=0) < _LEAST_SHARE
+    return (right[:rank].T / singular[:rank]) @ left[:, :rank].T, rank, np.asarray(known)
 
 
 _CANDIDATES = 2000
@@ -572,14 +570,16 @@ def best_poses(
     if not 0 < count <= len(pool):
         raise EstimationError(f"{count} poses cannot be chosen from {len(pool)} candidates within the joint limits")
     jacobian = elongation_jacobian(robot, pool)
-    basis = _determinable(jacobian, words)
-    information = {word: _information(jacobian[:, measured([word])[0]] @ basis) for word in set(words)}
-    chosen = _greedy(information, words)
-    _exchange(information, words, chosen, criterion)
-    picked = np.array(chosen)
-    system = jacobian[picked][measured(words)]
-    errors, condition = _quality(system)
-    return BestPoses(pool[picked], words, segment_names(robot), errors, condition)
+    # What no candidate shows is left out: an orthonormal basis of the rest.
+    seen = jacobian[:, measured(words).any(axis=0)].reshape(-1, jacobian.shape[2])
+    _, singular, right = np.linalg.svd(seen, full_matrices=False)
+    basis = right[singular > _RANK * np.max(singular)].T
+    rows = {word: jacobian[:, measured([word])[0]] @ basis for word in set(words)}
+    chosen = np.array(_chosen({word: np.swapaxes(r, 1, 2) @ r for word, r in rows.items()}, words, criterion))
+    system = jacobian[chosen][measured(words)]
+    inverse, rank, known = pseudo_inverse(system)
+    errors = np.where(known, np.linalg.norm(inverse, axis=1), np.nan)
+    return BestPoses(pool[chosen], words, segment_names(robot), errors, _condition(system, rank))
 
 
 def _pool(robot: Robot, candidates: ArrayLike | int, seed: int) -> Array:
@@ -592,71 +592,48 @@ def _pool(robot: Robot, candidates: ArrayLike | int, seed: int) -> Array:
     return rows[np.all((rows >= robot.lower) & (rows <= robot.upper), axis=1)]
 
 
-def _determinable(jacobian: Array, words: tuple[str, ...]) -> Array:
-    """Orthonormal basis (S, r) of the combinations that some candidate shows."""
-    seen = jacobian[:, measured(words).any(axis=0)].reshape(-1, jacobian.shape[2])
-    _, singular, right = np.linalg.svd(seen, full_matrices=False)
-    return np.asarray(right[: rank_of(singular)].T)
+def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: str) -> list[int]:
+    """Add one pose after the other, then exchange one at a time until nothing is better.
 
-
-def _information(rows: Array) -> Array:
-    return np.asarray(np.swapaxes(rows, 1, 2) @ rows)
-
-
-def _greedy(information: dict[str, Array], words: tuple[str, ...]) -> list[int]:
-    """Add one pose after the other; by determinant, which alone tells half-determined systems apart."""
-    size = next(iter(information.values())).shape[1]
-    total, chosen = 1e-6 * np.eye(size), list[int]()
-    for slot, word in enumerate(words):
-        best = int(np.argmax(_scores(total, information[word], "D", _taken(words, chosen, slot))))
-        chosen.append(best)
-        total = total + information[word][best]
-    return chosen
-
-
-def _exchange(information: dict[str, Array], words: tuple[str, ...], chosen: list[int], criterion: str) -> None:
-    size = next(iter(information.values())).shape[1]
+    Poses are added by determinant, which alone tells half-determined systems apart.
+    """
+    chosen: list[int] = []
+    for slot in range(len(words)):
+        chosen.append(int(np.argmax(_scores(information, words, chosen, slot, "D", 1e-6))))
     for _ in range(_SWEEPS):
         before = list(chosen)
-        for slot, word in enumerate(words):
+        for slot in range(len(words)):
             # A little of everything keeps the criteria finite where fewer components than unknowns are measured.
-            total = 1e-9 * np.eye(size)
-            for other, c in enumerate(chosen):
-                if other != slot:
-                    total = total + information[words[other]][c]
-            scores = _scores(total, information[word], criterion, _taken(words, chosen, slot))
+            scores = _scores(information, words, chosen, slot, criterion, 1e-9)
             best = int(np.argmax(scores))
             if scores[best] > scores[chosen[slot]] + 1e-12 * abs(scores[best]):
                 chosen[slot] = best
         if chosen == before:
-            return
+            break
+    return chosen
 
 
-def _taken(words: tuple[str, ...], chosen: list[int], slot: int) -> list[int]:
-    return [c for other, c in enumerate(chosen) if other != slot and words[other] == words[slot]]
-
-
-def _scores(total: Array, added: Array, criterion: str, taken: list[int]) -> NDArray[np.floating[Any]]:
-    """How good each candidate is, (M,); the larger, the better."""
-    with_each = total + added
-    scores: NDArray[np.floating[Any]]
+def _scores(
+    information: dict[str, Array], words: tuple[str, ...], chosen: list[int], slot: int, criterion: str, least: float
+) -> Array:
+    """How good each candidate is for a slot beside the others, (M,); the larger, the better."""
+    others = [(words[other], c) for other, c in enumerate(chosen) if other != slot]
+    own = information[words[slot]]
+    with_each = own + least * np.eye(own.shape[1])
+    for word, c in others:
+        with_each = with_each + information[word][c]
     if criterion == "D":
         scores = np.linalg.slogdet(with_each)[1]
     elif criterion == "A":
         scores = -np.trace(np.linalg.inv(with_each), axis1=1, axis2=2)
     else:
         scores = np.linalg.eigvalsh(with_each)[:, 0]
-    scores[taken] = -np.inf
-    return scores
+    scores[[c for word, c in others if word == words[slot]]] = -np.inf
+    return np.asarray(scores)
 
 
-def _quality(system: Array) -> tuple[Array, float]:
-    _, singular, right = np.linalg.svd(system, full_matrices=True)
-    rank = rank_of(singular)
-    known: NDArray[np.bool_] = visible(right, rank)
-    errors = np.sqrt(np.sum((right[:rank].T / singular[:rank]) ** 2, axis=1))
-    whole = rank == system.shape[1]
-    return np.where(known, errors, np.nan), float(singular[0] / singular[-1]) if whole else np.inf
+def _condition(system: Array, rank: int) -> float:
+    return float(np.linalg.cond(system)) if rank == system.shape[1] else np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -750,33 +727,25 @@ def identify_elongations(
     if not np.all(np.isfinite(moved[chosen])):
         raise EstimationError("a measured component of a displacement is not a finite number")
     noise = _noise(len(moved), sigma, covariance)
-    system, right, weighted, weighted_right = [], [], [], []
-    for pose, (rows, kept) in enumerate(zip(jacobian, chosen, strict=True)):
-        whiten = np.eye(int(kept.sum())) if noise is None else _whitening(noise[pose][np.ix_(kept, kept)])
-        system.append(rows[kept])
-        right.append(moved[pose, kept])
-        weighted.append(whiten @ rows[kept])
-        weighted_right.append(whiten @ moved[pose, kept])
-    design, observed = np.concatenate(weighted), np.concatenate(weighted_right)
-    left, singular, right_vectors = np.linalg.svd(design, full_matrices=True)
-    rank = rank_of(singular)
-    inverse = right_vectors[:rank].T / singular[:rank]
-    values = inverse @ (left[:, :rank].T @ observed)
-    known = visible(right_vectors, rank)
-
-    spread = inverse @ inverse.T
+    both, weighted = np.concatenate([jacobian, moved[..., None]], axis=2), []
+    for pose, kept in enumerate(chosen):
+        rows = both[pose, kept]
+        weighted.append(rows if noise is None else np.linalg.solve(_root(noise[pose][np.ix_(kept, kept)]), rows))
+    whole = np.concatenate(weighted)
+    design, observed = whole[:, :-1], whole[:, -1]
+    inverse, rank, known = pseudo_inverse(design)
+    values, spread = inverse @ observed, inverse @ inverse.T
     if noise is None:
         freedom = len(observed) - rank
         spread = spread * (np.sum((observed - design @ values) ** 2) / freedom if freedom else np.nan)
-    residuals = np.full_like(moved, np.nan)
-    residuals[chosen] = np.concatenate(right) - np.concatenate(system) @ values
+    residuals = np.where(chosen, moved - jacobian @ values, np.nan)
     return IdentifiedElongations(
         segment_names(robot),
         np.where(known, values, np.nan),
         np.where(known, np.sqrt(np.diag(spread)), np.nan),
         np.where(np.outer(known, known), spread, np.nan),
         known,
-        float(np.linalg.cond(np.concatenate(system))) if rank == len(known) else np.inf,
+        _condition(jacobian[chosen], rank),
         rank,
         residuals,
     )
@@ -800,10 +769,11 @@ def _noise(poses: int, sigma: ArrayLike | None, covariance: ArrayLike | None) ->
     return squares
 
 
-def _whitening(covariance: Array) -> Array:
+def _root(covariance: Array) -> Array:
+    """Cholesky's factor of the noise of a pose."""
     if not np.all(np.isfinite(covariance)):
         raise EstimationError("the noise of a measured component is not a finite number")
     try:
-        return np.linalg.inv(np.linalg.cholesky(covariance))
+        return np.asarray(np.linalg.cholesky(covariance), dtype=float)
     except np.linalg.LinAlgError as error:
         raise EstimationError("the covariance of a measured displacement is not positive definite") from error

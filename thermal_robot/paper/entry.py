@@ -2,43 +2,51 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from decimal import Decimal
+from string import Formatter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-AGREES = "agrees"
-TRUNCATED = "agrees when truncated"
-PARTLY = "agrees in part"
-ERRATUM = "erratum"
-NOT_REPRODUCIBLE = "not reproducible"
-ONLY_BOUNDED = "only bounded"
-NEGLECTED = "neglected"
-NOT_PRINTED = "not printed"
-
 VERDICTS = {
-    AGREES: "the printed figures are the computed ones, rounded, or lie within what the inputs' rounding leaves open",
-    TRUNCATED: "the printed figures are the computed ones with the further digits cut off",
-    PARTLY: "the claim holds in a part of the cases for which it is made",
-    ERRATUM: "what the paper itself prints determines the figure, and it is another",
-    NOT_REPRODUCIBLE: "no model or data in the paper lead to the figure",
-    ONLY_BOUNDED: "what is printed leaves a range open that reaches zero",
-    NEGLECTED: "the paper leaves it out; the consequence is computed",
-    NOT_PRINTED: "the paper prints no figure to compare with",
+    "agrees": "the printed figures are the computed ones, rounded, or lie within what the inputs' rounding leaves open",
+    "agrees when truncated": "the printed figures are the computed ones with the further digits cut off",
+    "agrees in part": "the claim holds in a part of the cases for which it is made",
+    "erratum": "what the paper itself prints determines the figure, and it is another",
+    "not reproducible": "no model or data in the paper lead to the figure",
+    "only bounded": "what is printed leaves a range open that reaches zero",
+    "neglected": "the paper leaves it out; the consequence is computed",
+    "not printed": "the paper prints no figure to compare with",
 }
 """What each verdict means."""
 
 _SLACK = 1e-9
 # Of a printed digit: what binary fractions may be off a decimal one.
+_UNITS = {"µm": -6, "mm": -3, "%": -2}
 
 
 @dataclass(frozen=True)
 class Printed:
-    """Figures as the paper prints them: as text, in SI units, and one unit of the last digit, of all or of each."""
+    """Figures as the paper prints them: as text, in SI units, and one unit of the last digit of each."""
 
     text: str
     values: tuple[float, ...]
-    digits: float | tuple[float, ...]
+    digits: tuple[float, ...]
+
+    @classmethod
+    def of(cls, text: str, digit: float | None = None) -> Printed:
+        """Read the numbers of a text, each part of it in its own unit; one with an exponent is in the unit squared."""
+        values, digits = [], []
+        for part in text.replace("−", "-").split(";"):
+            exponent = next((power for unit, power in _UNITS.items() if unit in part), 0)
+            for number in re.findall(r"[-+]?\d*\.?\d+(?:e-?\d+)?", part):
+                value = Decimal(number).scaleb(exponent * (2 if "e" in number else 1))
+                values.append(float(value))
+                digits.append(float(Decimal(1).scaleb(int(value.as_tuple().exponent))) if digit is None else digit)
+        return cls(text, tuple(values), tuple(digits))
 
 
 @dataclass(frozen=True)
@@ -73,18 +81,16 @@ class Entry:
     depends: tuple[str, ...] = ()
 
 
-def rounds_to(printed: Printed, low: ArrayLike, high: ArrayLike | None = None) -> bool:
+def rounds_to(printed: Printed, low: ArrayLike, high: ArrayLike) -> bool:
     """Whether every printed figure is a rounding of some value between ``low`` and ``high``."""
-    bottom = np.ravel(np.asarray(low, dtype=float))
-    top = bottom if high is None else np.ravel(np.asarray(high, dtype=float))
-    values, half = np.array(printed.values), np.broadcast_to(printed.digits, len(printed.values)) * (0.5 + _SLACK)
+    bottom, top = (np.ravel(np.asarray(v, dtype=float)) for v in (low, high))
+    values, half = np.array(printed.values), np.array(printed.digits) * (0.5 + _SLACK)
     return bool(np.all((bottom <= values + half) & (top >= values - half)))
 
 
 def truncates_to(printed: Printed, computed: ArrayLike) -> bool:
     """Whether every printed figure is a computed one with the further digits cut off."""
-    exact, values = np.ravel(np.asarray(computed, dtype=float)), np.array(printed.values)
-    digits = np.broadcast_to(printed.digits, len(values))
+    exact, values, digits = np.ravel(np.asarray(computed, float)), np.array(printed.values), np.array(printed.digits)
     beyond = np.abs(exact) - np.abs(values)
     return bool(np.all((exact * values >= 0.0) & (beyond >= -_SLACK * digits) & (beyond < digits)))
 
@@ -99,13 +105,14 @@ def judge(
 ) -> str:
     """Return the verdict on printed figures, all together, beside as many computed numbers, SI.
 
-    ``otherwise`` where neither rounding nor truncation leads to them: ``ERRATUM`` where the paper's own numbers
-    determine the figure, ``NOT_REPRODUCIBLE`` where they do not. ``low``, ``high``: range of each computed number over
-    the rounding of the inputs, where that is to count.
+    ``otherwise`` where neither rounding nor truncation leads to them: ``"erratum"`` where the paper's own numbers
+    determine the figure, ``"not reproducible"`` where they do not. ``low``, ``high``: range of each computed number
+    over the rounding of the inputs, where that is to count.
     """
-    if rounds_to(printed, computed) or (low is not None and high is not None and rounds_to(printed, low, high)):
-        return AGREES
-    return TRUNCATED if truncates_to(printed, computed) else otherwise
+    ranges = [(computed, computed)] if low is None or high is None else [(computed, computed), (low, high)]
+    if any(rounds_to(printed, *ends) for ends in ranges):
+        return "agrees"
+    return "agrees when truncated" if truncates_to(printed, computed) else otherwise
 
 
 def numbers(values: ArrayLike, decimals: int = 1, *, factor: float = 1.0) -> str:
@@ -115,6 +122,12 @@ def numbers(values: ArrayLike, decimals: int = 1, *, factor: float = 1.0) -> str
     return " / ".join(said).replace("-", "−")
 
 
-def floats(*values: ArrayLike) -> tuple[float, ...]:
-    """Join numbers and arrays into one tuple."""
-    return tuple(float(v) for array in values for v in np.ravel(np.asarray(array, dtype=float)))
+class Words(Formatter):
+    """Texts of the table: ``{x:2u}`` writes numbers with two decimals in millionths, ``m`` thousandths, ``c`` %."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """Write numbers by :func:`numbers`, the rest as ever."""
+        factor = {"u": 1e6, "m": 1e3, "c": 1e2}.get(format_spec[-1:], 1.0)
+        if format_spec[:1].isdigit():
+            return numbers(value, int(format_spec[0]), factor=factor)
+        return format(value * factor, "g") if format_spec[:1] == "g" else format(value, format_spec)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from textwrap import wrap
-from typing import Any, TypeAlias, cast
+from typing import Any, cast
 
-from thermal_robot.paper.entry import VERDICTS, Entry
+import numpy as np
+
+from thermal_robot.paper import rows
+from thermal_robot.paper.entry import VERDICTS, Entry, Words, judge
 from thermal_robot.paper.inputs import PaperInputs
-from thermal_robot.paper.rows import ROWS
 
 WIDTH = 120
 _COLUMNS = (32, 22, 39, 21)
@@ -81,9 +83,6 @@ def _bound(sentence: str) -> str:
 
 def _escaped(cell: str) -> str:
     return cell.replace("|", "\\|").replace("*", "\\*") if not cell.startswith("**") else cell
-
-
-Row: TypeAlias = Callable[[PaperInputs], Entry]
 
 
 @dataclass(frozen=True)
@@ -159,7 +158,7 @@ def ledger(inputs: PaperInputs | None = None) -> Ledger:
         If the inputs are not those of a robot and of samples.
     """
     given = PaperInputs() if inputs is None else inputs
-    return Ledger(given, tuple(_compute(row, given) for row in ROWS))
+    return Ledger(given, tuple(compute(row, given) for row in rows.table()))
 
 
 class _Reading:
@@ -174,11 +173,28 @@ class _Reading:
         return value
 
 
-def _compute(row: Row, inputs: PaperInputs) -> Entry:
-    reading = _Reading(inputs)
-    # It has every field of the inputs, which is all that a row may ask for.
-    entry = row(cast("PaperInputs", reading))
-    return replace(entry, depends=tuple(f.name for f in fields(inputs) if f.name in reading._read))
+def compute(row: Mapping[str, Any], inputs: PaperInputs) -> Entry:
+    """Compute one row of the table."""
+    reading, figures = _Reading(inputs), rows.printed(row["quantity"])
+    equation = getattr(rows, row["equation"]) if "equation" in row else lambda *_: {"values": ()}
+    # It has every field of the inputs, which is all that an equation may ask for.
+    found = equation(cast("PaperInputs", reading), figures, row)
+    values = _floats(found["values"])
+    verdict = found.get("verdict") or row.get("verdict")
+    if not verdict:
+        bounds = {"low": found.get("low"), "high": found.get("high")}
+        verdict = judge(figures, found.get("compared", values), otherwise=row["otherwise"], **bounds)
+    words, given = Words(), {**row, **found, "i": reading}
+    computed, why = (words.vformat(row[name], (), given) for name in ("computed", "why"))
+    depends = tuple(f.name for f in fields(inputs) if f.name in reading._read)
+    return Entry(row["quantity"], row["where"], row["printed"], computed, values, verdict, why, depends)
+
+
+def _floats(values: Any) -> tuple[float, ...]:
+    """Join numbers and arrays, nested in any way, into one tuple."""
+    if isinstance(values, tuple | list):
+        return tuple(number for value in values for number in _floats(value))
+    return tuple(float(number) for number in np.ravel(values))
 
 
 def _plain(value: Any) -> Any:

@@ -149,3 +149,9 @@ def test_questions_with_none_or_two_requirements_are_refused():
         capability(0.5, convention="three_sided")
     with pytest.raises(ValueError, match="every clearance"):
         required_clearance(np.zeros((2, 2)), probability=0.5)
+    with pytest.raises(ValueError, match="is not negative"):
+        failing_from_capability(-1.0)
+    with pytest.raises(ValueError, match="convention"):
+        failing_from_capability(1.0, convention="three_sided")
+    with pytest.raises(ValueError, match="two positive numbers"):
+        required_clearance(np.eye(2), probability=0.5, shape="rectangle", sides=(1.0, 0.0))

@@ -1,11 +1,158 @@
-"""The uniform part of an error: moments, tilings and draws of segments, boxes and zonotopes."""
+"""Tolerance polygon and zonotope against enumeration of the corners; the uniform part: moments, tilings, draws."""
+
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
-from thermal_robot.assembly.probability import UniformSpread, joining_probability, zonotope
-from thermal_robot.assembly.probability.spread import generator_bounds
+from thermal_robot.assembly.probability import (
+    UniformSpread,
+    joining_probability,
+    plane_axes,
+    polygon_in_plane,
+    zonotope,
+)
+
+ELONGATIONS = np.array([14.0, 5.0, 9.0, 7.0, 8.0])  # micrometres, for 3 K
+POSES = {"a": (0.5235, 0.6981, -0.3490, -1.0471), "b": (0.5235, 0.8726, -1.3962, -1.0471)}
+
+
+def sensitivities(q1, q2, q3, q4):
+    """Equations 9-11 as columns: what one unit of every link's elongation does to x, y, z."""
+    angles = np.cumsum([q2, q3, q4])
+    forward = np.concatenate([[0.0, 1.0], np.cos(angles)])
+    upward = np.concatenate([[1.0, 0.0], np.sin(angles)])
+    return np.stack([np.sin(q1) * forward, np.cos(q1) * forward, upward])
+
+
+def random_case(rng, dimension, count, kind):
+    columns = rng.normal(size=(dimension, count))
+    low = rng.normal(size=count)
+    high = low + rng.uniform(0.2, 2.0, count)
+    if kind == "parallel":
+        columns[:, 1], columns[:, 3] = -2.0 * columns[:, 0], 0.5 * columns[:, 0]
+    elif kind == "zero":
+        columns[:, 2] = 0.0
+        low[3] = high[3]
+    elif kind == "coplanar":
+        columns[:, 3] = columns[:, 0] + columns[:, 1]
+        columns[:, 4] = columns[:, 0] - 2.0 * columns[:, 1]
+    return columns, low, high
+
+
+def corners_of(columns, low, high):
+    return np.array(list(product(*zip(low, high, strict=True)))) @ columns.T
+
+
+CASES = [(d, k, kind) for d in (2, 3) for k in (5, 8) for kind in ("general", "parallel", "zero", "coplanar")]
+
+
+@pytest.mark.parametrize(("dimension", "count", "kind"), CASES)
+def test_zonotope_is_the_hull_of_all_corners(dimension, count, kind):
+    rng = np.random.default_rng(count + dimension)
+    for _ in range(5):
+        columns, low, high = random_case(rng, dimension, count, kind)
+        body, corners = zonotope(columns, low, high), corners_of(columns, low, high)
+        hull = ConvexHull(corners)
+        assert body.content == pytest.approx(hull.volume, rel=1e-11)
+        assert ConvexHull(body.vertices).volume == pytest.approx(hull.volume, rel=1e-11)
+        assert len(ConvexHull(body.vertices).vertices) == len(body.vertices), "every vertex must be needed"
+        assert body.farthest_distance == pytest.approx(np.max(np.linalg.norm(corners, axis=1)), rel=1e-14)
+        np.testing.assert_allclose(columns @ body.farthest_corner, body.farthest, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(body.corners @ columns.T, body.vertices, rtol=1e-13, atol=1e-13)
+        assert np.all((body.corners == low) | (body.corners == high))
+        directions = rng.normal(size=(20, dimension))
+        np.testing.assert_allclose(body.support(directions), np.max(directions @ corners.T, axis=1), rtol=1e-13)
+        assert np.all(body.contains(corners))
+        assert not np.any(body.contains(body.vertices + 1e-9 * (body.vertices - body.centre)))
+
+
+@pytest.mark.parametrize("kind", ["general", "parallel", "zero", "coplanar"])
+def test_polygon_runs_counter_clockwise_from_its_lowest_vertex(kind):
+    columns, low, high = random_case(np.random.default_rng(1), 2, 6, kind)
+    vertices = zonotope(columns, low, high).vertices
+    edges = np.roll(vertices, -1, axis=0) - vertices
+    turns = edges[:, 0] * np.roll(edges, -1, axis=0)[:, 1] - edges[:, 1] * np.roll(edges, -1, axis=0)[:, 0]
+    assert np.all(turns > 0.0)
+    assert np.argmin(vertices[:, 1]) == 0
+    x, y = vertices.T
+    shoelace = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+    assert zonotope(columns, low, high).area == pytest.approx(shoelace, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["general", "parallel", "zero", "coplanar"])
+def test_faces_close_the_body_and_look_outwards(kind):
+    columns, low, high = random_case(np.random.default_rng(2), 3, 6, kind)
+    body = zonotope(columns, low, high)
+    edges = {}
+    volume = 0.0
+    for face in body.faces:
+        points = body.vertices[list(face)]
+        volume += sum(np.linalg.det(points[[0, i, i + 1]]) for i in range(1, len(face) - 1)) / 6.0
+        for one, two in zip(face, face[1:] + face[:1], strict=True):
+            edges[one, two] = edges.get((one, two), 0) + 1
+    assert all(count == 1 and edges[two, one] == 1 for (one, two), count in edges.items())
+    assert len(body.vertices) - len(edges) // 2 + len(body.faces) == 2, "Euler"
+    assert body.volume == pytest.approx(volume, rel=1e-12)
+
+
+def test_parallel_generators_leave_a_segment_and_none_a_point():
+    for columns in ([[1.0, -2.0, 0.5], [2.0, -4.0, 1.0]], [[1.0, -2.0, 0.5], [2.0, -4.0, 1.0], [0.0, 0.0, 0.0]]):
+        body = zonotope(columns, 0.0, 1.0)
+        assert (len(body.vertices), body.content, body.faces) == (2, 0.0, ())
+        assert body.farthest_distance == pytest.approx(2.0 * np.sqrt(5.0), rel=1e-14)
+        middle = body.centre
+        assert body.contains(middle)
+        assert not body.contains(middle + np.eye(len(middle))[0] * 0.01)
+    for dimension in (2, 3):
+        body = zonotope(np.zeros((dimension, 4)), -1.0, 1.0)
+        np.testing.assert_array_equal(body.vertices, np.zeros((1, dimension)))
+        assert body.contains(np.zeros(dimension))
+        assert not body.contains(np.full(dimension, 0.1))
+    assert zonotope(np.empty((2, 0)), 0.0, 1.0).farthest_distance == 0.0
+
+
+def test_a_turned_box_is_a_box_and_a_flat_body_its_polygon():
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    body = zonotope(turn * [1.0, 2.0, 3.0], 0.0, 1.0)
+    assert (len(body.vertices), len(body.faces)) == (8, 6)
+    assert body.volume == pytest.approx(6.0, rel=1e-13)
+    assert body.farthest_distance == pytest.approx(np.sqrt(14.0), rel=1e-14)
+    columns = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    body = zonotope(columns, 0.0, 1.0)
+    assert (len(body.vertices), body.volume) == (6, 0.0)
+    assert body.contains([1.0, 1.0, 0.0])
+    assert not body.contains([1.0, 1.0, 0.01])
+    assert body.farthest_distance == pytest.approx(np.sqrt(8.0), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("pose", "bound", "expected"), [("a", 0.0, 27.35), ("a", -1.0, 29.34), ("b", 0.0, 22.89), ("b", -1.0, 32.71)]
+)
+def test_figure_5_farthest_point_and_vertices(pose, bound, expected):
+    body = polygon_in_plane(sensitivities(*POSES[pose]), bound * ELONGATIONS, ELONGATIONS, "yz")
+    assert len(body.vertices) == 10
+    assert body.farthest_distance == pytest.approx(expected, abs=0.005)
+
+
+def test_polygon_in_a_plane_is_the_shadow_of_the_body():
+    columns = sensitivities(*POSES["a"])
+    body = zonotope(columns, 0.0, ELONGATIONS)
+    for plane in ("xy", "zx", np.array([1.0, 2.0, -0.5]), np.array([0.0, 0.0, 2.0]), np.eye(3)[[2, 0]]):
+        shadow = polygon_in_plane(columns, 0.0, ELONGATIONS, plane)
+        flat = body.vertices @ plane_axes(plane).T
+        assert np.all(shadow.contains(flat))
+        directions = np.random.default_rng(3).normal(size=(30, 2))
+        np.testing.assert_allclose(shadow.support(directions), np.max(directions @ flat.T, axis=1), atol=1e-12)
+
+
+def test_axes_of_a_normal_are_right_handed_and_the_first_is_level():
+    for normal in ([0.3, -0.4, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]):
+        first, second = plane_axes(normal)
+        np.testing.assert_allclose(np.cross(first, second), np.array(normal) / np.linalg.norm(normal), atol=1e-15)
+        assert first[2] == pytest.approx(0.0, abs=1e-15)
+
 
 COLUMNS = np.array([[1.0, 0.3, 0.7, 0.2, -0.4], [0.2, 1.4, 0.6, -0.5, 0.3]])
 
@@ -15,6 +162,7 @@ def test_spread_has_the_moments_of_its_draws(over):
     columns = np.array([[1.0, 0.3, 0.7, 0.2], [0.2, 1.4, 0.6, -0.5]])
     spread = UniformSpread.zonotope(columns, [-1.0, 0.0, -0.5, 0.0], [1.0, 0.7, 0.5, 2.0], over=over)
     draws = spread.rvs(100_000, random_state=3)
+    np.testing.assert_array_equal(draws[:5], spread.rvs(100_000, np.random.default_rng(3))[:5])
     error = np.sqrt(np.diag(spread.covariance) / 100_000)
     assert np.all(np.abs(draws.mean(axis=0) - spread.mean) < 5.0 * error)
     # Bounded variables: the standard error of a variance is below its own size times sqrt(2 / n).
@@ -75,23 +223,7 @@ def test_uniform_over_the_area_is_uniform():
     assert np.all(np.linalg.eigvalsh(spread.covariance - links.covariance) > 0.0)
 
 
-def test_two_generators_are_the_same_over_links_and_over_the_area():
-    one, two = (UniformSpread.zonotope(COLUMNS[:, :2], -1.0, [0.5, 1.0], over=over) for over in ("links", "area"))
-    np.testing.assert_allclose(one.mean, two.mean, rtol=1e-13)
-    np.testing.assert_allclose(one.covariance, two.covariance, rtol=1e-13)
-
-
-def test_bounds_without_width_leave_a_point():
-    spread = UniformSpread.zonotope(COLUMNS, 0.3, 0.3)
-    np.testing.assert_allclose(spread.mean, 0.3 * COLUMNS.sum(axis=1), rtol=1e-14)
-    np.testing.assert_array_equal(spread.covariance, 0.0)
-    np.testing.assert_allclose(spread.rvs(3, 0), np.tile(spread.mean, (3, 1)))
-
-
-def test_a_seed_repeats_a_draw():
-    spread = UniformSpread.zonotope(COLUMNS, -1.0, 1.0, over="area")
-    np.testing.assert_array_equal(spread.rvs(20, 5), spread.rvs(20, np.random.default_rng(5)))
-    assert not np.array_equal(spread.rvs(20, 5), spread.rvs(20, 6))
+SQUARE = np.ones((2, 3))
 
 
 @pytest.mark.parametrize(
@@ -103,12 +235,22 @@ def test_a_seed_repeats_a_draw():
         (lambda: UniformSpread.segment([[1.0, 2.0]]), "finite vector"),
         (lambda: UniformSpread.zonotope(COLUMNS, -1.0, 1.0, over="volume"), "'links' or 'area'"),
         (lambda: UniformSpread.zonotope([[1.0, 2.0], [2.0, 4.0]], -1.0, 1.0, over="area"), "without area"),
-        (lambda: generator_bounds(COLUMNS, [0.0, 0.0, 0.0, 2.0, 0.0], 1.0), "for generator 3"),
-        (lambda: generator_bounds(COLUMNS, np.zeros(4), 1.0), r"shape \(5,\)"),
-        (lambda: generator_bounds(COLUMNS[0], 0.0, 1.0), "must be columns"),
-        (lambda: generator_bounds(COLUMNS, np.nan, 1.0), "finite"),
+        (lambda: zonotope(COLUMNS, [0.0, 0.0, 0.0, 2.0, 0.0], 1.0), "for generator 3"),
+        (lambda: zonotope(COLUMNS, np.zeros(4), 1.0), r"shape \(5,\)"),
+        (lambda: zonotope(np.ones(3), 0.0, 1.0), "must be columns"),
+        (lambda: zonotope(np.ones((4, 3)), 0.0, 1.0), "two or three rows"),
+        (lambda: zonotope(SQUARE, np.nan, 1.0), "finite"),
+        (lambda: zonotope(SQUARE, 0.0, np.inf), "finite"),
+        (lambda: zonotope(SQUARE, 0.0, 1.0).contains(np.zeros(3)), r"shape \(\.\.\., 2\)"),
+        (lambda: zonotope(SQUARE, 0.0, 1.0).volume, "a polygon has an area"),
+        (lambda: zonotope(np.eye(3), 0.0, 1.0).area, "in space has a volume"),
+        (lambda: polygon_in_plane(SQUARE, 0.0, 1.0, "xy"), "three rows"),
+        *(
+            (lambda plane=plane: polygon_in_plane(np.eye(3), 0.0, 1.0, plane), "plane")
+            for plane in ("xx", "xw", "xyz", [0.0, 0.0, 0.0], np.ones((2, 3)), np.eye(2))
+        ),
     ],
 )
-def test_impossible_parts_are_refused(make, words):
+def test_what_is_impossible_is_refused(make, words):
     with pytest.raises(ValueError, match=words):
         make()

@@ -252,26 +252,14 @@ class Zonotope:
 
     @property
     def area(self) -> float:
-        """Area of the polygon.
-
-        Raises
-        ------
-        ValueError
-            For a zonotope in space; ask for its `volume`, or for the polygon in a plane.
-        """
+        """Area of the polygon; ``ValueError`` for a zonotope in space."""
         if self.dimension != 2:
             raise ValueError("a zonotope in space has a volume; its polygon in a plane has an area")
         return self.content
 
     @property
     def volume(self) -> float:
-        """Volume of the polyhedron.
-
-        Raises
-        ------
-        ValueError
-            For a polygon.
-        """
+        """Volume of the polyhedron; ``ValueError`` for a polygon."""
         if self.dimension != 3:
             raise ValueError("a polygon has an area, not a volume")
         return self.content
@@ -279,20 +267,17 @@ class Zonotope:
     @property
     def farthest(self) -> Array:
         """Vertex farthest from the origin, the nominal position; shape ``(d,)``."""
-        return np.asarray(self.vertices[self._farthest_index()])
+        return np.asarray(self.vertices[np.argmax(np.linalg.norm(self.vertices, axis=1))])
 
     @property
     def farthest_corner(self) -> Array:
         """Elongations that lead to `farthest`, shape ``(k,)``."""
-        return np.asarray(self.corners[self._farthest_index()])
+        return np.asarray(self.corners[np.argmax(np.linalg.norm(self.vertices, axis=1))])
 
     @property
     def farthest_distance(self) -> float:
         """Largest displacement of the tool point."""
         return float(np.linalg.norm(self.farthest))
-
-    def _farthest_index(self) -> int:
-        return int(np.argmax(np.linalg.norm(self.vertices, axis=1)))
 
     def support(self, direction: npt.ArrayLike) -> Array:
         """Largest value of ``direction . displacement``.
@@ -450,71 +435,59 @@ def _polygon(columns: Array, low: Array, high: Array) -> tuple[Array, Array]:
     return table @ columns.T, table
 
 
+def _directions(edges: Array) -> tuple[Array, int]:
+    """Return unit vectors of the edges' directions ``(n, d)``, then those at right angles to all, and their rank."""
+    basis = np.array([direction for direction, _ in _groups(edges)]).reshape(-1, len(edges))
+    rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if len(basis) else 0
+    return np.concatenate([basis, np.linalg.svd(basis)[2][rank:] if len(basis) else np.eye(len(edges))]), rank
+
+
 def _facet_normals(edges: Array) -> Array:
-    """Directions that, with their opposites, bound the zonotope of the given edges ``(d, k)``; shape ``(F, d)``."""
-    dimension = edges.shape[0]
-    directions = [direction for direction, _ in _groups(edges)]
-    basis = np.array(directions) if directions else np.empty((0, dimension))
-    rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if directions else 0
-    # What the zonotope does not extend along bounds it too, with width zero.
-    missing = np.linalg.svd(basis)[2][rank:] if directions else np.eye(dimension)
-    if rank == dimension:
-        if dimension == 2:
-            return np.stack([-basis[:, 1], basis[:, 0]], axis=1)
-        pairs = np.array([np.cross(a, b) for a, b in combinations(basis, 2)])
-        sizes = np.linalg.norm(pairs, axis=1)
-        return np.asarray(pairs[sizes > 1e-12] / sizes[sizes > 1e-12, None])
-    if rank == dimension - 1 and rank == 2:
-        return np.concatenate([missing, np.cross(basis, missing[0])])
-    if rank == 1:
-        return np.concatenate([missing, basis[:1]])
-    return missing
+    """Directions that, with their opposites, bound the zonotope of the given edges ``(d, k)``; shape ``(F, d)``.
+
+    What it does not extend along counts as an edge without length.
+    """
+    basis, _ = _directions(edges)
+    if len(edges) == 2:
+        return np.stack([-basis[:, 1], basis[:, 0]], axis=1)
+    pairs = np.array([np.cross(a, b) for a, b in combinations(basis, 2)])
+    sizes = np.linalg.norm(pairs, axis=1)
+    return np.asarray(pairs[sizes > 1e-12] / sizes[sizes > 1e-12, None])
 
 
 def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
     """Faces by their normals: each face is the polygon of the generators in it, at one end of all the others."""
     edges = columns * (high - low)
-    groups = _groups(edges)
-    basis = np.array([direction for direction, _ in groups]) if groups else np.empty((0, 3))
-    rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if groups else 0
-    if rank < 3:
-        return _flat_polyhedron(columns, low, high, basis, rank)
-    members = np.abs(np.array([signs for _, signs in groups])) > 0.0
-    vertices: dict[bytes, int] = {}
-    corners: list[Array] = []
+    basis, rank = _directions(edges)
+    if rank < 3:  # no volume: its polygon, segment or point, in its own plane
+        axes = np.linalg.svd(basis[: len(basis) - 3 + rank])[2][:2] if rank else np.eye(3)[:2]
+        _, corners = _polygon(axes @ columns, low, high)
+        return Zonotope(columns, low, high, corners @ columns.T, corners)
+    members = np.abs(np.array([signs for _, signs in _groups(edges)])) > 0.0
+    moving = np.any(members, axis=0)
+    numbers: dict[bytes, int] = {}
+    found: list[Array] = []
     faces: list[tuple[int, ...]] = []
-    seen: list[frozenset[int]] = []
-    for i, j in combinations(range(len(groups)), 2):
-        if any(i in plane and j in plane for plane in seen):
-            continue
+    planes_seen = set()
+    for i, j in combinations(range(len(basis)), 2):
         normal = np.cross(basis[i], basis[j])
         normal /= np.linalg.norm(normal)
-        heights = basis @ normal
-        inside = np.abs(heights) <= 1e-10
-        seen.append(frozenset(np.flatnonzero(inside).tolist()))
-        lying = np.any(members[inside], axis=0) | ~np.any(members, axis=0)
+        inside = np.abs(basis @ normal) <= 1e-10
+        if inside.tobytes() in planes_seen:
+            continue
+        planes_seen.add(inside.tobytes())
+        lying = np.any(members[inside], axis=0) | ~moving
         for outward in (normal, -normal):
-            fixed = np.where(outward @ edges > 0.0, high, low)
-            axes = plane_axes(outward)
-            _, polygon = _polygon(axes @ columns[:, lying], low[lying], high[lying])
-            face = []
-            for local in polygon:
-                corner = fixed.copy()
-                corner[lying] = local
-                # A generator without length, or bounds without width, leads nowhere: one corner for all.
-                corner = np.where(np.any(members, axis=0), corner, low)
-                key = corner.tobytes()
-                if key not in vertices:
-                    vertices[key] = len(corners)
-                    corners.append(corner)
-                face.append(vertices[key])
-            faces.append(tuple(face))
-    table = np.array(corners)
+            corner = np.where(outward @ edges > 0.0, high, low)
+            _, polygon = _polygon(plane_axes(outward) @ columns[:, lying], low[lying], high[lying])
+            face = np.tile(corner, (len(polygon), 1))
+            face[:, lying] = polygon
+            # A generator without length, or bounds without width, leads nowhere: one corner for all.
+            face = np.where(moving, face, low)
+            for key, end in zip(map(bytes, face), face, strict=True):
+                if key not in numbers:
+                    numbers[key] = len(found)
+                    found.append(end)
+            faces.append(tuple(numbers[bytes(end)] for end in face))
+    table = np.array(found)
     return Zonotope(columns, low, high, table @ columns.T, table, tuple(faces))
-
-
-def _flat_polyhedron(columns: Array, low: Array, high: Array, basis: Array, rank: int) -> Zonotope:
-    """Build a zonotope in space that has no volume: its polygon, segment or point, in its own plane."""
-    axes = np.linalg.svd(basis)[2][:2] if rank else np.eye(3)[:2]
-    _, corners = _polygon(axes @ columns, low, high)
-    return Zonotope(columns, low, high, corners @ columns.T, corners)
