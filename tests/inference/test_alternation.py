@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.inference.registration import alternate, middle, soft, starts
+from thermal_robot.inference.registration import alternate, starts
 from thermal_robot.kinematics import exp3
 from thermal_robot.observations import Frames
 
@@ -34,18 +34,3 @@ def test_some_rows_are_a_campaign_of_these_rows(campaign):
     found, part = alternate(campaign, declared, targets, some=some), alternate(campaign.take(some), declared, targets)
     assert found[0] == part[0]
     np.testing.assert_array_equal(found[1].base, part[1].base)
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 8])
-def test_the_middle_is_the_median(count):
-    values = np.random.default_rng(count).normal(size=(5, count))
-    np.testing.assert_array_equal(middle(values), np.median(values, axis=1))
-
-
-def test_weights_fall_with_distance_and_do_not_feel_the_unit():
-    distance = np.random.default_rng(0).uniform(0.1, 1.0, (3, 20))
-    weights = soft(distance)
-    np.testing.assert_allclose(soft(1e3 * distance), weights, rtol=1e-9)
-    order = np.argsort(distance, axis=1)
-    assert (np.diff(np.take_along_axis(weights, order, axis=1), axis=1) <= 0.0).all()
-    assert weights.max() < 1.0 < 2.0 * weights.max()

@@ -112,44 +112,26 @@ def rivals(chosen, nominal):
     return list(_others(chosen, nominal, (*known, *gate.alone(known[0], nominal))))
 
 
-def test_rivals_of_a_setting_in_all_joints_are_those_of_each_alone(nominal):
-    """Of a joint's effect, constants being refined: in all joints, or in any one."""
+def test_rivals_of_a_setting_have_one_joint_less_one_more_or_another(nominal):
+    """Of all joints each alone; of a law all that were compared with it; an effect of no joint has itself alone."""
     joints = nominal.robot.joint_names
-    (gain,) = choose(("joint_gain",), (), ())
-    found = {setting.places for setting in rivals(gain, nominal)}
-    assert found == {(), *((j,) for j in joints)}
+    gain, scale = (choose((name,), (), ())[0] for name in ("joint_gain", "instrument_scale"))
+    alone = {frozenset({j}) for j in joints}
 
+    def places(*own):
+        return {frozenset(setting.places) for setting in rivals(replace(gain, places=own), nominal)}
 
-def test_rivals_of_one_joint_are_all_the_others_and_one_more(nominal):
-    joints = nominal.robot.joint_names
-    (gain,) = choose(("joint_gain",), (), ())
-    found = [setting.places for setting in rivals(replace(gain, places=("joint_2",)), nominal)]
-    assert {frozenset(own) for own in found} == {
-        frozenset(),
-        *(frozenset({j}) for j in joints),
-        *(frozenset({"joint_2", j}) for j in joints),
-    }
-
-
-def test_rivals_of_two_joints_have_one_less_one_more_or_another(nominal):
-    joints = nominal.robot.joint_names
-    (gain,) = choose(("joint_gain",), (), ())
-    pair = ("joint_2", "joint_4")
-    found = {frozenset(setting.places) for setting in rivals(replace(gain, places=pair), nominal)}
+    assert places() == {frozenset(), *alone}
+    assert places("joint_2") == {frozenset(), *alone, *(frozenset({"joint_2", j}) for j in joints)}
+    pair = {"joint_2", "joint_4"}
+    found = places(*sorted(pair))
     assert {len(own) for own in found} == {0, 1, 2, 3}
-    another = {frozenset({kept, j}) for kept in pair for j in joints if j not in pair}
-    assert {own for own in found if len(own) == 2} == {frozenset(pair), *another}
-    assert {own for own in found if len(own) == 3} == {frozenset({*pair, j}) for j in joints} - {frozenset(pair)}
     assert {frozenset({j}) for j in pair} <= found
-
-
-def test_rivals_of_a_law_are_all_that_were_compared_with_it(nominal):
+    another = {frozenset({kept, j}) for kept in pair for j in set(joints) - pair}
+    assert {own for own in found if len(own) == 2} == {frozenset(pair), *another}
+    assert {own for own in found if len(own) == 3} == {frozenset({*pair, j}) for j in set(joints) - pair}
     laws = [Discovered(place=f"joint_{k}", quantity="time", tried=50.0) for k in (1, 2, 3)]
     assert list(_others(laws[1], nominal, laws)) == laws
-
-
-def test_an_effect_that_sits_in_no_joint_has_itself_alone(nominal):
-    (scale,) = choose(("instrument_scale",), (), ())
     assert set(rivals(scale, nominal)) == {scale}
 
 

@@ -8,9 +8,8 @@ from inference.problems import FirstJoint
 from simulate import simulate
 
 from thermal_robot.effects import choose
-from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.exact import _ridge_step, corrected_observations, gauss_newton
+from thermal_robot.inference.exact import corrected_observations, gauss_newton
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.problem import Linear, gram, parameter_values
 from thermal_robot.inference.registration import moved, register
@@ -20,11 +19,6 @@ from thermal_robot.observations import observe
 
 SETTLED = 1e-4  # standard deviations
 NOISE = 25e-6  # m
-
-
-def products_of(design, gap):
-    stack = np.column_stack([design, gap])
-    return stack.T @ stack
 
 
 def explained(campaign, effects):
@@ -149,38 +143,6 @@ def test_without_effects_the_corrected_model_is_the_nominal_one(rv_m2):
     taken = sum(block(plain, e).columns @ v for e, v in zip(effects, values, strict=True))
     gap = corrected_observations(campaign, frames, list(zip(effects, values, strict=True))).gap
     np.testing.assert_allclose(plain.gap - gap, taken, rtol=0, atol=1e-5 * np.abs(taken).max())
-
-
-def test_a_step_minimises_misfit_and_prior_together():
-    rng = np.random.default_rng(0)
-    design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
-    state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
-    step, size = _ridge_step(products_of(design, gap), state, prior, 0.0)
-    rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
-    wanted = np.linalg.lstsq(rows, np.concatenate([gap, -state / prior]), rcond=None)[0]
-    np.testing.assert_allclose(step, wanted, rtol=1e-9)
-    # what it moves, in noise: the length of the step as rows see it
-    assert size == pytest.approx(np.linalg.norm(rows @ step), rel=1e-9)
-
-
-def test_a_damped_step_is_shorter_and_goes_downhill():
-    rng = np.random.default_rng(2)
-    design, gap, state, prior = rng.normal(size=(40, 7)), rng.normal(size=40), rng.normal(size=4), np.ones(4)
-    down = design.T @ gap - np.concatenate([np.zeros(3), state])
-    lengths = []
-    for damping in settings.DAMPINGS:
-        step, _ = _ridge_step(products_of(design, gap), state, prior, damping)
-        assert step @ down > 0.0
-        lengths.append(np.linalg.norm(step))
-    assert (np.diff(lengths) < 0.0).all()
-
-
-def test_directions_that_nothing_determines_are_not_moved():
-    rng = np.random.default_rng(1)
-    column = rng.normal(size=(30, 1))
-    step, _ = _ridge_step(products_of(np.hstack([column, -column]), rng.normal(size=30)), np.zeros(0), np.zeros(0), 0.0)
-    assert step[0] == pytest.approx(-step[1], rel=1e-9)
-    assert abs(step.sum()) < 1e-9 * abs(step[0])
 
 
 def test_a_linear_fit_that_went_astray_does_not_end_worse_than_it_began(fitted):

@@ -1,7 +1,5 @@
 """Products that are kept make the same normal equations as all columns at once, and go with their blocks."""
 
-import gc
-
 import numpy as np
 import pytest
 from simulate import simulate
@@ -46,15 +44,3 @@ def test_every_selection_in_any_order_is_as_if_formed_anew(seen, whitening):
             mine = basis @ found.matrix[a, a] @ basis.T
             theirs = other @ expected.matrix[b, b] @ other.T
             np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max(initial=0.0))
-
-
-def test_a_block_that_is_gone_leaves_nothing(seen, whitening):
-    kept = Products(Linear(seen.gap, frame_columns(seen)[0], ()), whitening)
-    stays = block(seen, choose(NAMES[:1])[0])
-    goes = block(seen, choose(NAMES[2:3])[0])
-    kept.problem([stays, goes])
-    assert len(kept._white) == 2
-    del goes
-    gc.collect()
-    assert list(kept._white) == [stays]
-    assert [len(own) for own in kept._pairs.values()] == [1]
