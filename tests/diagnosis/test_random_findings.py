@@ -76,31 +76,12 @@ def test_steps_are_named_with_their_height(rv_m2, steps):
     assert encoder.parameters[0].value == pytest.approx(np.sqrt(12.0) * SIGMA, rel=0.1)
 
 
-def test_scatter_never_shrinks_the_gap(single, visits, steps):
-    for known, seen in (single, visits, steps):
-        for finding in random_findings(known, seen):
-            if finding.status != "not_testable":
-                assert (finding.shrinkage, finding.shrinkage_ci95) == (0.0, (0.0, 0.0))
-
-
-def test_places_share_out_what_an_effect_moves(single, visits, steps):
-    for known, seen in (single, visits, steps):
-        for finding in random_findings(known, seen):
-            if finding.locations:
-                assert sum(place.share for place in finding.locations) == pytest.approx(1.0)
-
-
-def test_without_repeats_the_two_kinds_are_one(single):
+def test_without_steps_or_repeats_the_two_kinds_are_one_and_an_encoder_is_one_of_three_causes(single):
+    """Wear explains the scatter as well, and so does what nobody recorded."""
     encoder, wear = random_findings(*single)
     assert (encoder.status, encoder.confounded_with) == ("confounded", (wear.name,))
     assert (wear.status, wear.needs, wear.probability) == ("not_testable", ("pose",), None)
-
-
-def test_without_steps_or_repeats_an_encoder_is_one_of_three_causes(single):
-    """Wear explains the scatter as well, and so does what nobody recorded."""
-    known, seen = single
-    encoder, _ = random_findings(known, seen)
-    assert seen.scatter.probability["pose"] > 0.9
+    assert single[1].scatter.probability["pose"] > 0.9
     assert 0.2 < encoder.probability < 0.5
 
 
@@ -114,7 +95,11 @@ def test_steps_that_should_show_and_do_not_refute_an_encoder(rv_m2):
     assert not seen.explains_size
 
 
-def test_not_found_is_never_probable(single, visits, steps):
+def test_scatter_never_shrinks_the_gap_its_places_share_it_out_and_not_found_is_never_probable(single, visits, steps):
     for known, seen in (single, visits, steps):
         for finding in random_findings(known, seen):
+            if finding.status != "not_testable":
+                assert (finding.shrinkage, finding.shrinkage_ci95) == (0.0, (0.0, 0.0))
+            if finding.locations:
+                assert sum(place.share for place in finding.locations) == pytest.approx(1.0)
             assert finding.status != "not_found" or finding.probability < 0.5
