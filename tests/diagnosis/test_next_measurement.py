@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from conftest import ARMS
 from simulate import commands, random_motion, simulate
 
 from thermal_robot import diagnose
@@ -202,6 +203,12 @@ def test_what_it_expects_is_what_comes(rv_m2):
     assert 0.3 < np.median(came) / np.median(promised) < 3.0
 
 
+QUICK = ("rv_m2", "awkward-from-base", "coupled", "tiago-from-torso")
+
+
+@pytest.mark.parametrize(
+    "arm", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in ARMS], indirect=True
+)
 def test_samples_are_within_limits_and_conditions_within_reach(arm, monkeypatch):
     monkeypatch.setattr(settings, "DECIDED", 1.0)  # whether anything is left to be asked is not the question here
     rng = np.random.default_rng(5)
@@ -427,6 +434,7 @@ def test_what_tells_a_pair_apart_is_asked_for(settled, pair, kind, name):
     assert name in (None, found.name)
 
 
+@pytest.mark.slow
 def test_a_load_is_asked_for_where_it_tells_what_yields(rv_m2):
     """Joints and links yield to the same weight; with another load the two differ more."""
     group, asked = ("joint_compliance", "link_compliance"), []

@@ -120,13 +120,6 @@ def beside_play(robot, seed):
     return diagnose(replace(data, position=data.position + shift)).verdict
 
 
-def test_with_a_known_effect_beside_it_both_are_found(rv_m2):
-    """The slow test below asks for the names alone, and more often."""
-    names = beside_play(rv_m2, 0)
-    assert "backlash" in names
-    assert any(n.startswith("discovered.") for n in names)
-
-
 @pytest.mark.slow
 def test_with_a_known_effect_beside_it_both_are_named(rv_m2):
     verdicts = [beside_play(rv_m2, seed) for seed in range(4)]

@@ -227,39 +227,9 @@ def test_a_pair_of_faults_is_told_once(sound):
     assert len({frozenset(pair.split(" and ")) for pair in pairs}) == len(pairs)
 
 
-def screened(*spoil, campaign):
-    for one in spoil:
-        campaign = SPOILT[one](campaign)
-    return Screen(Struck.whole(Readings.of(campaign)))
-
-
 def best(tried, faults):
     own = min((t for t in tried if len(t.fault) == faults), key=lambda t: t.typical)
     return {p.kind.name for p in own.fault}, own
-
-
-@pytest.mark.parametrize("joints", ["reversed joints", "exchanged joints", "rad read as degrees"])
-@pytest.mark.parametrize("measured", ["inch", "mirrored axis", "quaternion order", "angles of orientations"])
-def test_a_fault_on_each_side_is_found(sound, joints, measured):
-    screen = screened(joints, measured, campaign=sound)
-    kinds, own = best(screen.both_sides(), 2)
-    assert kinds == {joints, measured}
-    assert own.typical < 2e-3
-    assert screen.asked > 100
-
-
-def test_two_faults_of_the_joints_are_found(sound):
-    screen = screened("coupled joints", "reversed joints", campaign=sound)
-    kinds, own = best(screen.two_of_joints(), 2)
-    assert kinds == {"coupled joints", "reversed joints"}
-    assert own.typical < 2e-3
-
-
-def test_of_faults_that_differ_by_a_number_the_best_is_asked(sound):
-    screen = screened("clock offset", campaign=sound)
-    kinds, own = best(screen.both_sides(), 1)
-    assert kinds == {"clock offset"}
-    assert own.typical < 2e-3
 
 
 def test_known_frames_are_not_fitted(sound):
