@@ -187,7 +187,7 @@ def evidence(explanation, seen, effect):
 
 
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])
-@pytest.mark.parametrize("ratio", [3.0, 30.0])
+@pytest.mark.parametrize("ratio", [30.0, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_no_constant_of_a_fine_grid_is_much_better(kind, constant, attribute, ratio):
     for seed in range(3):
         seen, explanation = explained(lagging("panda", seed, kind, constant, ratio), (kind,))

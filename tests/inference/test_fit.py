@@ -132,7 +132,11 @@ def test_rows_of_unlike_noise_leave_a_diagnosis_as_it_is(rv_m2):
             assert own["value"] == pytest.approx(other["value"], abs=other["std"] / 5)
 
 
-@pytest.mark.parametrize(("targets", "lost"), [(FLAT, 0.0), (LONG, 0.15)], ids=["three", "four of which some are lost"])
+@pytest.mark.parametrize(
+    ("targets", "lost"),
+    [pytest.param(FLAT, 0.0, marks=pytest.mark.slow), (LONG, 0.15)],
+    ids=["three", "four of which some are lost"],
+)
 def test_parameters_that_several_targets_tell_are_off_by_what_is_said_of_them(targets, lost):
     """Of the last joints, whose turns the targets tell; along the rod they tell it far worse than across."""
     arm, joints, z2 = load_arm("ur10"), ["wrist_2_joint", "wrist_3_joint"], []

@@ -92,7 +92,7 @@ def test_a_fit_without_laws_has_discovered_none(stepped):
 @pytest.mark.parametrize(
     ("law", "values"), [(STEP, [0.0, 6e-4]), (BEND, [0.0, 4e-3])], ids=["a step in time", "a bend of a joint"]
 )
-@pytest.mark.parametrize("seed", [1, 2, 5])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)])
 def test_an_injected_law_is_found_with_place_and_quantity(rv_m2, law, values, seed):
     own = lawful(known(with_law(rv_m2, law, values, seed=seed)[0]))
     (named,) = discovered(own)

@@ -187,7 +187,9 @@ def test_where_the_tracker_stands_changes_nothing(arm, turning, effects):
     np.testing.assert_allclose(there.model.predict(campaign)[0], expected, rtol=0, atol=1e-8)
 
 
-@on_arms
+@pytest.mark.parametrize(
+    "arm", ["rv_m2", *(pytest.param(arm, marks=pytest.mark.slow) for arm in ("ur10", "panda"))], indirect=True
+)
 def test_a_simulators_prediction_replaces_the_urdfs_and_keeps_the_declared_target(arm):
     rng = np.random.default_rng(7)
     true = far_frames(rng, exp3(rng.normal(size=3)))
