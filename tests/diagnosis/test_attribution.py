@@ -37,8 +37,13 @@ def test_places_divide_an_effects_share_among_them(rv_m2):
         assert where.joints == {
             place.name: place.share for place in sorted(locations["joint_gain"], key=lambda p: p.name)
         }
-    where, locations, _, _ = located(rv_m2, "joint_gain", -0.2)
+    where, locations, _, fitted = located(rv_m2, "joint_gain", -0.2)
     assert {place.share for place in locations["joint_gain"]} == {0.0}
+    # axes are shares of the gap's mean square
+    rows = fitted.nominal.gap[~fitted.explanation.outliers, :3]
+    assert sum(where.axes.values()) == pytest.approx(1.0)
+    largest = max(where.axes, key=where.axes.get)
+    assert "xyz"[int(np.sqrt((rows**2).mean(axis=0)).argmax())] == largest
 
 
 def test_one_coefficient_for_all_links_sits_in_all_of_them(rv_m2):
@@ -52,32 +57,25 @@ def test_one_coefficient_for_all_links_sits_in_all_of_them(rv_m2):
 
 @pytest.mark.parametrize(("name", "kind"), [("drift", "base"), ("instrument_scale", "instrument")])
 def test_what_errs_beyond_joints_and_links_has_its_share(rv_m2, name, kind):
-    where, locations, _, _ = located(rv_m2, name, 0.8)
+    where, locations, _, fitted = located(rv_m2, name, 0.8)
     assert where.beyond == {kind: pytest.approx(0.8)}
     assert where.joints == where.links == {}
     assert where.places == {(kind, kind): pytest.approx(0.8)}
     assert {(p.kind, p.name) for p in locations[name]} == {(kind, kind)}
+    # the quantity that an effect follows explains most of the gap
+    assert name != "drift" or next(iter(where.covariates)) == "time"
+    shares = list(where.covariates.values())
+    assert shares == sorted(shares, reverse=True)
+    assert all(0.0 <= share <= 1.0 for share in shares)
+    # without laws the known effects leave what the fit leaves
+    left = Unexplained(True, 1e-4, 1e-9)
+    assert without_laws(fitted, left) is left
 
 
 def test_places_are_all_there_are_largest_first():
     where = Where({}, {"a": 0.1}, {"b": 0.5}, {}, {"base": 0.2, "tool": 0.05})
     shares = {("link", "b"): 0.5, ("base", "base"): 0.2, ("joint", "a"): 0.1, ("tool", "tool"): 0.05}
     assert list(where.places.items()) == list(shares.items())
-
-
-def test_axes_are_shares_of_the_gaps_mean_square(rv_m2):
-    where, _, _, fitted = located(rv_m2, "joint_gain")
-    rows = fitted.nominal.gap[~fitted.explanation.outliers, :3]
-    assert sum(where.axes.values()) == pytest.approx(1.0)
-    largest = max(where.axes, key=where.axes.get)
-    assert "xyz"[int(np.sqrt((rows**2).mean(axis=0)).argmax())] == largest
-
-
-def test_the_quantity_that_an_effect_follows_explains_most_of_the_gap(rv_m2):
-    where, _, _, _ = located(rv_m2, "drift")
-    assert next(iter(where.covariates)) == "time"
-    assert all(0.0 <= share <= 1.0 for share in where.covariates.values())
-    assert list(where.covariates.values()) == sorted(where.covariates.values(), reverse=True)
 
 
 def test_rows_that_were_set_aside_count_nowhere(rv_m2):
@@ -111,8 +109,3 @@ def test_what_the_known_effects_leave_has_what_the_laws_take_in_it(rv_m2):
         assert reasons[1:] == rest
         assert reasons[0].startswith("a law explains ")
         assert float(reasons[0].split()[3].rstrip("%")) == pytest.approx(100.0 * share, abs=1.0)
-
-
-def test_without_laws_the_known_effects_leave_what_the_fit_leaves(rv_m2):
-    left = Unexplained(True, 1e-4, 1e-9)
-    assert without_laws(fit(simulate(rv_m2, ["drift"], seed=3)[0], choose("drift")), left) is left

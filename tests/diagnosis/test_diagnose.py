@@ -24,6 +24,7 @@ DOUBTED = ("ur10", "base_compliance")
 COLUMNS = {"tracking_lag": {"moving": True}, "thermal_bending": {"links": True}}
 NOISE = 25e-6
 SLOW_ARMS = [pytest.param(name, marks=pytest.mark.slow) for name in ("ur10", "panda")]
+two_arms = pytest.mark.parametrize("arm", ["rv_m2", pytest.param("ur10", marks=pytest.mark.slow)], indirect=True)
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", *SLOW_ARMS], indirect=True)
 
 
@@ -179,7 +180,8 @@ def test_a_soft_base_under_a_ur10_is_as_sure_as_all_others(cases):
 
 
 @on_arms
-def test_what_is_not_identified_has_no_number(cases):
+def test_what_is_not_identified_has_no_number(arm, cases):
+    """As an offset of the first joint, where the base is unknown."""
     unknown = 0
     for case in cases:
         for finding in case.found.to_dict()["effects"]:
@@ -187,10 +189,6 @@ def test_what_is_not_identified_has_no_number(cases):
                 assert (p["value"] is None) == (p["std"] is None) == (not p["identified"])
                 unknown += not p["identified"]
     assert unknown > 0
-
-
-@on_arms
-def test_an_offset_of_the_first_joint_is_never_a_number_with_an_unknown_base(arm, cases):
     offsets = next(c for c in cases if c.name == "joint_offset").found.finding("joint_offset").parameters
     # where some joints alone are at fault, it is not among them
     first = [p for p in offsets if p.name.endswith(f", {arm.joint_names[0]}")]
@@ -198,13 +196,7 @@ def test_an_offset_of_the_first_joint_is_never_a_number_with_an_unknown_base(arm
     assert any(p.identified for p in offsets)
 
 
-@on_arms
-def test_nothing_is_left_to_chance(arm, cases):
-    case = cases[-1]
-    assert diagnose(case.campaign).to_dict() == case.found.to_dict()
-
-
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
+@two_arms
 def test_two_effects_share_the_gap_as_they_caused_it(arm):
     """Shares add up to the whole; each is near its part of the mean square, noise included."""
     apart = []
@@ -228,11 +220,18 @@ def test_two_effects_share_the_gap_as_they_caused_it(arm):
 CONDITIONS = {"backlash": "joint", "transmission_error": "joint", "drift": "base"}
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", pytest.param("ur10", marks=pytest.mark.slow)], indirect=True)
-def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm):
-    alone = ["transmission_error", "backlash", "joint_compliance", "geometric", "thermal_elongation", "drift"]
+WITHHELD = ("transmission_error", "backlash", "joint_compliance", "geometric", "thermal_elongation", "drift")
+
+
+@pytest.mark.parametrize(
+    ("arm", "alone"),
+    [("rv_m2", CONDITIONS), *(pytest.param(arm, WITHHELD, marks=pytest.mark.slow) for arm in ("rv_m2", "ur10"))],
+    indirect=["arm"],
+)
+def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm, alone):
     flagged, placed, followed = [], [], []
-    for seed, name in enumerate(alone):
+    for name in alone:
+        seed = WITHHELD.index(name)
         campaign, truth, _ = simulate(arm, [name], seed=seed, outliers=0.03)
         found = diagnose(campaign, without=[name])
         left = found.unexplained
@@ -260,10 +259,9 @@ def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm
     [("joint_offset", "geometric"), ("instrument_scale", "geometric"), ("joint_gain", "transmission_error")],
 )
 def test_a_withheld_effect_that_another_contains_is_carried_by_that(arm, name, stand_in):
-    for seed in range(2):
-        found = diagnose(simulate(arm, [name], seed=seed, outliers=0.03)[0], without=[name])
-        assert stand_in in found.verdict
-        assert not found.unexplained.flagged
+    found = diagnose(simulate(arm, [name], seed=0, outliers=0.03)[0], without=[name])
+    assert stand_in in found.verdict
+    assert not found.unexplained.flagged
 
 
 @pytest.fixture(scope="module")
@@ -272,40 +270,39 @@ def campaign(rv_m2):
     return simulate(rv_m2, ["thermal_elongation", "backlash"], samples=80, seed=1, outliers=0.03)[0]
 
 
-def test_threads_change_no_bit(campaign):
-    """However many threads linear algebra may have, a diagnosis takes one: sums are rounded in the same order."""
-    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
-    assert pools
+@pytest.fixture(scope="module")
+def first(campaign):
+    """Its diagnosis, and what was said meanwhile."""
     said = []
-    for threads in (1, 2, 4):
-        with threadpool_limits(threads):
-            said.append(json.dumps(diagnose(campaign).to_dict()))
-    assert said[0] == said[1] == said[2]
+    return diagnose(campaign, progress=said.append), said
 
 
-def test_no_stage_of_it_runs_on_several_threads(campaign):
-    """Nor do threads stay fewer once it has answered."""
+def test_no_stage_of_it_runs_on_several_threads_and_nothing_is_left_to_chance(campaign, first):
+    """Sums are rounded in the same order, to the last bit; nor do threads stay fewer once it has answered."""
     seen = []
 
     def look(_):
         seen.append(max(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"))
 
     with threadpool_limits(4):
-        diagnose(campaign, progress=look)
+        again = diagnose(campaign, progress=look)
         assert {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"} == {4}
     assert len(seen) > 5
     assert set(seen) == {1}
+    assert json.dumps(again.to_dict()) == json.dumps(first[0].to_dict())
 
 
-def test_each_stage_says_what_it_does(campaign, tmp_path):
-    from_memory, from_file = [], []
-    first = diagnose(campaign, progress=from_memory.append)
+def test_each_stage_says_what_it_does(campaign, first, tmp_path):
+    (found, from_memory), from_file = first, []
     again = diagnose(write_campaign(campaign, tmp_path), progress=from_file.append)
     assert from_file == ["reading the campaign", *from_memory]
     assert from_memory[0] == "unknown frames"
     assert "held out: 20 blocks, one at a time" in from_memory
-    assert again.verdict == first.verdict
-    assert again.probability == pytest.approx(first.probability, rel=1e-6)
+    assert again.verdict == found.verdict
+    assert again.probability == pytest.approx(found.probability, rel=1e-6)
+    # the sentences belong to what was found
+    assert all(found.title(name).split()[0] in found.summary for name in found.verdict[:1])
+    assert bool(found.advice) == (found.wanted is not None)
 
 
 def test_a_name_that_no_effect_has_is_named(campaign):
@@ -318,18 +315,8 @@ def test_a_name_that_no_effect_has_is_named(campaign):
             diagnose(campaign, **how)
 
 
-def test_the_sentences_belong_to_what_was_found(campaign):
-    found = diagnose(campaign)
-    assert all(found.title(name).split()[0] in found.summary for name in found.verdict[:1])
-    assert bool(found.advice) == (found.wanted is not None)
-
-
-two_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
-
-
 @two_arms
-@pytest.mark.parametrize("effects", [["joint_offset"], ["thermal_elongation"], []], ids=lambda e: e[0] if e else "none")
-@pytest.mark.parametrize("lost", [0.0, 0.1])
+@pytest.mark.parametrize(("effects", "lost"), [(["joint_offset"], 0.1), (["thermal_elongation"], 0.0), ([], 0.1)])
 def test_several_targets_of_each_pose_tell_the_effect(arm, effects, lost):
     """Nothing else, nothing unexplained, and what remains is the noise of their middle."""
     data, _ = simulated(arm, effects, LONG, 3, samples=80, lost=lost)

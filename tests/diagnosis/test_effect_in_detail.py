@@ -1,7 +1,6 @@
 """The figure of one effect shows the error at its place, before and after, against what drives it."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -192,11 +191,6 @@ def test_where_an_effect_is_not_part_of_the_explanation_it_says_which_are(rv_m2)
         explained(fit(campaign, choose((), (), ())), "drift")
 
 
-def test_poses_and_simulators_are_drawn_too(rv_m2):
-    figure, found, _, _ = shown(rv_m2, "backlash", turning=3e-5)
-    assert len(figure.axes) == len(found.places)
-
-
 def test_gross_errors_are_left_out():
     campaign = demo()[0]
     known = fit(campaign, choose((), (), ()))
@@ -225,18 +219,8 @@ def test_no_text_meets_another_and_every_axis_has_a_unit(rv_m2, count):
         assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
     assert drawn[0].get_ylabel() == "error (mrad)"
     assert "2 smaller places are not shown" in figure._suptitle.get_text()
-
-
-def test_an_effect_without_a_material_place_gives_an_empty_figure():
-    figure = explain_figure(Explained("backlash", (), 0))
-    assert figure._repr_png_().startswith(b"\x89PNG")
-
-
-def test_the_report_does_not_load_the_diagnosis():
-    import thermal_robot.report.plots as module
-
-    text = Path(module.__file__).read_text(encoding="utf-8")
-    assert "import pyplot" not in text
+    # without a material place the figure is empty
+    assert explain_figure(Explained("backlash", (), 0))._repr_png_().startswith(b"\x89PNG")
 
 
 def above_its_zero(observed):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from conftest import ARMS
 from simulate import commands, random_motion, simulate
 
 from thermal_robot import diagnose
@@ -202,6 +203,12 @@ def test_what_it_expects_is_what_comes(rv_m2):
     assert 0.3 < np.median(came) / np.median(promised) < 3.0
 
 
+QUICK = ("rv_m2", "awkward-from-base", "coupled", "tiago-from-torso")
+
+
+@pytest.mark.parametrize(
+    "arm", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in ARMS], indirect=True
+)
 def test_samples_are_within_limits_and_conditions_within_reach(arm, monkeypatch):
     monkeypatch.setattr(settings, "DECIDED", 1.0)  # whether anything is left to be asked is not the question here
     rng = np.random.default_rng(5)
@@ -259,18 +266,14 @@ def test_the_same_seed_gives_the_same_samples_and_json_is_plain(rv_m2):
     gains = [sample["gain"] for sample in listed]
     assert gains == sorted(gains)
     assert gains[-1] > 1.0
-
-
-def test_the_table_is_in_the_campaigns_units(rv_m2):
-    _, campaign, pair, _ = doubtful(rv_m2, heat_or_drift, 11)
-    asked = next_samples(fit(campaign, choose(pair, (), ())), count=4)
+    # the table is in the campaign's units
     table = asked.to_table()
     assert list(table.columns) == [*rv_m2.joint_names, "time", "temperature", "separates", "gain"]
     np.testing.assert_allclose(np.radians(table[list(rv_m2.joint_names)].to_numpy()), asked.commands.q)
     for separates in table["separates"]:
-        first, second = (set(explanation.split(" + ")) for explanation in separates.split(" | "))
-        assert first != second
-        assert first | second <= set(pair)
+        one, other = (set(explanation.split(" + ")) for explanation in separates.split(" | "))
+        assert one != other
+        assert one | other <= set(pair)
 
 
 def test_where_all_is_settled_the_parameters_are_sharpened(rv_m2):
@@ -341,25 +344,18 @@ def test_gains_are_the_information_of_all_that_was_chosen(forty):
     assert len(set(chosen)) == 12
     for k in range(1, 13):
         assert gains[k - 1] == pytest.approx(information(*forty, chosen[:k]), rel=1e-9)
-
-
-def test_each_choice_is_the_best_after_those_before(forty):
-    chosen, _ = most_informative(*forty, 5)
-    for k, row in enumerate(chosen):
-        left = [c for c in range(40) if c not in chosen[:k]]
-        assert row == max(left, key=lambda c: information(*forty, [*chosen[:k], c]))
+    # each choice is the best after those before
+    for k, row in enumerate(chosen[:5]):
+        rest = [c for c in range(40) if c not in chosen[:k]]
+        assert row == max(rest, key=lambda c: information(*forty, [*chosen[:k], c]))
+    # without frames all information counts
+    assert np.all(np.diff([0.0, *most_informative(forty[0], forty[0][:, :, :0], 3)[1]]) > 0.0)
 
 
 def test_of_candidates_alike_one_is_chosen(forty):
     alike = np.repeat(np.arange(8), 5)
     chosen, _ = most_informative(*forty, 8, alike)
     assert sorted(alike[chosen].tolist()) == list(range(8))
-
-
-def test_without_frames_all_information_counts(forty):
-    root = forty[0]
-    _, gains = most_informative(root, root[:, :, :0], 3)
-    assert np.all(np.diff([0.0, *gains]) > 0.0)
 
 
 CLEAN = Unexplained(False, 0.0, 0.5)
@@ -386,10 +382,6 @@ def left(kind, name, *follows):
     )
 
 
-def test_nothing_where_nothing_is_needed(settled):
-    assert wanted(settled, FOUND, (), CLEAN, CLEAN, 0.99) is None
-
-
 @pytest.mark.parametrize(
     ("remainder", "column", "whether"),
     [
@@ -414,37 +406,35 @@ def test_the_load_is_asked_for_where_the_torque_is_known(settled, rv_m2):
     assert wanted(known, FOUND, (), remainder, remainder, 0.99).name == "payload"
 
 
-def test_repeats_where_there_is_no_column_to_record(settled):
-    remainder = left("base", "base", "humidity")
-    assert wanted(settled, FOUND[:1], (), remainder, remainder, 0.99).kind == "repeats"
-
-
-def test_scatter_that_only_repeats_tell_apart_asks_for_repeats(settled):
-    found = wanted(settled, FOUND, (("encoder_resolution", "excess_repeatability"),), CLEAN, CLEAN, 0.99)
-    assert (found.kind, found.name) == ("repeats", "pose")
-
-
 def test_a_law_that_says_it_all_asks_for_what_would_tell_its_cause_alone(settled):
     followed = left("joint", "joint_3", "humidity")
     assert wanted(settled, FOUND, (), CLEAN, followed, 0.99) is None
     assert wanted(settled, FOUND, (), followed, followed, 0.99).name.startswith("approach")
-
-
-def test_a_law_of_a_joints_own_position_leaves_nothing_to_ask(settled):
+    # a law of a joint's own position leaves nothing to ask
     assert wanted(settled, FOUND, (), CLEAN, left("joint", "joint_3", "joint_3"), 0.99) is None
     assert wanted(settled, FOUND, (), CLEAN, left("joint", "joint_3", "time"), 0.99).name == "temperature"
+    # repeats where there is no column to record, and nothing where nothing is needed
+    remainder = left("base", "base", "humidity")
+    assert wanted(settled, FOUND[:1], (), remainder, remainder, 0.99).kind == "repeats"
+    assert wanted(settled, FOUND, (), CLEAN, CLEAN, 0.99) is None
 
 
-def test_a_frame_is_asked_for_where_one_is_confounded(settled):
-    found = wanted(settled, FOUND, (("base_frame", "joint_offset"),), CLEAN, CLEAN, 0.99)
-    assert (found.kind, found.name, found.apart) == ("frame", 'frames.base = "known"', ("base_frame", "joint_offset"))
+@pytest.mark.parametrize(
+    ("pair", "kind", "name"),
+    [
+        (("encoder_resolution", "excess_repeatability"), "repeats", "pose"),
+        (("base_frame", "joint_offset"), "frame", 'frames.base = "known"'),
+        (("backlash", "joint_offset"), "range", None),
+    ],
+)
+def test_what_tells_a_pair_apart_is_asked_for(settled, pair, kind, name):
+    """Repeats of what scatters, a frame where one is confounded, else the whole range."""
+    found = wanted(settled, FOUND, (pair,), CLEAN, CLEAN, 0.99)
+    assert (found.kind, found.apart or pair) == (kind, pair)
+    assert name in (None, found.name)
 
 
-def test_what_no_pose_tells_apart_asks_for_the_whole_range(settled):
-    found = wanted(settled, FOUND, (("backlash", "joint_offset"),), CLEAN, CLEAN, 0.99)
-    assert (found.kind, found.apart) == ("range", ("backlash", "joint_offset"))
-
-
+@pytest.mark.slow
 def test_a_load_is_asked_for_where_it_tells_what_yields(rv_m2):
     """Joints and links yield to the same weight; with another load the two differ more."""
     group, asked = ("joint_compliance", "link_compliance"), []

@@ -75,6 +75,12 @@ def test_json_holds_all_and_nothing_that_json_cannot(hall, tmp_path):
     assert [e["name"] for e in again["effects"]] == [f.name for f in hall.effects]
     assert again["gap"]["held_out"]["shrinkage"] == hall.gap.held_out.shrinkage
     assert len(numbers(again)) > 100
+    gap = again["gap"]
+    assert gap["orientation"] is None  # it was not measured
+    assert (gap["rms_before"], gap["noise_floor"]) == (hall.gap.rms_before, hall.gap.noise_floor)
+    assert [scheme["name"] for scheme in gap["schemes"]] == [scheme.name for scheme in hall.gap.schemes]
+    with pytest.raises(FrozenInstanceError):
+        hall.verdict = ()
 
 
 @pytest.mark.parametrize("no_number", [float("nan"), float("inf")])
@@ -88,7 +94,7 @@ def test_what_is_no_number_becomes_null(hall, no_number):
 def test_without_a_fit_nothing_is_proposed(hall):
     bare = replace(hall, fit=None)
     assert bare.to_dict()["next"]["samples"] == []
-    for ask in (bare.next_samples, lambda: bare.explain("backlash")):
+    for ask in (bare.next_samples, lambda: bare.explain("backlash"), lambda: bare.covariance):
         with pytest.raises(ValueError, match="without its fit"):
             ask()
     assert len(hall.next_samples(3).samples) == 3
@@ -109,18 +115,6 @@ def test_effects_are_asked_for_by_name(hall):
     assert hall.title("somebodys_own") == "somebodys own"
     assert hall.is_frame("base_frame")
     assert not hall.is_frame("backlash")
-
-
-def test_it_is_frozen(hall):
-    with pytest.raises(FrozenInstanceError):
-        hall.verdict = ()
-
-
-def test_a_gap_tells_of_orientation_only_where_it_was_measured(hall):
-    gap, found = hall.gap, hall.to_dict()["gap"]
-    assert found["orientation"] is None
-    assert (found["rms_before"], found["noise_floor"]) == (gap.rms_before, gap.noise_floor)
-    assert [scheme["name"] for scheme in found["schemes"]] == [scheme.name for scheme in gap.schemes]
 
 
 @pytest.fixture(scope="module")
@@ -191,20 +185,11 @@ def test_residuals_have_the_rms_that_is_told(diagnosis):
 ANGLES = ["roll", "pitch", "yaw"]
 
 
-def test_a_point_has_no_direction_on_the_tool(diagnosis):
-    frames = diagnosis.frames
+def test_a_point_has_no_direction_on_the_tool_unless_it_was_measured_or_declared(diagnosis):
+    frames, model = diagnosis.frames, diagnosis.model
     assert frames.loc["tool", ANGLES].isna().all()
     assert frames.loc["base"].notna().all()
     assert frames.loc["tool", ["x", "y", "z"]].notna().all()
-
-
-def test_a_direction_that_was_measured_or_declared_is_told(diagnosis):
-    model = diagnosis.model
     declared = replace(model.settings, tool_known=True)
     for known in (replace(model, measures="pose"), replace(model, settings=declared)):
         assert frame_table(known).loc["tool", ANGLES].notna().all()
-
-
-def test_one_without_its_fit_says_so(diagnosis):
-    with pytest.raises(ValueError, match="without its fit"):
-        _ = replace(diagnosis, fit=None).covariance

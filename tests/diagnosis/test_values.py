@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from thermal_robot.diagnosis import values
-from thermal_robot.diagnosis.values import Finding, Location, Place, is_frame, jsonable
+from thermal_robot.diagnosis.values import AnotherModel, Finding, Location, Place, is_frame, jsonable
+
+NONE = np.zeros(0)
 
 
 @pytest.mark.parametrize(
@@ -16,7 +18,10 @@ from thermal_robot.diagnosis.values import Finding, Location, Place, is_frame, j
     [("joint", "shoulder", "joint shoulder"), ("joint", "joint_3", "joint_3"), ("base", "base", "base")],
 )
 def test_a_place_says_its_kind_once(kind, name, words):
-    assert Location(kind, name, 0.5).words.removeprefix("the ") == words
+    own = Location(kind, name, 0.5)
+    assert own.words.removeprefix("the ") == words
+    place = Place(kind, name, 1.0, "time", "s", NONE, False, "rad", NONE, NONE, NONE, np.zeros((2, 0)))
+    assert place.words == own.words
 
 
 def test_a_frame_is_what_needs_a_known_frame():
@@ -28,16 +33,9 @@ def test_a_frame_is_what_needs_a_known_frame():
     assert is_frame(found, "base_frame")
     assert not is_frame(found, "drift")
     assert not is_frame(found, "geometric")
-
-
-def test_what_was_not_a_candidate_can_only_be_a_frame():
-    """Effects are confounded with candidates, and with frames that nobody asked for."""
+    # effects are confounded with candidates, and with frames that nobody asked for
     assert is_frame([], "tool_frame")
-
-
-def test_an_effect_that_is_not_testable_has_no_figures():
-    finding = Finding("drift", "not_testable", needs=("time",))
-    assert (finding.probability, finding.shrinkage, finding.shrinkage_ci95) == (None, None, None)
+    assert (found[1].probability, found[1].shrinkage, found[1].shrinkage_ci95) == (None, None, None)
 
 
 def test_values_are_frozen():
@@ -49,21 +47,18 @@ def test_values_are_frozen():
             setattr(value, fields(kind)[0].name, None)
 
 
-NONE = np.zeros(0)
-
-
-def place(kind, name):
-    return Place(kind, name, 1.0, "time", "s", NONE, False, "rad", NONE, NONE, NONE, np.zeros((2, 0)))
-
-
-@pytest.mark.parametrize(("kind", "name"), [("joint", "shoulder"), ("joint", "joint_3"), ("base", "base")])
-def test_a_place_says_its_kind_as_a_location_does(kind, name):
-    assert place(kind, name).words == Location(kind, name, 0.5).words
-
-
 def test_numbers_of_numpy_and_what_is_not_finite_become_plain():
     given = {1: (np.float64(0.5), np.int64(3), np.bool_(True)), "none": [math.nan, -math.inf], "text": "µm"}
     found = jsonable(given)
     assert found == {"1": [0.5, 3, True], "none": [None, None], "text": "µm"}
     assert [type(value) for value in found["1"]] == [float, int, bool]
     assert json.loads(json.dumps(found, allow_nan=False)) == found
+
+
+@pytest.mark.parametrize(
+    ("factor", "told"), [(None, False), (0.5, False), (25.4, False), (0.01, True), (1e3, True), (1e-3, True)]
+)
+def test_a_unit_is_told_from_a_sister(factor, told):
+    model = AnotherModel(factor, joint="joint_3", off=0.2)
+    assert model.in_another_unit is told
+    assert bool(model.unit) is told

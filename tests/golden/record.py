@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 TOLERANCE = 1e-9
 """Relative: BLAS rounds by about 1e-16, the fits' condition numbers reach 1e6."""
+ELSEWHERE = 1e-6
+"""Relative: other processors and versions of BLAS round otherwise, and fits multiply that by their condition."""
 NOTHING = 1e-11
 """Below this a figure is rounding of nothing: p-values and shares that underflow."""
 CHANCES = ("probability",)
@@ -93,6 +95,29 @@ def differences(old: object, new: object, tolerance: float, path: str = "") -> l
         same = math.isclose(old, new, rel_tol=tolerance, abs_tol=floor)
         return [] if same else [f"{path}: {old!r} became {new!r}"]
     return [] if old == new else [f"{path}: {old!r} became {new!r}"]
+
+
+REWRITE = "python tests/golden/record.py --only {name}"
+
+
+def unchanged(name: str, tolerance: float = ELSEWHERE) -> None:
+    """Assert that the same is said as before."""
+    old = json.loads(golden(name).read_text(encoding="utf-8"))
+    lines = differences(old, said(name), tolerance)
+    rewrite = REWRITE.format(name=name)
+    assert not lines, (
+        f"{name}: {len(lines)} figures changed, the first: {lines[:3]}. If that is meant, write them anew with "
+        f"`{rewrite}`, and let the commit message tell what changed, where and why."
+    )
+
+
+def shrinks(found: Diagnosis) -> float:
+    """Held-out rows, not those of the fit, say so; and the interval holds the figure."""
+    held_out = found.gap.held_out
+    low, high = held_out.shrinkage_ci95
+    assert 0.0 < low <= held_out.shrinkage <= high < 1.0
+    assert held_out.rms_after < held_out.rms_before
+    return held_out.shrinkage
 
 
 def main() -> int:

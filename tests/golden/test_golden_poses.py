@@ -3,8 +3,7 @@
 import os
 
 import pytest
-from golden.record import diagnosed
-from golden.unchanged import shrinks, unchanged
+from golden.record import diagnosed, shrinks, unchanged
 
 from thermal_robot.report.words import MOST_WORDS
 
@@ -16,11 +15,8 @@ pytestmark = [
 ]
 
 
-def test_the_same_is_said_as_before():
+def test_the_same_is_said_as_before_and_the_headline_is_short():
     unchanged("ipa_ur10_d")
-
-
-def test_its_headline_is_short():
     assert len(diagnosed("ipa_ur10_d").summary.split()) <= MOST_WORDS
 
 

@@ -11,10 +11,12 @@ from several import FLAT, LONG, simulated
 from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
+import thermal_robot as tr
 from thermal_robot import diagnose
-from thermal_robot.effects import choose
+from thermal_robot.effects import JointOffset, choose, gate, named
+from thermal_robot.errors import EffectError, EstimationError
 from thermal_robot.inference.exact import corrected_observations
-from thermal_robot.inference.fit import fit, less, refit
+from thermal_robot.inference.fit import fit, fit_named, less, refit
 
 
 def constant_of(effects, kind):
@@ -130,7 +132,11 @@ def test_rows_of_unlike_noise_leave_a_diagnosis_as_it_is(rv_m2):
             assert own["value"] == pytest.approx(other["value"], abs=other["std"] / 5)
 
 
-@pytest.mark.parametrize(("targets", "lost"), [(FLAT, 0.0), (LONG, 0.15)], ids=["three", "four of which some are lost"])
+@pytest.mark.parametrize(
+    ("targets", "lost"),
+    [pytest.param(FLAT, 0.0, marks=pytest.mark.slow), (LONG, 0.15)],
+    ids=["three", "four of which some are lost"],
+)
 def test_parameters_that_several_targets_tell_are_off_by_what_is_said_of_them(targets, lost):
     """Of the last joints, whose turns the targets tell; along the rod they tell it far worse than across."""
     arm, joints, z2 = load_arm("ur10"), ["wrist_2_joint", "wrist_3_joint"], []
@@ -144,3 +150,97 @@ def test_parameters_that_several_targets_tell_are_off_by_what_is_said_of_them(ta
             if parameter.place in joints:
                 z2.append(float((values[k] - true.get(parameter.name, 0.0)) ** 2 / covariance[k, k]))
     assert chi2.ppf(0.001, len(z2)) < sum(z2) < chi2.ppf(0.999, len(z2))
+
+
+ARM, NAMED_NOISE = "builtin:rv_m2", 20e-6
+OFF = {"joint_2": 1.2e-3, "joint_3": -8e-4, "joint_4": 5e-4}
+
+
+def with_known_base(effects, rows=60, seed=1, **further):
+    return tr.simulate(
+        ARM,
+        effects,
+        rows=rows,
+        noise=NAMED_NOISE,
+        base=np.eye(4),
+        tool=np.eye(4),
+        tool_frame="tool0",
+        seed=seed,
+        **further,
+    )
+
+
+@pytest.fixture(scope="module")
+def offsets():
+    return with_known_base({"joint_offset": OFF})
+
+
+def test_it_is_the_whole_fit_where_that_would_choose_the_same(offsets):
+    whole = fit(offsets, choose(only=["joint_offset"]))
+    own = fit_named(offsets, [JointOffset()])
+    assert [effect for effect, _ in whole.effects] == [effect for effect, _ in own.effects]
+    std = np.sqrt(np.diag(own.explanation.values[0][1]))
+    assert (np.abs(whole.effects[0][1] - own.effects[0][1]) < 0.05 * std).all()
+    np.testing.assert_allclose(own.nominal.gap, whole.nominal.gap, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(own.corrected.gap, whole.corrected.gap, rtol=0.0, atol=0.05 * NAMED_NOISE)
+
+
+def test_an_effect_that_is_not_there_is_fitted_all_the_same(offsets):
+    found = fit_named(offsets, [named("joint_offset"), named("backlash")])
+    assert [effect.name for effect, _ in found.effects] == ["joint_offset", "backlash"]
+    values, covariance = found.effects[1][1], found.explanation.values[1][1]
+    assert (np.abs(values) < 4.0 * np.sqrt(np.diag(covariance))).all()
+
+
+def test_without_noise_the_exact_model_is_found():
+    offsets = tr.simulate(ARM, {"joint_offset": {"joint_3": 0.03}}, base=np.eye(4), tool_frame="tool0", seed=2)
+    found = fit_named(offsets, [JointOffset()])
+    assert np.abs(found.nominal.gap).max() > 1e-3
+    assert np.abs(found.corrected.gap).max() < 1e-7
+
+
+def test_another_step_would_move_nothing_that_is_measured(offsets):
+    found = fit_named(offsets, [named("geometric")])
+    again = tr.observe(offsets, found.corrected.frames, displacement=found.corrected.displacement)
+    np.testing.assert_array_equal(again.gap, found.corrected.gap)
+    e = found.explanation
+    (linear, covariance), (_, exact) = e.values[0], found.effects[0]
+    away = np.linalg.lstsq(covariance, linear - exact, rcond=1e-12)[0] @ (linear - exact)
+    assert away < 0.1**2 * len(exact)
+
+
+def test_gross_errors_are_set_aside_and_change_little(offsets):
+    position, struck = offsets.position.copy(), [4, 17, 40]
+    position[struck] += [[0.01, 0.0, 0.0], [0.0, -0.02, 0.0], [0.0, 0.0, 0.005]]
+    spoilt = fit_named(replace(offsets, position=position), [JointOffset()])
+    clean = fit_named(offsets, [JointOffset()])
+    assert np.flatnonzero(spoilt.explanation.outliers).tolist() == struck
+    std = np.sqrt(np.diag(clean.explanation.values[0][1]))
+    assert (np.abs(spoilt.effects[0][1] - clean.effects[0][1]) < 2.0 * std).all()
+
+
+def test_what_is_told_inside_another_is_not_fitted_beside_it(offsets):
+    both = fit_named(offsets, [named("joint_offset"), named("geometric")])
+    assert [effect.name for effect, _ in both.effects] == ["geometric"]
+    assert set(both.variants) == {"joint_offset", "geometric"}
+
+
+def test_constants_of_another_kind_are_fitted_too():
+    seen = tr.observe(with_known_base({}, rows=80))
+    slow = max(gate.variants(named("thermal_elongation"), seen), key=lambda e: e.lag)
+    found = fit_named(with_known_base({slow: 2e-5}, rows=80), [named("thermal_elongation")])
+    assert found.effects[0][0].lag == pytest.approx(slow.lag, rel=0.5)
+
+
+def test_what_a_campaign_lacks_is_said(offsets):
+    bare = offsets.drop_covariate("temperature")
+    with pytest.raises(EffectError, match="'thermal_elongation' cannot be fitted to simulated, which lacks temp"):
+        fit_named(bare, [named("thermal_elongation")])
+    with pytest.raises(EstimationError, match="different poses are too few"):
+        fit_named(offsets.take(np.arange(4)), [JointOffset()])
+    two = np.arange(offsets.samples) % 2
+    held = replace(offsets, q=offsets.q[two] + 1e-4 * np.sin(offsets.q), labels={"pose": two.astype(str)})
+    read = replace(offsets, q=offsets.q[two].round(3) + 1e-5 * np.sin(offsets.q))
+    for again in (held, read):  # by its label; by what an encoder adds
+        with pytest.raises(EstimationError, match=r"^2 different poses are too few"):
+            fit_named(again, [JointOffset()])

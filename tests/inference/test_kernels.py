@@ -12,7 +12,7 @@ from simulate import simulate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.kernels import Form, Smooth, Spectrum, decomposed, forms
+from thermal_robot.inference.kernels import Form, Grouped, Smooth, Spectrum, decomposed, forms
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.registration import register
 from thermal_robot.inference.weights import Noise
@@ -22,122 +22,179 @@ NOISE = 25e-6  # m
 TAUS = (0.5, 3.0)
 
 
-def one_for_all(rng, rows, functions, measures=3, components=3):
-    return Form("one", rng.normal(size=(rows, functions)), rng.normal(size=(measures, components)))
-
-
-def by_row(rng, rows, functions, measures=3, components=2):
-    return Form("by row", rng.normal(size=(rows, functions)), rng.normal(size=(rows, measures, components)))
-
-
-CASES = {
-    "one matrix, narrow": lambda rng: one_for_all(rng, 14, 4),
-    "one matrix, wide": lambda rng: one_for_all(rng, 9, 20),
-    "one matrix, one direction": lambda rng: one_for_all(rng, 14, 4, components=1),
-    "one matrix, poses": lambda rng: one_for_all(rng, 10, 3, measures=6, components=6),
-    "by row, narrow": lambda rng: by_row(rng, 14, 5),
-    "by row, wide": lambda rng: by_row(rng, 9, 30),
-    "by row, poses": lambda rng: by_row(rng, 10, 4, measures=6, components=3),
+# name: rows, functions, measures, components, whether each row has moves of its own
+SMOOTH = {
+    "one matrix, narrow": (14, 4, 3, 3, False),
+    "one matrix, wide": (9, 20, 3, 3, False),
+    "one matrix, one direction": (14, 4, 3, 1, False),
+    "one matrix, poses": (10, 3, 6, 6, False),
+    "by row, narrow": (14, 5, 3, 2, True),
+    "by row, wide": (9, 30, 3, 2, True),
+    "by row, poses": (10, 4, 6, 3, True),
+}
+# name: groups of a dozen rows; measures, components, whether each row has moves of its own
+ANEW = {
+    "one column": (np.arange(12) // 3, 3, 1, True),
+    "two columns": (np.arange(12) // 3, 3, 2, True),
+    "more columns than a group has equations": (np.arange(12), 3, 5, True),
+    "groups of poses": (np.arange(12) // 4, 6, 6, True),
+    "the same moves for all rows": (np.arange(12) // 3, 3, 3, False),
+    "groups of several sizes, mixed": (np.array([3, 0, 1, 3, 0, 3, 2, 1, 3, 0, 4, 3]), 3, 2, True),
+    "numbers that no row has": (np.array([5, 0, 2, 5, 0, 5, 2, 8, 5, 0, 8, 5]), 3, 2, True),
+    "all rows one group": (np.zeros(12, dtype=int), 3, 2, True),
 }
 
 
-@pytest.fixture(params=list(CASES))
+def form_of(name, rng):
+    """The form of a case; its groups, if it is anew in each."""
+    first, *functions, measures, components, by_row = {**SMOOTH, **ANEW}[name]
+    rows = first if functions else len(first)
+    moves = rng.normal(size=(rows, measures, components) if by_row else (measures, components))
+    if functions:
+        return Form(name, rng.normal(size=(rows, *functions)), moves), None
+    return Form(name, first.astype(float), moves, anew=True), first
+
+
+class Case:
+    """A form's decompositions and its dense covariances: of the rows in use, and of all rows with them.
+
+    Two rows weigh nothing. Of a form that is anew the last row's group weighs nothing either; it is decomposed by
+    groups and with a function for each group.
+    """
+
+    def __init__(self, name):
+        self.rng = np.random.default_rng([4, len(name)])
+        form, groups = form_of(name, self.rng)
+        rows, self.measures = len(form.functions), form.moves.shape[-2]
+        noise = np.repeat(self.rng.uniform(0.5, 2.0, self.measures // 3), 3)
+        weights = self.rng.uniform(0.3, 1.0, rows)
+        weights[[1, 4]] = 0.0
+        if groups is not None and len(set(groups)) > 1:
+            weights[groups == groups[10]] = 0.0
+        self.spectra, each = [decomposed(form, weights, noise)], form
+        if groups is not None:
+            each = replace(form, functions=np.eye(groups.max() + 1)[groups], anew=False)
+            # written out by row: where moves are the same for all, a spectrum takes another way
+            written = np.broadcast_to(form.moves, (rows, *form.moves.shape[-2:]))
+            self.spectra.append(Spectrum.of(replace(each, moves=written), weights, noise))
+        root, used = np.repeat(np.sqrt(weights), self.measures), np.repeat(weights > 0, self.measures)
+        across = dense(each, noise) * root  # of all rows with those in use, weighed
+        self.inside, self.across = (root[:, None] * across)[np.ix_(used, used)], across[:, used]
+        self.stack = self.rng.normal(size=(len(self.inside), 6))
+
+    def covariance(self, tau):
+        return np.eye(len(self.inside)) + tau**2 * self.inside
+
+
+@pytest.fixture(params=[*SMOOTH, *ANEW])
 def case(request):
-    """A form's spectrum, weights of two rows zero; the dense covariance of those in use, and of all with them."""
-    rng = np.random.default_rng(len(request.param))
-    form = CASES[request.param](rng)
-    count, measures = len(form.functions), form.moves.shape[-2]
-    noise = np.repeat(rng.uniform(0.5, 2.0, measures // 3), 3)
-    weights = rng.uniform(0.3, 1.0, count)
-    weights[[1, 4]] = 0.0
-    whole = dense(form, noise)
-    used = np.repeat(weights > 0, measures)
-    root = np.repeat(np.sqrt(weights), measures)
-    across = whole * root  # of all rows with those in use, weighed
-    inside = (root[:, None] * across)[np.ix_(used, used)]
-    return Spectrum.of(form, weights, noise), inside, across[:, used], measures, rng
+    return Case(request.param)
+
+
+def close(found, expected, to=1e-10):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=to * max(np.abs(expected).max(), 1.0))
+
+
+@pytest.mark.parametrize("chunk", [5, 1024])
+@pytest.mark.parametrize("tau", TAUS)
+def test_products_and_the_mean_are_those_of_the_dense_covariance(case, tau, chunk, monkeypatch):
+    """The mean is that of the process given the rows in use; it does not matter how many rows are taken at once."""
+    monkeypatch.setattr(settings, "CHUNK", chunk)
+    stack, plain, left = case.stack, case.stack.T @ case.stack, case.stack[:, 0]
+    expected = stack.T @ np.linalg.solve(case.covariance(tau), stack)
+    mean = tau**2 * case.across @ np.linalg.solve(case.covariance(tau), left)
+    for own in case.spectra:
+        smooth = Smooth(own, tau)
+        close(smooth.products(stack), expected)
+        # from some columns that were carried over once
+        some = [along[:, [4, 1]] for along in own.along(stack)]
+        close(own.products(tau, some, plain[np.ix_([4, 1], [4, 1])]), expected[np.ix_([4, 1], [4, 1])])
+        found = smooth.mean(left)
+        assert found.shape == (len(case.across) // case.measures, case.measures)
+        close(found.ravel(), mean)
 
 
 @pytest.mark.parametrize("tau", TAUS)
-def test_products_are_those_beside_the_dense_covariance(case, tau):
-    spectrum, inside, _, _, rng = case
-    stack = rng.normal(size=(len(inside), 7))
-    expected = stack.T @ np.linalg.solve(np.eye(len(inside)) + tau**2 * inside, stack)
-    found = Smooth(spectrum, tau).products(stack)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-    # from columns that were carried over once
-    again = spectrum.products(tau, spectrum.along(stack), stack.T @ stack)
-    np.testing.assert_allclose(again, found, rtol=0, atol=1e-12 * np.abs(expected).max())
+def test_whitened_columns_the_determinant_and_what_is_followed_are_those_of_the_dense_covariance(case, tau):
+    covariance = case.covariance(tau)
+    whitened = np.linalg.inv(np.real(sqrtm(covariance))) @ case.stack
+    for own in case.spectra:
+        smooth = Smooth(own, tau)
+        close(smooth.whitened(case.stack), whitened, 1e-8)
+        close(smooth.whitened(case.stack).T @ smooth.whitened(case.stack), smooth.products(case.stack))
+        assert smooth.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-10)
+        followed = np.trace(np.linalg.solve(covariance, tau**2 * case.inside))
+        assert smooth.degrees == pytest.approx(followed, rel=1e-10)
 
 
-def test_no_columns_have_no_products(case):
-    """As where both frames are known and no effect is found."""
-    spectrum, inside, _, _, _ = case
-    none = np.zeros((len(inside), 0))
-    assert Smooth(spectrum, 1.0).products(none).shape == (0, 0)
-    assert spectrum.spread(1.0, none).shape == (0, 0)
-    assert Smooth(spectrum, 1.0).whitened(none).shape == none.shape
-
-
+@pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("tau", TAUS)
-def test_columns_are_spread_by_the_dense_covariance(case, tau):
-    spectrum, inside, _, _, rng = case
-    stack = rng.normal(size=(len(inside), 7))
-    expected = stack.T @ (np.eye(len(inside)) + tau**2 * inside) @ stack
-    np.testing.assert_allclose(spectrum.spread(tau, stack), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("tau", TAUS)
-def test_columns_are_whitened_by_the_root_of_the_dense_covariance(case, tau):
-    spectrum, inside, _, _, rng = case
-    stack = rng.normal(size=(len(inside), 5))
-    expected = np.linalg.inv(np.real(sqrtm(np.eye(len(inside)) + tau**2 * inside))) @ stack
-    np.testing.assert_allclose(Smooth(spectrum, tau).whitened(stack), expected, rtol=0, atol=1e-8)
-    white = Smooth(spectrum, tau).whitened(stack)
-    products = Smooth(spectrum, tau).products(stack)
-    np.testing.assert_allclose(white.T @ white, products, rtol=0, atol=1e-10 * np.abs(products).max())
-
-
-@pytest.mark.parametrize("tau", TAUS)
-def test_the_determinant_and_what_is_followed_are_those_of_the_dense_covariance(case, tau):
-    spectrum, inside, _, _, _ = case
-    covariance = np.eye(len(inside)) + tau**2 * inside
-    smooth = Smooth(spectrum, tau)
-    assert smooth.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-10)
-    assert smooth.degrees == pytest.approx(np.trace(np.linalg.solve(covariance, tau**2 * inside)), rel=1e-10)
-
-
-@pytest.mark.parametrize("tau", TAUS)
-def test_the_eigenvectors_put_the_covariance_together(case, tau):
-    spectrum, inside, _, _, _ = case
+def test_a_spectrum_puts_the_covariance_together(name, tau):
+    case = Case(name)
+    (spectrum,) = case.spectra
+    assert isinstance(spectrum, Spectrum)
+    close(spectrum.spread(tau, case.stack), case.stack.T @ case.covariance(tau) @ case.stack)
     vectors, variance = spectrum.eigen(tau, 1e-8)
     assert (variance > 1e-8).all()
     np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(variance)), rtol=0, atol=1e-8)
-    np.testing.assert_allclose((vectors * variance) @ vectors.T, tau**2 * inside, rtol=0, atol=2e-8 * len(inside))
+    inside = tau**2 * case.inside
+    np.testing.assert_allclose((vectors * variance) @ vectors.T, inside, rtol=0, atol=2e-8 * len(inside))
     few, large = spectrum.eigen(tau, float(np.median(variance)))
     assert few.shape[1] == len(large) < len(variance)
+    # no columns, as where both frames are known and no effect is found, have no products
+    none = case.stack[:, :0]
+    assert Smooth(spectrum, tau).products(none).shape == spectrum.spread(tau, none).shape == (0, 0)
+    assert Smooth(spectrum, tau).whitened(none).shape == none.shape
 
 
+@pytest.mark.parametrize("name", ANEW)
 @pytest.mark.parametrize("tau", TAUS)
-def test_the_mean_is_that_of_the_process_given_the_rows_in_use(case, tau):
-    spectrum, inside, across, measures, rng = case
-    left = rng.normal(size=len(inside))
-    expected = tau**2 * across @ np.linalg.solve(np.eye(len(inside)) + tau**2 * inside, left)
-    found = Smooth(spectrum, tau).mean(left)
-    assert found.shape == (len(across) // measures, measures)
-    np.testing.assert_allclose(found.ravel(), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+def test_what_some_rows_have_in_common_is_that_of_their_own_covariance(name, tau):
+    case = Case(name)
+    assert isinstance(case.spectra[0], Grouped)
+    rows = case.rng.random(len(case.stack) // case.measures) < 0.7
+    own, columns = np.repeat(rows, case.measures), case.stack.reshape(len(rows), case.measures, -1)
+    some, covariance = case.stack[own], case.covariance(tau)[np.ix_(own, own)]
+    expected = some.T @ some - some.T @ np.linalg.solve(covariance, some)
+    for spectrum in case.spectra:
+        close(Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
+        assert not Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e9).any()
+    # what lies below a floor is left out of both alike
+    floor = float(np.median(np.linalg.eigvalsh(tau**2 * case.inside)[-4:]))
+    close(*(Smooth(s, tau).taken(rows, lambda which: columns[which], floor) for s in case.spectra))
 
 
-@pytest.mark.parametrize("name", list(CASES))
+def test_of_a_group_that_no_row_in_use_has_nothing_is_known():
+    """Its mean is that of the prior, nought; the other groups' is not."""
+    case = Case("groups of several sizes, mixed")
+    grouped = case.spectra[0]
+    mean = Smooth(grouped, 3.0).mean(case.stack[:, 0])
+    alone = ~np.isin(grouped.groups, grouped.group)
+    assert alone.any()
+    assert (mean[alone] == 0.0).all()
+    assert (np.abs(mean[~alone]).max(axis=1) > 1e-3).all()
+    # a row that is set aside errs as the others of its group where the moves are the same
+    case = Case("the same moves for all rows")
+    mean = Smooth(case.spectra[0], 3.0).mean(case.stack[:, 0])
+    for group in range(4):
+        assert np.ptp(mean[case.spectra[0].groups == group], axis=0).max() < 1e-12
+    # where no row is in use there is nothing
+    empty = Grouped.of(grouped.everywhere, grouped.groups, np.zeros(12), np.ones(3))
+    assert (empty.log_det(3.0), empty.degrees(3.0)) == (0.0, 0.0)
+    assert (empty.mean(3.0, np.zeros(0)) == 0.0).all()
+
+
+@pytest.mark.parametrize("name", [*SMOOTH, *ANEW])
 def test_a_unit_of_a_form_is_the_noise(name):
     """Whatever the units of functions and moves: the discrepancy's mean square is τ² times the noise's."""
     rng = np.random.default_rng(3)
-    form = CASES[name](rng)
+    form, groups = form_of(name, rng)
     count, measures = len(form.functions), form.moves.shape[-2]
     noise = np.repeat(rng.uniform(0.5, 2.0, measures // 3), 3)
     for factor in (1.0, 1e-5):
-        other = replace(form, moves=factor * form.moves, functions=7.0 * form.functions)
-        smooth = Smooth(Spectrum.of(other, np.ones(count), noise), 2.0)
+        functions = form.functions if groups is not None else 7.0 * form.functions
+        other = replace(form, moves=factor * form.moves, functions=functions)
+        smooth = Smooth(decomposed(other, np.ones(count), noise), 2.0)
         covariance = np.linalg.inv(smooth.products(np.eye(count * measures)))
         assert (np.diag(covariance) - 1.0).mean() == pytest.approx(4.0, rel=1e-8)
 

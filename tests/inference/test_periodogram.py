@@ -84,12 +84,6 @@ def test_a_slide_is_searched_down_to_the_lead_of_a_screw():
     assert far == pytest.approx(2.0 * near, rel=0.02)
 
 
-def test_positions_on_a_lattice_know_no_order_above_its_half():
-    lattice = np.deg2rad(10.0) * np.random.default_rng(0).integers(-9, 10, ROWS)
-    assert 17.0 < orders(lattice).max() <= 18.0
-    assert orders(lattice + 1e-3 * np.random.default_rng(1).normal(size=ROWS)).max() > 199.0
-
-
 def test_in_noise_the_choice_of_an_order_is_paid_for():
     """Of sixty periodograms of noise not one gains more than its share of the orders allows."""
     worths = []

@@ -1,4 +1,4 @@
-"""What the normal equations hold: the frames projected out, what the data cannot see or tell apart left out."""
+"""What the normal equations hold: frames projected out, rows in their own noise, what nothing tells apart left out."""
 
 from dataclasses import replace
 
@@ -9,9 +9,22 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.effects import choose
+from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.problem import Linear, contained, frame_step, gram, parameter_values, whitened
+from thermal_robot.inference.problem import (
+    Linear,
+    Products,
+    Whitening,
+    contained,
+    frame_step,
+    generalised,
+    gram,
+    parameter_values,
+    whitened,
+)
+from thermal_robot.inference.registration import register
 from thermal_robot.inference.search import Search
+from thermal_robot.observations import observe
 
 
 def flat(linear, whitening, columns):
@@ -232,3 +245,103 @@ def test_each_row_is_whitened_by_its_own_noise():
     own = replace(even, relative=relative)
     np.testing.assert_allclose(whitened(scaled, own), whitened(linear, even), rtol=1e-12)
     np.testing.assert_array_equal(own.sigma([2, 4]), even.noise * relative[[2, 4]])
+
+
+NAMES = ("joint_offset", "joint_gain", "backlash", "drift")
+
+
+@pytest.fixture(scope="module")
+def seen(rv_m2):
+    data = simulate(rv_m2, ["joint_offset", "drift"], samples=50, seed=4)[0]
+    return observe(data, register(data))
+
+
+@pytest.fixture(scope="module")
+def whitening(seen):
+    weights = np.random.default_rng(0).uniform(0.0, 1.0, len(seen.gap)).round(1)  # some rows are not used
+    assert (weights == 0.0).any()
+    return Whitening(weights, np.array([2e-5, 3e-5, 4e-5]), 5.0)
+
+
+def test_every_selection_in_any_order_is_as_if_formed_anew(seen, whitening):
+    blocks = [block(seen, effect) for effect in choose(NAMES)]
+    whole = Linear(seen.gap, frame_columns(seen)[0], ())
+    kept = Products(whole, whitening)
+    for which in ([0], [0, 1], [1, 0], [3, 2, 1], [0, 1, 2, 3], [2], []):
+        some = [blocks[k] for k in which]
+        linear, found = kept.problem(some)
+        assert linear.blocks == tuple(some)
+        expected = gram(Linear(whole.gap, whole.frames, tuple(some)), whitening)
+        assert (found.slices, found.equations, found.ranks) == (expected.slices, expected.equations, expected.ranks)
+        assert found.total == pytest.approx(expected.total, rel=1e-10)
+        # the reduction of a block is free up to turns: what is seen of the parameters is not
+        for a, b, basis, other in zip(found.slices, expected.slices, found.bases, expected.bases, strict=True):
+            mine, theirs = basis @ found.vector[a], other @ expected.vector[b]
+            np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max(initial=0.0))
+            mine = basis @ found.matrix[a, a] @ basis.T
+            theirs = other @ expected.matrix[b, b] @ other.T
+            np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max(initial=0.0))
+
+
+NOISE = np.array([2e-5, 3e-5, 5e-5])
+
+
+def covariances(rng, rows):
+    """(rows, 3, 3) positive definite, the smallest and largest axis apart by orders of magnitude."""
+    turned = np.linalg.qr(rng.normal(size=(rows, 3, 3)))[0]
+    return (turned * 10.0 ** rng.uniform(-10, -6, (rows, 1, 3))) @ turned.transpose(0, 2, 1)
+
+
+def test_rows_have_the_covariance_of_the_noise():
+    rng = np.random.default_rng(0)
+    linear = small_problem(0)[0]
+    covariance = np.repeat(covariances(rng, 1), 12, axis=0)
+    gaps = []
+    for _ in range(2000):
+        gap = rng.multivariate_normal(np.zeros(3), covariance[0], size=12)
+        gaps.append(generalised(type(linear)(gap, linear.frames, ()), covariance, NOISE).gap)
+    rows = np.concatenate(gaps)
+    spread = rows.T @ rows / len(rows) / np.outer(NOISE, NOISE)
+    np.testing.assert_allclose(spread, np.eye(3), atol=4.0 * np.sqrt(2.0 / len(rows)))
+
+
+@pytest.mark.parametrize("only", [False, True], ids=["with its values", "its columns alone"])
+def test_squared_lengths_are_those_of_the_covariance(only):
+    """Of the gap and of every column: |x|² in noise is xᵀ S⁻¹ x."""
+    rng = np.random.default_rng(1)
+    linear = small_problem(1)[0]
+    covariance = covariances(rng, 12)
+    white = generalised(linear, covariance, NOISE)
+    inverse = np.linalg.inv(covariance)
+    pairs = [(linear.frames, white.frames)]
+    pairs += [(a.columns, b.columns) for a, b in zip(linear.blocks, white.blocks, strict=True)]
+    pairs += [] if only else [(linear.gap[:, :, None], white.gap[:, :, None])]
+    for plain, own in pairs:
+        expected = np.einsum("nik,nij,njl->nkl", plain, inverse, plain)
+        own = own / NOISE[:, None]
+        found = np.einsum("nik,nil->nkl", own, own)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+
+
+def test_the_fit_is_that_of_weighted_least_squares():
+    """The parameters of the normal equations Xᵀ S⁻¹ X θ = Xᵀ S⁻¹ y (Aitken)."""
+    rng = np.random.default_rng(2)
+    linear = small_problem(2)[0]
+    # rows that differ by a factor of three
+    covariance = covariances(rng, 12) / 1e-8 + 0.3 * np.eye(3)
+    columns = linear.stack[:, :, :-1]
+    inverse = np.linalg.inv(covariance)
+    expected = np.linalg.solve(
+        np.einsum("nik,nij,njl->kl", columns, inverse, columns),
+        np.einsum("nik,nij,nj->k", columns, inverse, linear.gap),
+    )
+    white = generalised(linear, covariance, NOISE)
+    root = (white.stack / NOISE[:, None]).reshape(36, -1)
+    np.testing.assert_allclose(np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0], expected, rtol=1e-7)
+
+
+def test_the_noise_itself_changes_nothing():
+    linear = small_problem(3)[0]
+    same = generalised(linear, np.broadcast_to(np.diag(NOISE**2), (12, 3, 3)), NOISE)
+    np.testing.assert_allclose(same.stack, linear.stack, rtol=1e-12)
+    assert [b.sizes is o.sizes for b, o in zip(same.blocks, linear.blocks, strict=True)] == [True] * 3

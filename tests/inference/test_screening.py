@@ -9,13 +9,17 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot.campaign.turning import SLIPS
+from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.fit import fit
+from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.registration import register
-from thermal_robot.inference.screening import Target, scan, shaped, shapes
+from thermal_robot.inference.screening import Target, Thin, scan, shaped, shapes
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 
@@ -72,6 +76,11 @@ def test_every_candidate_is_counted_and_segments_are_tried_with_what_speaks_else
     assert "none" in links  # a constant of a segment: its geometry
     assert law.quantity in links
     assert len(links - {"none"}) == 6
+    # a law of nothing has one shape
+    constant = next(item for item in found if item.law.shape == "constant")
+    again = shaped(here, target, constant.law)
+    assert again.law == constant.law
+    assert again.gain == pytest.approx(constant.gain, rel=1e-9)
 
 
 def test_several_remainders_are_scanned_as_each_alone(scanned):
@@ -141,14 +150,6 @@ def test_a_wheel_on_the_motor_is_found_with_its_order(rv_m2):
     assert shaped(here, target, smooth).law.marks == (51.0,)
 
 
-def test_a_law_of_nothing_has_one_shape(scanned):
-    _, here, target, found = scanned["joint"]
-    constant = next(item for item in found if item.law.shape == "constant")
-    again = shaped(here, target, constant.law)
-    assert again.law == constant.law
-    assert again.gain == pytest.approx(constant.gain, rel=1e-9)
-
-
 def put_in(robot, law, values, seed, ratio):
     """A campaign of a robot with a law at work whose size is a ratio of the noise, once the frames are fitted."""
     data = replace(simulate(robot, samples=120, seed=seed, noise=NOISE)[0], priors={})
@@ -167,45 +168,34 @@ def put_in(robot, law, values, seed, ratio):
 def grammar(robot, name, rng):
     """A law of a kind at random in a robot, and its values."""
     joint = robot.joint_names[int(rng.integers(1, robot.n - 1))]
-    other = robot.joint_names[0]
     k = int(rng.integers(14, 26))
-    plain = Discovered(place=joint)
-    law, values = {
-        "lost motion x payload": (
-            replace(plain, quantity="payload", shape="ramp", span=3.0, of="backlash"),
-            [0.0, 1.0],
-        ),
+    load = {"quantity": "payload", "span": 3.0}
+    warm = {"quantity": "temperature", "span": 5.0, "origin": 22.0}
+    product = {"quantity": "payload", "shape": "product"}
+    # drawn in this order: a generator that is asked otherwise gives other laws
+    tool, base, hour = rng.normal(size=3), rng.normal(size=6), float(rng.uniform(1800.0, 5400.0))
+    own, values = {
+        "lost motion x payload": ({**load, "shape": "ramp", "of": "backlash"}, [0.0, 1.0]),
         "compliance x temperature": (
-            replace(
-                plain,
-                place=robot.joint_names[1],
-                quantity="temperature",
-                shape="ramp",
-                span=5.0,
-                origin=22.0,
-                of="joint_compliance",
-            ),
+            {**warm, "place": robot.joint_names[1], "shape": "ramp", "of": "joint_compliance"},
             [0.0, 1.0],
         ),
-        "product in a joint": (replace(plain, quantity="payload", shape="product", by=other, span=3.0), [0.0, 1.0]),
+        "product in a joint": ({**load, "shape": "product", "by": robot.joint_names[0]}, [0.0, 1.0]),
         "product at the tool": (
-            replace(plain, kind="tool", place="tool", turns=False, quantity="payload", shape="product", by="gravity.x"),
-            [0.0, 0.0, 0.0, *rng.normal(size=3)],
+            {**product, "kind": "tool", "place": "tool", "turns": False, "by": "gravity.x"},
+            [0.0, 0.0, 0.0, *tool],
         ),
         "product at the base": (
-            replace(plain, kind="base", place="base", turns=False, quantity="payload", shape="product", by="reach.x"),
-            [*np.zeros(6), *rng.normal(size=6)],
+            {**product, "kind": "base", "place": "base", "turns": False, "by": "reach.x"},
+            [*np.zeros(6), *base],
         ),
         "memory": (
-            replace(plain, quantity=f"since_turn.{joint}", shape="hysteresis", marks=SLIPS[k : k + 2]),
+            {"quantity": f"since_turn.{joint}", "shape": "hysteresis", "marks": SLIPS[k : k + 2]},
             [0.0, 1.0, 1.0],
         ),
-        "jump": (
-            replace(plain, quantity="time", shape="step", marks=(float(rng.uniform(1800.0, 5400.0)),)),
-            [0.0, 1.0],
-        ),
+        "jump": ({"quantity": "time", "shape": "step", "marks": (hour,)}, [0.0, 1.0]),
     }[name]
-    return law, 1e-4 * np.asarray(values)
+    return Discovered(**{"place": joint, **own}), 1e-4 * np.asarray(values)
 
 
 on_arms = pytest.mark.parametrize(
@@ -415,3 +405,72 @@ def test_a_wave_of_a_screw_is_found_with_its_lead(awkward):
     assert (first.place, first.shape) == ("slide", "harmonic")
     assert 2.0 * np.pi / first.marks[0] == pytest.approx(0.01, rel=1e-3)
     assert first.describe().endswith("(a wave of 0.01 m)")
+
+
+@pytest.fixture(scope="module")
+def known(rv_m2):
+    """A fit with an effect at work, gross errors, and a spell of rows that were knocked."""
+    campaign = simulate(rv_m2, ["joint_offset"], samples=150, seed=3, outliers=0.05)[0]
+    position = campaign.position.copy()
+    position[np.argsort(campaign.covariates["time"])[60:64]] += 5e-3
+    return fit(replace(campaign, position=position), choose(("joint_offset",), (), ()))
+
+
+@pytest.fixture
+def thinned(known, monkeypatch):
+    monkeypatch.setattr(settings, "ENOUGH_ROWS", 90)
+    return Thin.of(known)
+
+
+def test_below_the_limit_all_rows_are_there(known):
+    thin, e = Thin.of(known), known.explanation
+    assert thin.observations is known.corrected
+    assert thin.linear is e.linear
+    # the knocked rows follow each other, scattered gross errors do not
+    assert thin.changed[np.argsort(known.campaign.covariates["time"])[60:64]].all()
+    assert thin.changed.sum() < e.outliers.sum()
+
+
+def test_above_it_rows_are_drawn_once_and_in_order(known, thinned):
+    assert thinned.observations.campaign.samples == 90
+    rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in thinned.observations.q]
+    assert rows == sorted(set(rows))
+    e = known.explanation
+    np.testing.assert_array_equal(thinned.linear.gap, e.linear.gap[rows])
+    np.testing.assert_array_equal(thinned.linear.frames, e.linear.frames[rows])
+    for own, whole in zip(thinned.linear.blocks, e.linear.blocks, strict=True):
+        np.testing.assert_array_equal(own.columns, whole.columns[rows])
+    np.testing.assert_array_equal(thinned.changed, in_a_row(known.campaign, e.outliers)[rows])
+    # the corrected model is the same: its gap at these rows is the one it had among all
+    np.testing.assert_allclose(thinned.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
+    # the same campaign always gets the same rows
+    np.testing.assert_array_equal(Thin.of(known).observations.q, thinned.observations.q)
+
+
+def test_the_rows_drawn_stand_for_all(known, thinned, monkeypatch):
+    clock = known.campaign.covariates["time"]
+    share = np.mean(thinned.observations.campaign.covariates["time"] < np.median(clock))
+    assert share == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(90))
+    blocks = known.explanation.best.blocks
+    own = thinned.target(blocks).white
+    monkeypatch.undo()
+    sound = Thin.of(known).target(blocks).white
+    # four of its standard deviations: that of a normal law's median of |x|, 1.17/√n of it
+    assert np.median(np.abs(own)) == pytest.approx(np.median(np.abs(sound)), rel=4.0 * 1.17 / np.sqrt(own.size))
+
+
+def test_targets_hold_what_is_left_beside_some_blocks(known):
+    thin = Thin.of(known)
+    blocks = known.explanation.best.blocks
+    assert blocks
+    calm = replace(thin, changed=np.zeros(150, dtype=bool))
+    before, after = calm.target(()), thin.target(blocks)
+    frames = thin.linear.frames.shape[2]
+    assert before.basis.shape[1] == frames
+    assert after.basis.shape[1] > frames
+    columns = thin.linear.blocks[blocks[0]].columns
+    assert before.worth(columns).gain > 50.0
+    # rows that changed weigh fully, however far they are
+    assert (after.root[thin.changed].min(axis=0) >= after.root.max(axis=0) * (1.0 - 1e-9)).all()
+    spoilt = known.explanation.outliers & ~thin.changed
+    assert after.root[spoilt].max() < 0.2 * after.root.max()

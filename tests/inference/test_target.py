@@ -27,28 +27,13 @@ def squares(gap, columns):
     return float(left @ left)
 
 
-@pytest.fixture(scope="module")
-def noise():
-    """Worth of columns that have nothing to do with the gap, 200 times."""
+def test_in_noise_every_p_value_is_as_likely_the_share_is_zero_and_the_evidence_falls():
     rng = np.random.default_rng(0)
-    found = []
-    for _ in range(200):
-        gap, design, further = drawn(rng)
-        found.append(plain(gap, design).worth(further))
-    return found
-
-
-def test_in_noise_every_p_value_is_as_likely(noise):
+    noise = [plain(gap, design).worth(further) for gap, design, further in (drawn(rng) for _ in range(200))]
     assert kstest([w.p_value for w in noise], "uniform").pvalue > 0.01
-
-
-def test_in_noise_the_share_is_zero_on_average(noise):
     shares = np.array([w.share for w in noise])
     assert abs(shares.mean()) < 4.0 * shares.std() / np.sqrt(len(shares))
     assert (shares < 0.0).any()
-
-
-def test_in_noise_columns_lower_the_evidence(noise):
     assert np.mean([w.gain for w in noise]) < -3.0
     assert np.mean([w.gain > 0.0 for w in noise]) < 0.02
 
@@ -63,28 +48,26 @@ def test_weights_hardly_make_the_test_of_noise_bolder():
     assert np.mean(np.array(found) < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 200)
 
 
-def test_the_gain_is_the_difference_of_the_bayes_information_criterion():
+@pytest.mark.parametrize("rows", [6, ROWS])
+def test_the_gain_is_that_of_the_bayes_information_criterion_and_the_p_value_that_of_the_f_test(rows):
     """BIC = n ln(S/n) + k ln n of each fit, n being what the design leaves; the gain is half of what it falls by."""
     rng = np.random.default_rng(2)
     for signal in (0.0, 1e-6, 1e-5, 1e-3):
-        gap, design, further = drawn(rng)
+        gap, design, further = drawn(rng, rows)
         gap = gap + signal * further[:, :, 0]
         own = plain(gap, design)
         before, after = squares(gap, design), squares(gap, np.concatenate([design, further], axis=2))
         n = own.freedom
-        assert n == 3 * ROWS - DESIGN
+        assert n == 3 * rows - DESIGN
         falls = (n * np.log(before / n)) - (n * np.log(after / n) + FURTHER * np.log(n))
-        assert own.worth(further).gain == pytest.approx(0.5 * falls, rel=1e-6, abs=1e-9)
-
-
-def test_the_p_value_is_that_of_the_f_test_of_two_nested_fits():
-    rng = np.random.default_rng(9)
-    for rows in (6, ROWS):
-        gap, design, further = drawn(rng, rows)
-        before, after = squares(gap, design), squares(gap, np.concatenate([design, further], axis=2))
-        left = 3 * rows - DESIGN - FURTHER
-        expected = f_law.sf((before - after) / FURTHER / (after / left), FURTHER, left)
-        assert plain(gap, design).worth(further).p_value == pytest.approx(expected, rel=1e-6)
+        worth = own.worth(further)
+        assert worth.gain == pytest.approx(0.5 * falls, rel=1e-6, abs=1e-9)
+        ratio = (before - after) / FURTHER / (after / (n - FURTHER))
+        assert worth.p_value == pytest.approx(f_law.sf(ratio, FURTHER, n - FURTHER), rel=1e-6)
+        # units do not matter, neither of further columns nor of the design
+        units = 10.0 ** np.array([-6.0, 0.0, 3.0, 6.0])
+        assert plain(gap, design * units).worth(further).gain == pytest.approx(worth.gain, rel=1e-6, abs=1e-9)
+        assert own.worth(further * [1e-6, 1.0, 1e6]).p_value == pytest.approx(worth.p_value, rel=1e-6)
 
 
 def test_the_share_is_that_of_what_is_left():
@@ -114,12 +97,6 @@ def test_what_the_design_holds_already_is_worth_nothing():
     assert own.worth(np.concatenate([design, further], axis=2)).gain == pytest.approx(own.worth(further).gain, rel=1e-6)
 
 
-def test_units_of_further_columns_do_not_matter():
-    gap, design, further = drawn(np.random.default_rng(5))
-    own = plain(gap, design)
-    assert own.worth(further * [1e-6, 1.0, 1e6]).p_value == pytest.approx(own.worth(further).p_value, rel=1e-6)
-
-
 def test_too_few_equations_say_nothing():
     rng = np.random.default_rng(6)
     for columns, worth in ((7, False), (8, True)):
@@ -143,13 +120,6 @@ def test_rows_far_from_the_rest_weigh_little_unless_they_are_trusted():
     assert np.abs(plain(gap + 1e-5 * further[:, :, 0], design).worth(further[:, :, :1]).gain) < 10.0
 
 
-def test_units_of_the_design_do_not_matter():
-    gap, design, further = drawn(np.random.default_rng(8))
-    units = 10.0 ** np.array([-6.0, 0.0, 3.0, 6.0])
-    one, other = (Target.of(gap, d).worth(further) for d in (design, design * units))
-    assert other.gain == pytest.approx(one.gain, rel=1e-6)
-
-
 @pytest.mark.parametrize("components", [1, 6])
 def test_a_seat_tells_of_many_laws_what_the_target_tells_of_each(components):
     rng = np.random.default_rng(3)
@@ -165,12 +135,7 @@ def test_a_seat_tells_of_many_laws_what_the_target_tells_of_each(components):
         np.testing.assert_allclose(own.seat(moves).gains(laws), expected, rtol=1e-9)
     assert loud.seat(moves).gains(laws)[-1] > 10.0
     assert target.seat(moves).gains(laws)[-2] == -np.inf
-
-
-def test_a_seat_does_not_count_what_the_design_can_do():
-    rng = np.random.default_rng(4)
-    gap, design, _ = drawn(rng)
-    target = Target.of(gap, design)
+    # what the design can do does not count
     assert target.seat(design[:, :, :1]).gains([np.ones((ROWS, 1))])[0] == -np.inf
 
 

@@ -61,10 +61,6 @@ def test_what_was_fitted_is_given_back_to_the_noise():
     assert np.mean(ratios) == pytest.approx(1.0, abs=4.0 * np.std(ratios) / np.sqrt(60))
 
 
-def test_a_remainder_of_nothing_has_the_noise_of_rounding():
-    assert (robust_noise(np.zeros((20, 6))) > 0.0).all()
-
-
 def test_a_stated_noise_counts_whatever_is_left():
     """What is more in the remainder is something else, and has a form of its own."""
     position, orientation = 2e-5, 3e-5
@@ -80,6 +76,10 @@ def test_a_stated_noise_counts_whatever_is_left():
     assert free == 0.0
     assert STATED.parts(3) == (position,)
     assert STATED.parts(6) == (position, orientation)
+    # no noise is less than rounding: somebody wrote 1e-12 mm
+    assert Noise(1e-15, 0.5e-9).parts(6) == (1e-9, 1e-9)
+    assert Noise(None, None).parts(6) == (None, None)
+    assert (robust_noise(np.zeros((20, 6))) > 0.0).all()
 
 
 def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others():
@@ -138,12 +138,6 @@ def test_a_close_fit_is_judged_by_the_equations_that_it_leaves():
     rows[0] = 3.0 * SIGMA[:3]
     assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
     np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
-
-
-def test_no_stated_noise_is_less_than_rounding():
-    """Somebody wrote 1e-12 mm: a billion times finer than any instrument, and than the figures of a table."""
-    assert Noise(1e-15, 0.5e-9).parts(6) == (1e-9, 1e-9)
-    assert Noise(None, None).parts(6) == (None, None)
 
 
 @measured

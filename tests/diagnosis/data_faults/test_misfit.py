@@ -35,14 +35,10 @@ def test_the_fault_comes_first_and_no_effect_is_claimed(sound):
     assert "joint_3 is reversed" in plain["verdict"]["reason"]
     assert "Change the sign of its column" in plain["verdict"]["reason"]
     assert plain["next"]["samples"] == []
-
-
-def test_what_nothing_mends_is_unusable_too(sound):
+    # what nothing mends is unusable, too
     found = diagnose(measured_at(sound, np.random.default_rng(0).permutation(sound.samples)))
-    assert not found.usable
-    assert found.misfit.fault is None
+    assert (found.usable, found.verdict, found.misfit.fault) == (False, (), None)
     assert found.misfit.away > 0.02 * found.reach
-    assert found.verdict == ()
     assert found.reason.startswith("Robot and table do not describe the same motion")
 
 
@@ -138,6 +134,7 @@ def test_a_common_factor_of_the_links_is_told(rv_m2, factor):
     sister = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), factor))
     found = another_robot(read_with(measured(sister, 3, geometric=2e-4), rv_m2))
     assert found.model.factor == pytest.approx(factor, rel=0.01)
+    assert arm_length(sister) == pytest.approx(factor * sum(s.length for s in rv_m2.segments))
 
 
 COARSE = [
@@ -179,29 +176,17 @@ def fitted(campaign, near=5e-3):
     return fitting(replace(Readings.of(campaign), base_known=False, tool_known=False), near)
 
 
-def test_the_robot_that_was_measured_is_named():
+def test_the_robot_that_was_measured_is_named(rv_m2):
     own, other = (example(name) for name in ("ur5", "ur10"))
     name, remains = fitted(read_with(measured(own, 1, geometric=2e-4), other))
     assert name == "example-robot-data:ur5"
     assert remains < 2e-3
-
-
-def test_columns_go_to_the_joints_of_their_names():
-    ur5 = example("ur5")
-    campaign = measured(ur5, 2)
-    turned = load_robot(ur5.urdf.replace("shoulder_pan_joint", "a_joint"), "tool0")
-    assert fitted(read_with(campaign, turned))[0] == "example-robot-data:ur5"
-
-
-def test_no_robot_is_named_where_none_fits(rv_m2):
-    ur5 = example("ur5")
-    shrunk = measured(ur5, 3)
-    assert fitted(replace(shrunk, position=0.5 * shrunk.position)) is None
-
-
-def test_a_robot_of_the_package_is_at_hand(rv_m2):
-    name, _ = fitted(measured(rv_m2, 4, geometric=2e-4))
-    assert name == "builtin:rv_m2"
+    assert fitted(measured(rv_m2, 4, geometric=2e-4))[0] == "builtin:rv_m2"
+    # columns go to the joints of their names, and no robot is named where none fits
+    campaign = measured(own, 2)
+    turned = load_robot(own.urdf.replace("shoulder_pan_joint", "a_joint"), "tool0")
+    assert fitted(read_with(campaign, turned))[0] == name
+    assert fitted(replace(campaign, position=0.5 * campaign.position)) is None
 
 
 def calibrated(campaign, parts=1):
@@ -252,9 +237,3 @@ def test_a_base_that_moved_is_told_by_its_part(rv_m2):
     moved[30:] += (0.3, -0.1, 0.2)
     found = calibrated(replace(campaign, position=moved), parts=2)
     np.testing.assert_allclose(found.bases[1, :3, 3] - found.bases[0, :3, 3], (0.3, -0.1, 0.2), atol=2e-3)
-
-
-def test_an_arm_is_as_long_as_its_links(rv_m2):
-    assert arm_length(rv_m2) == pytest.approx(sum(s.length for s in rv_m2.segments))
-    doubled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), 2.0))
-    assert arm_length(doubled) == pytest.approx(2.0 * arm_length(rv_m2))

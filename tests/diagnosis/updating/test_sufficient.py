@@ -15,7 +15,6 @@ from thermal_robot.diagnosis.sequential import (
     Sums,
     bend,
     carried,
-    joined,
     linearised,
     products,
 )
@@ -42,28 +41,17 @@ def within(guard, rng):
     return step * guard.reach / np.sqrt(step @ guard.metric @ step)
 
 
-def test_no_step_within_reach_carries_a_safe_row_into_the_tail(rows, guard):
+def test_no_step_within_reach_carries_a_safe_row_into_the_tail_and_hardly_one_across_the_median(rows, guard):
     scores, rng = guard.scores(rows, np.ones(len(rows))), np.random.default_rng(1)
+    assert (guard.scores(rows, np.full(len(rows), 0.9)) == -1.0).all()  # rows that count less are never safe
     safe = rows[scores >= guard.reach]
     assert 50 < len(safe) < 400
+    below, crossed = np.linalg.norm(safe[:, :, -1], axis=1) < guard.medians, []
     for _ in range(50):
         after = np.linalg.norm(safe[:, :, -1] - safe[:, :, :-1] @ within(guard, rng), axis=1)
         assert (after < guard.bend - guard.share * guard.reach).all()
-
-
-def test_hardly_a_safe_row_crosses_the_median(rows, guard):
-    scores, rng = guard.scores(rows, np.ones(len(rows))), np.random.default_rng(2)
-    safe = rows[scores >= guard.reach]
-    below = np.linalg.norm(safe[:, :, -1], axis=1) < guard.medians
-    crossed = [
-        ((np.linalg.norm(safe[:, :, -1] - safe[:, :, :-1] @ within(guard, rng), axis=1) < guard.medians) != below)
-        for _ in range(50)
-    ]
+        crossed.append((after < guard.medians) != below)
     assert np.mean(crossed) < 0.01
-
-
-def test_rows_that_count_less_are_never_safe(rows, guard):
-    assert (guard.scores(rows, np.full(len(rows), 0.9)) == -1.0).all()
 
 
 def test_it_does_not_hold_beyond_its_reach(guard):
@@ -119,22 +107,14 @@ def test_rows_that_are_noisier_say_less(whole, grown):
     assert np.allclose(products(alike, in_full(noisy).kept), products(stack, np.ones(2)))
 
 
-def test_no_rows_have_all_columns(whole, grown):
-    nothing, some = (linearised(whole.take(k), grown.fitted.point, grown.choice, rivals=True) for k in ([], [0]))
-    assert nothing.shape == (0, *some.shape[1:])
-
-
 def test_products_after_a_step_are_those_of_the_gap_after_it():
     rng = np.random.default_rng(1)
     rows, weights, step = rng.normal(size=(30, 6, 5)), rng.uniform(size=30), rng.normal(size=3)
     after = rows.copy()
     after[:, :, -1] -= rows[:, :, :3] @ step
     assert np.allclose(carried(products(rows, weights), step), products(after, weights))
-
-
-def test_positions_and_orientations_are_summed_apart():
-    rows = np.ones((4, 6, 2))
-    rows[:, 3:] = 2.0
+    # positions and orientations are summed apart
+    rows = np.repeat([1.0, 2.0], 3)[None, :, None] * np.ones((4, 6, 2))
     assert np.allclose(products(rows, np.ones(4))[:, 0, 0], [12.0, 48.0])
 
 
@@ -159,11 +139,3 @@ def test_by_the_diagnosis_rows_get_the_weight_of_their_distance(grown):
     assert 10 < single.aside.sum() < 30
     assert (single.weights[single.aside] == 0.0).all()
     assert (single.weights[~single.aside] > 0.5).all()
-
-
-def test_where_each_fit_weighs_them_they_come_in_full(grown, whole):
-    assert (Rows.weighed(grown.choice, whole.take(np.arange(40))).weights == 1.0).all()
-
-
-def test_nothing_put_together_is_nothing():
-    assert joined([]).shape == (0,)

@@ -8,7 +8,7 @@ import pytest
 from updating_cases import ALL, EFFECTS, OLD, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, independent_rows, log_odds, rivals
+from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, log_odds, rivals
 from thermal_robot.errors import CampaignError, EstimationError
 
 
@@ -31,9 +31,7 @@ def test_it_is_what_a_fresh_diagnosis_says(updated, fresh, whole):
     assert np.abs(updated.model.predict(whole)[0] - fresh.model.predict(whole)[0]).max() < 1e-9
     assert (updated.samples, updated.choice_stands, updated.reason) == (ALL, True, "")
     assert set(updated.outliers) == {row for row in fresh.outliers if row in whole.rows[OLD:]}
-
-
-def test_predictions_are_as_sure_as_those_of_a_fresh_diagnosis(updated, fresh):
+    # predictions are as sure
     assert np.allclose(updated.model.spread.covariance, fresh.model.spread.covariance, rtol=1e-3, atol=1e-16)
     for name, ends in fresh.model.spread.ranges.items():
         assert updated.model.spread.ranges[name] == pytest.approx(ends)
@@ -63,18 +61,15 @@ def test_the_model_is_saved_and_loaded(updated, whole, tmp_path):
     assert np.allclose(again.predict(whole)[0], updated.model.predict(whole)[0], atol=1e-12)
 
 
-def test_it_is_plain_values(updated):
-    plain = json.loads(json.dumps(updated.to_dict()))
-    assert plain["schema"] == "thermal-robot/updated/1"
-    assert plain["samples"] == ALL
-    assert [p["value"] for p in plain["parameters"]] == updated.parameters["value"].tolist()
-
-
-def test_it_prints_whether_the_choice_stands(updated):
+def test_it_is_plain_values_and_prints_whether_the_choice_stands(updated):
     assert "the choice stands" in str(updated)
     fallen = replace(updated, fallen=("The new rows leave 3 times as much.",))
     assert "to be diagnosed anew" in repr(fallen)
     assert "3 times" in str(fallen)
+    plain = json.loads(json.dumps(updated.to_dict()))
+    assert plain["schema"] == "thermal-robot/updated/1"
+    assert plain["samples"] == ALL
+    assert [p["value"] for p in plain["parameters"]] == updated.parameters["value"].tolist()
 
 
 def test_deviations_that_were_widened_stay_wider(found, whole):
@@ -181,14 +176,13 @@ def test_a_combination_that_is_ahead_makes_it_fall_as_long_as_it_is(known):
 
 @pytest.fixture(scope="module")
 def little():
-    """A diagnosis of few rows: play of a joint is too small to be named by them."""
-    small = {"joint_offset": EFFECTS["joint_offset"], "backlash": {"joint_2": 2e-5}}
-    return measured(400, seed=12, effects=small), tr.diagnose
+    """A robot whose play in a joint is too small to be named by few rows."""
+    return measured(400, seed=12, effects={"joint_offset": EFFECTS["joint_offset"], "backlash": {"joint_2": 2e-5}})
 
 
 @pytest.fixture(scope="module")
 def sparse(little):
-    return tr.diagnose(little[0].take(np.arange(60)), only=["joint_offset", "backlash"])
+    return tr.diagnose(little.take(np.arange(60)), only=["joint_offset", "backlash"])
 
 
 def test_by_the_rows_of_the_diagnosis_the_order_is_its_own(found, grown):
@@ -210,7 +204,7 @@ def test_rows_that_show_more_bring_a_runner_forward(sparse, little):
     assert sparse.verdict == ("joint_offset",)
     assert with_play
     before = log_odds(fixed_point(sparse.fit), listed)[with_play].max()
-    after = log_odds(fixed_point(sparse.fit).plus(in_full(little[0].take(np.arange(60, 400)))), listed)[with_play].max()
+    after = log_odds(fixed_point(sparse.fit).plus(in_full(little.take(np.arange(60, 400)))), listed)[with_play].max()
     assert before < 0.0 < after
 
 
@@ -218,15 +212,6 @@ def test_prior_odds_count(found, grown):
     listed = chosen(found.fit)[1][:1]
     likelier = [listed[0]._replace(log_prior=listed[0].log_prior + 2.0)]
     assert log_odds(grown, likelier)[0] - log_odds(grown, listed)[0] == pytest.approx(2.0)
-
-
-def test_it_holds_no_rows(grown):
-    assert all(len(item.columns) == 0 for item in (*grown.choice.blocks, *grown.choice.rivals))
-
-
-def test_rows_are_weighed_anew_where_noise_is_all_that_remains(found, grown):
-    assert found.fit.explanation.discrepancy.form is None
-    assert grown.choice.judge is None
 
 
 def test_rivals_are_other_combinations_the_most_probable_first(found):
@@ -237,7 +222,3 @@ def test_rivals_are_other_combinations_the_most_probable_first(found):
     assert e.best.blocks not in listed
     assert listed
     assert [chance[b] for b in listed] == sorted((chance[b] for b in listed), reverse=True)
-
-
-def test_rows_that_count_by_themselves_can_be_added(found):
-    assert independent_rows(found.fit)
