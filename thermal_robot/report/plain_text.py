@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from thermal_robot.report import units, words
 from thermal_robot.report.words import WIDTH
+from thermal_robot.report.words import needs as needed
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.calibration import Calibrated, Calibration
@@ -106,7 +107,7 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _effect(finding: Finding, status: str, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
     if status == "not_testable":
-        needs = words.needs(finding, diagnosis.joint_names)
+        needs = needed(finding, diagnosis.joint_names)
         yield _wrap(f"needs {needs}", f"    {finding.name:{wide}}{'':13}   ")
         return
     bounds = f"  ({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
