@@ -208,10 +208,10 @@ def test_effects_without_a_constant_stay_as_they_were(rv_m2):
 
 def test_constants_of_several_effects_are_moved_together(rv_m2):
     """Values belong to the constants that were found: the remainder they leave is smaller than before."""
-    drifting, lagging = (lagging("rv_m2", 2, *own, 20.0) for own in ((DRIFT, 0.2), (LAG, 900.0)))
+    drifting, grown = (lagging("rv_m2", 2, *own, 20.0) for own in ((DRIFT, 0.2), (LAG, 900.0)))
     # both start from the same robot in the same place: to first order what they do adds up
     still = observe(drifting, Frames.declared(drifting)).predicted_position
-    data = replace(drifting, position=drifting.position + lagging.position - still)
+    data = replace(drifting, position=drifting.position + grown.position - still)
     seen, explanation = explained(data, (DRIFT, LAG))
     after = refined(explanation, seen, 1.6)
     assert len(after) == len(explanation.best.blocks)
