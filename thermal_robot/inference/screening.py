@@ -646,22 +646,20 @@ class Scanned:
 
 
 class Seats:
-    """What laws do to some targets, place by place; the functions of each quantity are computed once."""
+    """What laws do to some targets, the columns of each place and the functions of each quantity computed once."""
 
     def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
         self.observations, self.targets = observations, targets
+        self._seats: dict[tuple[object, ...], tuple[Seat, ...]] = {}
         self._functions: dict[tuple[object, ...], Array] = {}
-        self._last: tuple[Discovered | None, tuple[Seat, ...]] = None, ()
 
-    def seen_from(self, place: Discovered) -> tuple[Seat, ...]:
-        """Return the targets as they are seen from a place, or from the known effect in it (:func:`_steady`).
-
-        Kept are those of one place: those of all together are larger than all else.
-        """
-        if self._last[0] != place:
-            moves = block(self.observations, place).columns
-            self._last = place, tuple(target.seat(moves) for target in self.targets)
-        return self._last[1]
+    def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
+        """Return the targets as they are seen from a law's place, or from the known effect in it."""
+        place = (law.kind, law.place, law.turns, law.of, law.of_arguments)
+        if place not in self._seats:
+            moves = block(self.observations, _steady(law)).columns
+            self._seats[place] = tuple(target.seat(moves) for target in self.targets)
+        return self._seats[place]
 
     def functions(self, law: Discovered) -> Array:
         """Return a law's (N, K) functions of what it follows, wherever it enters."""
@@ -678,12 +676,12 @@ class Seats:
     def gains(self, candidates: Sequence[Discovered]) -> Array:
         """Return (targets, C) the log evidence that each law gains."""
         found = np.zeros((len(self.targets), len(candidates)))
-        together: dict[Discovered, list[int]] = {}
+        together: dict[tuple[Seat, ...], list[int]] = {}
         for i, law in enumerate(candidates):
-            together.setdefault(_steady(law), []).append(i)
-        for place, which in together.items():
+            together.setdefault(self.seen_from(law), []).append(i)
+        for seats, which in together.items():
             functions = Alike.of([self.functions(candidates[i]) for i in which])
-            for t, seat in enumerate(self.seen_from(place)):
+            for t, seat in enumerate(seats):
                 found[t, which] = seat.gains(functions)
         return found
 
@@ -763,7 +761,7 @@ def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
     if law.quantity in CLOCK and law.quantity in observations.covariates and not law.of and not law.by:
         candidates += relaxing(observations, law)
     names = [candidate.shape for candidate in candidates]
-    gains = seats.seen_from(_steady(law))[t].gains([seats.functions(candidate) for candidate in candidates])
+    gains = seats.seen_from(law)[t].gains([seats.functions(candidate) for candidate in candidates])
     return [
         Scanned(candidate, float(gain), len(set(names)) * names.count(candidate.shape))
         for candidate, gain in zip(candidates, gains, strict=True)
@@ -858,7 +856,7 @@ def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) ->
         q = observations.q[:, observations.robot.joint_names.index(joint)]
         plain = Discovered(place=joint, quantity=joint, shape="harmonic", unit=unit(observations.robot, joint))
         plain = replace(plain, origin=float(q.min()), span=float(np.ptp(q)))
-        seat = seats.seen_from(_steady(plain))[t]
+        seat = seats.seen_from(plain)[t]
         law = replace(plain, marks=(peak(seat, q, grid),))
         found.append(Scanned(law, float(seat.gains([seats.functions(law)])[0]), tried))
     return found
@@ -877,7 +875,7 @@ def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
     steps = [step for step in steps if step.runs]
     if not steps:
         return None
-    gains = seats.seen_from(_steady(law))[t].gains([seats.functions(step) for step in steps])
+    gains = seats.seen_from(law)[t].gains([seats.functions(step) for step in steps])
     return Scanned(steps[int(gains.argmax())], float(gains.max()))
 
 
