@@ -54,8 +54,8 @@ def by_yourdfpy(urdf, root, link, rows):
         yield read.get_transform(link, root)
 
 
-def by_mujoco(xml, root, link, rows):
-    """Of a URDF or an MJCF."""
+def by_mujoco(xml, root, link, rows, kind="body"):
+    """Of a URDF or an MJCF; ``link`` is a body or a site."""
     text = re.sub(r"(<robot\b[^>]*>)", rf"\1{LOOSE}", BARE.sub("", xml)) if "<robot" in xml else xml
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -63,7 +63,7 @@ def by_mujoco(xml, root, link, rows):
         for name, position in row.items():
             data.qpos[model.joint(name).qposadr[0]] = position
         mujoco.mj_kinematics(model, data)
-        yield np.linalg.inv(pose_of(data.body(root))) @ pose_of(data.body(link))
+        yield np.linalg.inv(pose_of(data.body(root))) @ pose_of(getattr(data, kind)(link))
 
 
 def pose_of(placed):

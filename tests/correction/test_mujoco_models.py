@@ -3,6 +3,7 @@
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -25,15 +26,7 @@ TRANSLATED = ["rv_m2", "awkward", "awkward-from-base", "coupled", "parallelogram
 SIMULATED = ["rv_m2", "awkward-from-base", "coupled", "ur5", "panda"]
 
 
-def site(text, root, name, rows):
-    """(N, 4, 4) of a site in a body."""
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    for row in rows:
-        for moving, position in row.items():
-            data.qpos[model.joint(moving).qposadr[0]] = position
-        mujoco.mj_kinematics(model, data)
-        yield np.linalg.inv(pose_of(data.body(root))) @ pose_of(data.site(name))
+site = partial(by_mujoco, kind="site")
 
 
 @pytest.mark.parametrize("name", TRANSLATED)

@@ -44,6 +44,18 @@ def test_a_urdf_in_use_is_parsed(more):
         assert reason(two(more).replace("revolute", "wobbly")) == said
 
 
+@pytest.mark.parametrize("before", ["", "<!DOCTYPE robot>\n"])
+def test_a_default_namespace_and_what_is_long_are_read_and_written_back(before):
+    named = two(f"<a b='{'1' * 10_000_001}'/>").replace("<robot", f'{before}<robot xmlns="http://drake.mit.edu"')
+    written = rewritten(named, {"j": np.eye(4)}, links={"c": ("b", np.eye(4))})
+    assert load_robot(written, "c").urdf_joints == ("j", "c_joint")
+    assert len(named) < len(written) < len(named) + 300
+    assert f'{before}<robot xmlns="http://drake.mit.edu" name="two">' in written
+    assert "xmlns" not in written.partition("drake")[2]
+    ends = '<origin .*/><parent link="b"/><child link="c"/>'
+    assert re.search(f'<link name="c"/>\n<joint name="c_joint" type="fixed">{ends}</joint>\n</robot>\n$', written)
+
+
 @pytest.mark.parametrize("limit", ["", "<limit/>", '<limit velocity="1"/>', '<limit effort="2" velocity="1"/>'])
 def test_a_joint_without_limits_has_none(limit):
     model = parse_urdf(two("<!-- é -->", limit=limit), "arm.urdf")

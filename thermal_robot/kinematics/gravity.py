@@ -133,28 +133,27 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
         first moment (x, y, z) in the frame of the element after that joint (the tool frame for the last).
     """
     frames = chain_frames(robot, q) if frames is None else frames
-    chain, (rotations, positions) = robot.chain, (np.moveaxis(each, -1, 0) for each in _with_tool(frames))
-    rows, bodies = len(positions), len(chain.movable)
+    chain, (rotations, positions) = robot.chain, ([np.moveaxis(e, -1, 0) for e in each] for each in _with_tool(frames))
+    rows, bodies = len(frames.tool_position), len(chain.movable)
     regressor = np.zeros((rows, bodies, bodies, 4))
     for j, k in enumerate(chain.movable):
-        axis = rotations[:, k] @ chain.axes[k]
+        axis = rotations[k] @ chain.axes[k]
         turn = -np.cross(robot.gravity, axis)  # −g · (axis × lever) = turn · lever
         for b in range(j, bodies):
             after = chain.movable[b] + 1
             if chain.kinds[k] == REVOLUTE:
-                regressor[:, j, b, 0] = ((positions[:, after] - positions[:, k]) * turn).sum(axis=1)
-                regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotations[:, after], turn)
+                regressor[:, j, b, 0] = ((positions[after] - positions[k]) * turn).sum(axis=1)
+                regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotations[after], turn)
             else:
                 regressor[:, j, b, 0] = -axis @ robot.gravity
     driven = chain.coupling.matrix.T @ regressor.reshape(rows, bodies, -1)
     return np.asarray(driven.reshape(rows, robot.n, bodies, 4))
 
 
-def _with_tool(frames: ChainFrames) -> tuple[Array, Array]:
-    """Return rotations (K + 1, 3, 3, N) and positions (K + 1, 3, N) of the elements and behind them of the tool."""
+def _with_tool(frames: ChainFrames) -> tuple[list[Array], list[Array]]:
+    """Return rotations (3, 3, N) and positions (3, N) of the K elements and behind them of the tool."""
     places = frames.rows_last()
-    rotations = np.concatenate([places.rotations, places.tool_rotation[None]])
-    return rotations, np.concatenate([places.positions, places.tool_position[None]])
+    return [*places.rotations, places.tool_rotation], [*places.positions, places.tool_position]
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:

@@ -33,6 +33,7 @@ Element: TypeAlias = Any
 """An element of lxml, which has no types."""
 
 _HIDDEN = re.compile(r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?\?>", re.DOTALL)
+_ENTITY = re.compile(r"<!ENTITY\s+(?:%\s+)?(\S+)")
 _DEEPEST = 100
 """Elements within each other: no robot has more than ten, and urdfdom refuses 500."""
 _MOST_ATTRIBUTES = 100
@@ -44,10 +45,13 @@ _FOREIGN = {"sdf": "is an SDF file", "mujoco": "is an MJCF file (MuJoCo)", "COLL
 
 
 def tree(text: str) -> Element:
-    """Parse XML; ``--`` in comments and prefixes that nobody declared, as URDFs in use have, do no harm."""
-    # a text in Python has left its encoding behind, whatever it declares
-    parser = etree.XMLParser(encoding="utf-8", recover=True, resolve_entities=False)
-    return etree.fromstring(text.encode(errors="replace"), parser)
+    """Parse XML; ``--`` in comments, prefixes that nobody declared and a default namespace, as in use, do no harm."""
+    # a text in Python has left its encoding behind, whatever it declares; a smaller tree would be cut at 10 MB of text
+    parser = etree.XMLParser(encoding="utf-8", recover=True, resolve_entities=False, huge_tree=True)
+    root = etree.fromstring(text.encode(errors="replace"), parser)
+    for element in () if root is None else root.xpath("//*[namespace-uri() and not(contains(name(), ':'))]"):
+        element.tag = etree.QName(element).localname
+    return root
 
 
 def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
@@ -57,6 +61,7 @@ def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
         lines = "\n".join(re.sub(r"-(?=-)", "- ", line) for line in notes).rstrip("-")
         parts.insert(parts.index(root), etree.Comment(f"\n{lines}\n"))
     declared = ["<?xml version='1.0' encoding='utf-8'?>"] if before.lstrip().startswith("<?xml") else []
+    declared += filter(None, [root.getroottree().docinfo.doctype])
     return "\n".join([*declared, *(etree.tostring(p, encoding="unicode", with_tail=False) for p in parts), ""])
 
 
@@ -83,6 +88,9 @@ def read(urdf: str, source: str) -> Element:
     seen, root, problem = _seen(urdf), None, ""
     if not seen.strip():
         raise RobotError(f"{source} is empty", name=source)
+    if entity := _ENTITY.search(seen):  # before libxml2 expands it
+        problem = f"declares the XML entity {entity[1]!r}, which no URDF reader expands; write its text in its place"
+        raise RobotError(f"{source} {problem}", name=source)
     with contextlib.suppress(etree.XMLSyntaxError):  # whose words are not expat's
         root = tree(seen)
     if root is not None:
@@ -95,10 +103,7 @@ def read(urdf: str, source: str) -> Element:
 
 
 def _foreign(root: Element) -> str:
-    """Say what no URDF has: entities, another root, tags of xacro, more of anything than a robot."""
-    declared = root.getroottree().docinfo.internalDTD
-    for entity in () if declared is None else declared.entities():
-        return f"declares the XML entity {entity.name!r}, which no URDF reader expands; write its text in its place"
+    """Say what no URDF has: another root, tags of xacro, more of anything than a robot."""
     if root.tag != "robot":
         return f"{_FOREIGN.get(root.tag, 'is XML')} but not a URDF: its root element is <{root.tag}>, expected <robot>"
     # a tag of xacro whose prefix is not declared is left over from an expanded file
@@ -361,8 +366,9 @@ def rewritten(
         for kind, new in (("link", link), ("joint", name)):
             if any(element.get("name") == new for element in root.iterfind(kind)):
                 raise RobotError(f"the robot has a {kind} {new!r} already, which would be added: rename it", name=new)
-        etree.SubElement(root, "link", name=link)
+        etree.SubElement(root, "link", name=link).tail = "\n"
         joints[name] = etree.SubElement(root, "joint", name=name, type="fixed")
+        joints[name].tail = "\n"
         etree.SubElement(joints[name], "parent", link=parent)
         etree.SubElement(joints[name], "child", link=link)
     for name, pose in placed.items():
@@ -371,6 +377,7 @@ def rewritten(
         origin = joints[name].find("origin")
         if origin is None:
             origin = etree.Element("origin")
+            origin.tail = joints[name].text
             joints[name].insert(0, origin)
         for key, value in zip(("xyz", "rpy"), xyz_rpy(pose), strict=True):
             origin.set(key, value)
