@@ -176,16 +176,12 @@ def _figure(value: float) -> str:
 
 
 LIMIT_TOLERANCE = 1e-6  # rad or m by which a command may pass a limit: the last digit of a file is not a violation
-MOST_TURNS = (
-    2  # turns of a command at most: wrists and cables allow two to either side; 13 degrees read as rad are more
-)
+MOST_TURNS = 2  # turns of a command at most: wrists and cables allow two to either side; 13 degrees as rad are more
 LEAST_ANGLE = 2 * math.pi  # degrees that a real campaign exceeds; commands in rad read as degrees stay within one turn
 FEWEST_COMMANDS = 3  # rows from which small commands are a habit and not an accident
 # lengths are compared with the reach by coarse bounds, as one that is read in a wrong unit is a thousand times off
 FARTHEST_TARGET = 3.0  # reaches within which a target sits on the arm: a long tool is shorter
-WORST_INSTRUMENT = (
-    0.01  # reaches, one sigma of an instrument at most: 1 cm for an arm of 1 m, worse than a tape measure
-)
+WORST_INSTRUMENT = 0.01  # reaches, one sigma of an instrument at most: 1 cm for 1 m, worse than a tape measure
 LARGEST_EXTENT = 4.0  # reaches with the target: the ball that it can reach is two across; two more for commands outside
 SMALLEST_EXTENT = 1 / 200  # reaches over which positions extend at least, once enough joints move: 5 mm for 1 m
 MOVES = 0.5  # rad or m of a joint's range that carry the target visibly

@@ -450,9 +450,8 @@ def campaign_from_table(
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
     frame = word(("known", "unknown"), kinds.WORD)
-    arguments: dict[
-        str, tuple[Any, ...]
-    ] = {  # section and key of campaign.toml, name, value, kind, and what is expected where the kind says less
+    # by section and key of campaign.toml: name, value, kind, and what is expected where the kind says less
+    arguments: dict[str, tuple[Any, ...]] = {
         "robot.moves": ("moves", moves, kinds.HOW_MOVED),
         "robot.reference_temperature": ("reference_temperature", reference_temperature, kinds.TEMPERATURE),
         "measurements.angle_unit": ("angle_unit", angle_unit, kinds.ANGLE_UNIT),

@@ -124,11 +124,9 @@ class Table:
         """
         import pandas as pd
 
-        plain = {name for name in self.columns if self.first_text(name) is None}
-        plain = plain if numbers or self.decimal_comma else set()
-        return pd.DataFrame(
-            {n: self.numbers(n, gaps=True) if n in plain else cells for n, cells in self.columns.items()}
-        )
+        asked = self.columns if numbers or self.decimal_comma else ()
+        plain = {name: self.numbers(name, gaps=True) for name in asked if self.first_text(name) is None}
+        return pd.DataFrame({**self.columns, **plain})
 
     def first_text(self, column: str) -> int | None:
         """Return the index of the first cell that is not a number, ``None`` for a numeric column."""
@@ -137,7 +135,9 @@ class Table:
     def is_empty(self, column: str) -> bool:
         """Return whether no cell of the column holds anything."""
         cells = self.columns[column]
-        return bool(np.isnan(cells).all()) if isinstance(cells, np.ndarray) else not any(self.text(column))
+        if isinstance(cells, np.ndarray):
+            return bool(np.isnan(cells).all())
+        return all(cell.lower() in _EMPTY for cell in cells)
 
     def _values(self, column: str) -> Any:
         """Return the number in each cell, NaN for an empty one, ``None`` for text."""
