@@ -29,6 +29,12 @@ def test_a_folder_holds_every_campaign_below_it_labelled_by_its_folders(root):
     assert campaigns(root / "hall_1" / "c").campaigns == ((".", ()),)  # a folder that is a campaign
 
 
+def test_a_campaign_whose_file_is_a_broken_link_is_not_passed_over(root):
+    (root / "hall_1" / "d").mkdir()
+    (root / "hall_1" / "d" / "campaign.toml").symlink_to(root / "gone")
+    assert [name for name, _ in campaigns(root / "hall_1").campaigns] == ["a/friday", "a/monday", "c", "d"]
+
+
 CSV = "campaign,hall,robot\nhall_1/a/monday,one,a\nhall_2/b/monday,two,\n"
 TOML = '[[campaigns]]\ncampaign = "hall_1/a/monday"\nhall = "one"\nrobot = "a"\n'
 TOML += '[[campaigns]]\ncampaign = "hall_2/b/monday"\nhall = "two"\n'

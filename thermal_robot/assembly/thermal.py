@@ -619,9 +619,10 @@ def _scores(
     """How good each candidate is for a slot beside the others, (M,); the larger, the better."""
     others = [(words[other], c) for other, c in enumerate(chosen) if other != slot]
     own = information[words[slot]]
-    with_each = own + least * np.eye(own.shape[1])
+    total = least * np.eye(own.shape[1])
     for word, c in others:
-        with_each = with_each + information[word][c]
+        total = total + information[word][c]
+    with_each = total + own
     if criterion == "D":
         scores = np.linalg.slogdet(with_each)[1]
     elif criterion == "A":

@@ -70,7 +70,9 @@ def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
 
 def _below(root: Path, names: Sequence[str]) -> Listed:
     """List every folder below with a campaign, labelled by the folders on the way; ``.`` is the root itself."""
-    found = sorted(file.parent.relative_to(root).as_posix() for file in root.rglob(FILE_NAME) if file.is_file())
+    # a file that cannot be opened, such as a broken link, is a campaign: its row says why
+    having = (folder for folder, _, files in os.walk(root) if FILE_NAME in files)
+    found = sorted(Path(os.path.relpath(folder, root)).as_posix() for folder in having)
     if not found:
         raise CampaignError(str(root), f"no {FILE_NAME} lies below this folder", expected="a folder of campaigns")
     parts = [Path(name).parts for name in found]

@@ -11,6 +11,7 @@ rounding of the inputs, and ``verdict`` one that follows from something else.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from functools import cache, lru_cache
 from importlib.resources import files
@@ -18,7 +19,6 @@ from itertools import product
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import tomllib
 from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.integrate import quad
@@ -40,6 +40,12 @@ from thermal_robot.assembly.thermal import (
 from thermal_robot.kinematics import elongation_jacobian, tool_poses
 from thermal_robot.paper.entry import Printed, judge, numbers, rounds_to
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 
 Case: TypeAlias = Mapping[str, Any]
 Found: TypeAlias = dict[str, Any]

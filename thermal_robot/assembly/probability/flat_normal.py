@@ -196,22 +196,30 @@ class FlatNormal(_Frozen):  # type: ignore[misc]  # scipy has no annotations
 
 
 def _upper_quantile(q: Array, sigma: Array, half_width: Array) -> Array:
-    """``x`` with P(X > x) = q, by bracketing its logarithm, down to ``q = 1e-300``."""
-    # Imported here: it brings scipy's optimisers, which a probability alone does not need.
-    from scipy.optimize.elementwise import find_root
+    """``x`` with P(X > x) = q.
 
-    q, sigma, half_width = np.broadcast_arrays(q, sigma, half_width)
+    Newton's iteration on ``log P(X > x)``, which is concave: started beyond the root it approaches it from there
+    without overshooting, down to ``q = 1e-300`` and for any proportion of the two parts.
+    """
+    q, sigma, half_width = (np.array(v, dtype=float) for v in np.broadcast_arrays(q, sigma, half_width))
     share = np.minimum(q, 1.0 - q)
-    with np.errstate(all="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        target = np.log(share)
         # X <= half_width + sigma Z bounds the quantile from beyond; its uniform part alone is exact for sigma = 0.
-        beyond = half_width - sigma * ndtri(share)
-        found = find_root(
-            lambda x, s, a, target: log_tail(x, s, a) - target,
-            (np.zeros(q.shape), 1.001 * beyond),
-            args=(sigma, half_width, np.log(share)),
-        )
-    x = np.where(sigma > 0.0, np.where(share == 0.0, np.inf, found.x), half_width * (1.0 - 2.0 * share))
-    x = np.where(share == 0.5, 0.0, x)
+        x = np.where(sigma > 0.0, half_width - sigma * ndtri(share), half_width * (1.0 - 2.0 * share))
+        active = (sigma > 0.0) & (share > 0.0) & (share < 0.5)
+        x = np.where(share == 0.5, 0.0, x)
+        for _ in range(200):
+            if not np.any(active):
+                break
+            at, width, edge = x[active], sigma[active], half_width[active]
+            value = log_tail(at, width, edge)
+            step = (value - target[active]) * np.exp(value - log_density(at, width, edge))
+            moved = np.maximum(at + step, 0.0)
+            x[active] = moved
+            still = np.abs(moved - at) > 4e-16 * (np.abs(moved) + width)
+            active[active] = still
+    x = np.where(share == 0.0, np.where(sigma > 0.0, np.inf, half_width), x)
     return np.where(q <= 0.5, x, -x)
 
 
