@@ -144,6 +144,7 @@ WRONG = {
     "kind unknown": ((replace(GOOD, kind="axis"),), "kind is 'axis', expected one of joint, link"),
     "unit not text": ((replace(GOOD, unit=None),), "unit is None, expected text"),
     "label not text": ((replace(GOOD, label=3),), "label is 3, expected text"),
+    "label a list": ((replace(GOOD, label=["sag"], place=""),), r"label is \['sag'\], expected text"),
     "place not text": ((replace(GOOD, place=1),), "place is 1, expected text"),
     "positive in words": ((replace(GOOD, positive="yes"),), "positive is 'yes', expected True or False"),
     "a joint of no robot": ((replace(GOOD, place="nowhere"),), "place is 'nowhere', expected a joint of the robot"),

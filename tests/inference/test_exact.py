@@ -17,6 +17,7 @@ from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.exact import (
     _leading,
     _others,
+    _ridge_step,
     corrected_observations,
     gauss_newton,
     heard,
@@ -402,3 +403,17 @@ def test_a_linear_fit_that_went_astray_does_not_end_worse_than_it_began(fitted):
     assert objective(campaign, explanation, kept.frames, found) < begun
     for (_, one), (_, other) in zip(found, right, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+def test_a_step_minimises_misfit_and_prior_together_and_a_damped_one_is_shorter_and_goes_downhill():
+    rng = np.random.default_rng(0)
+    design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
+    state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
+    rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
+    wanted = np.concatenate([gap, -state / prior])
+    stack = np.column_stack([design, gap])
+    steps, sizes = zip(*(_ridge_step(stack.T @ stack, state, prior, d) for d in (0.0, 0.1, 10.0)), strict=True)
+    np.testing.assert_allclose(steps[0], np.linalg.lstsq(rows, wanted, rcond=None)[0], rtol=1e-9)
+    assert sizes[0] == pytest.approx(np.linalg.norm(rows @ steps[0]), rel=1e-9)  # what it moves, in noise
+    assert (np.diff(np.linalg.norm(steps, axis=1)) < 0.0).all()
+    assert min(step @ rows.T @ wanted for step in steps) > 0.0

@@ -1,5 +1,6 @@
 """What the normal equations hold: frames projected out, rows in their own noise, what nothing tells apart left out."""
 
+import gc
 from dataclasses import replace
 
 import numpy as np
@@ -345,3 +346,14 @@ def test_the_noise_itself_changes_nothing():
     same = generalised(linear, np.broadcast_to(np.diag(NOISE**2), (12, 3, 3)), NOISE)
     np.testing.assert_allclose(same.stack, linear.stack, rtol=1e-12)
     assert [b.sizes is o.sizes for b, o in zip(same.blocks, linear.blocks, strict=True)] == [True] * 3
+
+
+def test_a_block_that_is_gone_leaves_nothing(seen, whitening):
+    kept = Products(Linear(seen.gap, frame_columns(seen)[0], ()), whitening)
+    stays, goes = (block(seen, choose([name])[0]) for name in ("joint_offset", "backlash"))
+    kept.problem([stays, goes])
+    assert len(kept._white) == 2
+    del goes
+    gc.collect()
+    assert list(kept._white) == [stays]
+    assert [len(own) for own in kept._pairs.values()] == [1]

@@ -9,7 +9,7 @@ from simulate import commands, simulate
 import thermal_robot as tr
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.registration import alternate, register, starts
+from thermal_robot.inference.registration import alternate, middle, register, starts
 from thermal_robot.kinematics import Displacement, align, exp3, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
@@ -255,3 +255,9 @@ def test_some_rows_are_a_campaign_of_these_rows(campaign):
     found, part = alternate(campaign, declared, targets, some=some), alternate(campaign.take(some), declared, targets)
     assert found[0] == part[0]
     np.testing.assert_array_equal(found[1].base, part[1].base)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 8])
+def test_the_middle_is_the_median(count):
+    values = np.random.default_rng(count).normal(size=(5, count))
+    np.testing.assert_array_equal(middle(values), np.median(values, axis=1))

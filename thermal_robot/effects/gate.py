@@ -228,9 +228,9 @@ def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Para
     for k, parameter in enumerate(answer):
         if not isinstance(parameter, Parameter):
             raise _broken(effect, f", parameter {k + 1}: found {type(parameter).__name__}, expected a Parameter")
-        twice = "the name is used twice" if parameter.name in names else ""
-        if problem := _wrong(parameter, observations) or twice:
-            raise _broken(effect, f", parameter {parameter.name!r}: {problem}")
+        problem = _wrong(parameter, observations)
+        if problem or parameter.name in names:
+            raise _broken(effect, f", parameter {parameter.name!r}: {problem or 'the name is used twice'}")
         names.add(parameter.name)
     return tuple(answer)
 

@@ -138,6 +138,7 @@ PAIRS = [
     ("reversed joints", "degrees read as rad"),
     ("exchanged joints", "inch"),
     ("coupled joints", "reversed joint"),
+    ("coupled joints", "reversed joints"),
     ("zero off by 90°", "degrees read as rad"),
     ("coupled joints", "mirrored axis"),
     ("zero off by 180°", "exchanged joints"),
