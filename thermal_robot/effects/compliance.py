@@ -214,13 +214,13 @@ class LinkCompliance(_Yielding):
         if self.tilt:
             return _by_tilt(observations)
         robot = observations.robot
-        told = []  # of each parameter what it is, the segment, and the shift and turn of its far end
+        told, most = [], 0.0  # of each parameter what it is, the segment, and the shift and turn of its far end
         for s in beams(robot):
             along = robot.segments[s].direction
             for k, (axis, (turn, shift)) in enumerate(zip(cross_axes(robot, s), _yields(observations, s), strict=True)):
                 moved = np.outer(shift, np.cross(axis, along)), np.outer(turn, axis)
                 told.append((f"bending compliance of {{}}, axis {k + 1}", s, *moved))
-        most = max((float(np.linalg.norm(shift, axis=1).max(initial=0.0)) for *_, shift, _ in told), default=0.0)
+                most = max(most, float(np.abs(shift).max(initial=0.0)))
         for s in shafts(robot) if self.twist else ():
             along = robot.segments[s].direction
             turn = robot.segments[s].length * np.outer(observations.segment_load[:, s, 3:] @ along, along)

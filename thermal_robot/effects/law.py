@@ -102,8 +102,9 @@ class Discovered(Fading):
 
     @property
     def modulated(self) -> Effect | None:
-        """Known effect that changes with the quantity, in the law's joint; ``None`` where there is none."""
-        return gate.placed(restored(self.of, self.of_arguments), (self.place,)) if self.of else None
+        """Known effect that changes with the quantity, in the law's joint; ``None`` where it has joints of its own."""
+        known = restored(self.of, self.of_arguments) if self.of else None
+        return None if known is None or known.share is not None else gate.placed(known, (self.place,))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the quantities that the campaign lacks, and what the effect in the law lacks."""
