@@ -76,6 +76,10 @@ def test_a_package_is_found_where_ros_says(package, tmp_path, monkeypatch, varia
     found = find_mesh("package://arm/meshes/link 1.stl", elsewhere / "deep")
     assert found is not None
     assert found.samefile(package / "meshes" / "link 1.stl")
+    own = elsewhere / "meshes" / "link 1.stl"  # of a URDF that was moved with its meshes: before all others
+    own.parent.mkdir()
+    own.touch()
+    assert find_mesh("package://arm/meshes/link 1.stl", elsewhere) == own
 
 
 @pytest.mark.parametrize(

@@ -54,11 +54,11 @@ def _places(named: str, folder: Path) -> Iterator[Path]:
         package, _, rest = named.removeprefix(_PACKAGE).partition("/")
         listed = [Path(p) for name in _SEARCHED for p in os.environ.get(name, "").split(os.pathsep) if p]
         installed = [Path(sysconfig.get_path("purelib")) / "cmeel.prefix", Path(sysconfig.get_path("data"))]
-        for above in (folder.resolve(), *folder.resolve().parents, *listed):
-            yield above / package / rest
-            if above.name == package:
-                yield above / rest
-        yield folder / rest  # a URDF that was moved out of its package still stands beside its meshes
+        for place in (folder.resolve(), *folder.resolve().parents, folder, *listed):
+            yield place / package / rest
+            # a URDF that was moved out of its package still stands beside its meshes
+            if place.name == package or place is folder:
+                yield place / rest
         for prefix in (*listed, *installed):
             yield prefix / "share" / package / rest
     elif "://" not in named:

@@ -265,15 +265,14 @@ def html(score: Plain, generated: str) -> str:
 
     ``generated`` is when it was made, in the words that shall stand in the footer; may be empty.
     """
-    groups = [_groups(f"{of}, {more}", score[name], name) for name, of, more, _ in text.GROUPED if score[name]]
+    groups = [_groups(f"{of}, {more}", score[name], ask) for name, of, more, ask in text.GROUPED if score[name]]
     shown = {"score": score, "text": text, "figures": sys.modules[__name__], "groups": groups}
     return render("blind.html", shown, title="Blind trial", generated=generated)
 
 
-def _groups(heading: str, groups: Plain, name: str) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    """Return heading, names of the columns and rows of a table of rates."""
-    questions = ("exact", "found", "way", "day", "false_alarm") if name == "changes" else text.ASKED
-    asked = [q for q in questions if any(q in rates for rates in groups.values())]
+def _groups(heading: str, groups: Plain, columns: Sequence[str]) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
+    """Return heading, names of the columns and rows of a table of rates, false alarms among them."""
+    asked = [q for q in dict.fromkeys((*columns, "false_alarm")) if any(q in rates for rates in groups.values())]
     rows = [(group, *(_share(rates.get(q)) for q in asked)) for group, rates in groups.items()]
     return heading, ("", *map(text.question, asked)), rows
 
