@@ -16,15 +16,13 @@ The text has ``2 sqrt(6) pi r`` in the denominator; the area is then ``sqrt(6 pi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
-from scipy.integrate import quad
 from scipy.optimize import minimize
-from scipy.special import comb, entr, logsumexp, ndtri
+from scipy.special import comb, logsumexp, ndtri
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.joining import joining_probability, link_nodes
@@ -224,19 +222,26 @@ def _upper_quantile(q: Array, sigma: Array, half_width: Array) -> Array:
 
 
 def _entropy(sigma: float, half_width: float) -> float:
-    """Entropy; closed form without a normal part, otherwise by quadrature over the half line."""
+    """Entropy; closed form in both limits, otherwise Gauss-Legendre panels over the half line."""
     if sigma == 0.0:
         return float(np.log(2.0 * half_width))
-    knees = half_width + sigma * np.array([-12.0, 0.0, 40.0])
-    edges = np.unique(np.maximum([0.0, *knees], 0.0))
-    parts = [quad(lambda x: entr(density(x, sigma, half_width)), *e, epsabs=0.0)[0] for e in pairwise(edges)]
-    return 2.0 * float(np.sum(parts))
+    if half_width == 0.0:
+        return float(0.5 * np.log(2.0 * np.pi * np.e) + np.log(sigma))
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    # Panels no wider than two sigma about the slope, and one over the plateau where there is one.
+    start = max(0.0, half_width - 12.0 * sigma)
+    edges = np.concatenate([[0.0], np.linspace(start, half_width + 40.0 * sigma, 27)])
+    half = 0.5 * np.diff(edges)[:, None]
+    points = edges[:-1, None] + half * (1.0 + nodes)
+    log_values = log_density(points, sigma, half_width)
+    return float(-2.0 * np.sum(half * weights * np.exp(log_values) * log_values))
 
 
 Estimate = tuple[float, float, float]
+Held = tuple[float | None, float | None, float | None]
 
 _STARTS = (0.5, 1.0, 1.5, 3.0, 10.0)  # of r, beside the moments' one: the likelihood may have more than one peak
-_BOUNDS = np.array([(-2.0, 2.0), (-2.0, 2.0), (0.0, np.pi / 2.0 - 1e-4)])
+_BOUNDS = ((-2.0, 2.0), (-2.0, 2.0), (0.0, np.pi / 2.0 - 1e-4))
 # Of mean and logarithm of the size, in the sample's own standard deviations, and of arctan r.
 
 
@@ -283,41 +288,66 @@ def fit_maximum_likelihood(
     values = _checked(sample)
     centre, width = float(np.mean(values)), float(np.std(values))
     scaled = (values - centre) / width
-    given = (loc, scale, ratio)
-    free = np.array([value is None for value in given])
-    place, size, angle = (np.nan if value is None else float(value) for value in given)
-    held = np.array([(place - centre) / width, np.log(size / width), np.arctan(angle)])
-
-    def estimate(point: Array) -> Estimate:
-        whole = held.copy()
-        whole[free] = point
-        return float(np.tan(whole[2])) if free[2] else angle, float(whole[0]), float(np.exp(whole[1]))
-
-    def loss(found: Estimate) -> float:
-        value = -log_likelihood(scaled, *found) / scaled.size
-        return value if np.isfinite(value) else 1e6
-
-    candidates = [_limit(scaled, limit, held, free) for limit in (0.0, np.inf) if ratio is None or ratio == limit]
-    if not np.any(free):
-        candidates.append(estimate(held[free]))
-    else:
-        options = {"xatol": 1e-9, "fatol": 1e-14, "maxiter": 2000}
-        for start in {min(fit_moments(scaled)[0], 20.0), *_STARTS} if free[2] else {1.0}:
-            first, bounds = np.array([0.0, 0.0, np.arctan(start)])[free], _BOUNDS[free]
-            found = minimize(lambda p: loss(estimate(p)), first, method="Nelder-Mead", bounds=bounds, options=options)
-            candidates.append(estimate(found.x))
+    held = (
+        None if loc is None else (loc - centre) / width,
+        None if scale is None else float(np.log(scale / width)),
+        None if ratio is None else float(np.arctan(ratio)),
+    )
+    candidates = _between_limits(scaled, held)
+    for limit in (0.0, np.inf):
+        if ratio is None or ratio == limit:
+            place, size = _limit(scaled, limit, held[0], held[1])
+            candidates.append((-log_likelihood(scaled, limit, place, size) / scaled.size, (limit, place, size)))
+    if not candidates:
+        candidates.append((0.0, _estimate(_completed(held, np.array([])))))
     # A limit wins a tie: the simpler law.
-    best = min(candidates, key=lambda found: (round(loss(found), 11), found[0] not in (0.0, np.inf)))
+    best = min(candidates, key=lambda item: (round(item[0], 11), item[1][0] not in (0.0, np.inf)))[1]
     return best[0], centre + width * best[1], width * best[2]
 
 
-def _limit(scaled: Array, limit: float, held: Array, free: npt.NDArray[np.bool_]) -> Estimate:
-    """Likeliest normal (``limit = 0``) or uniform (``inf``) distribution; mean and size may be held."""
-    middle = np.mean(scaled) if limit == 0.0 else 0.5 * (np.max(scaled) + np.min(scaled))
-    place = float(middle if free[0] else held[0])
-    off = np.abs(scaled - place)
-    size = np.sqrt(np.mean(off**2)) if limit == 0.0 else np.max(off) * (1.0 + 1e-15) / _ROOT_3
-    return limit, place, float(size if free[1] else np.exp(held[1]))
+def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
+    """Smallest losses, and where they are, from several starts; none where all three parameters are held."""
+    free = [k for k in range(3) if held[k] is None]
+    if not free:
+        return []
+
+    def loss(point: Array) -> float:
+        ratio, place, size = _estimate(_completed(held, point))
+        value = -log_likelihood(scaled, ratio, place, size) / scaled.size
+        return value if np.isfinite(value) else 1e6
+
+    bounds = [_BOUNDS[k] for k in free]
+    found = []
+    for start in {min(fit_moments(scaled)[0], 20.0), *_STARTS} if 2 in free else {1.0}:
+        first = np.array([(0.0, 0.0, np.arctan(start))[k] for k in free])
+        rough = minimize(loss, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-13})
+        options = {"xatol": 1e-9, "fatol": 1e-13, "maxiter": 400}
+        polished = minimize(loss, rough.x, method="Nelder-Mead", bounds=bounds, options=options)
+        found.append((float(polished.fun), _estimate(_completed(held, polished.x))))
+    return found
+
+
+def _completed(held: Held, point: Array) -> tuple[float, float, float]:
+    """Mean, logarithm of the size and angle: what is held, and the point's coordinates for the rest."""
+    rest = iter(point)
+    place, size, angle = (float(next(rest)) if value is None else value for value in held)
+    return place, size, angle
+
+
+def _estimate(point: tuple[float, float, float]) -> Estimate:
+    place, size, angle = point
+    return float(np.tan(angle)), place, float(np.exp(size))
+
+
+def _limit(scaled: Array, limit: float, loc: float | None, log_scale: float | None) -> tuple[float, float]:
+    """Mean and total standard deviation of the likeliest normal (``limit = 0``) or uniform (``inf``) distribution."""
+    if limit == 0.0:
+        place = float(np.mean(scaled)) if loc is None else loc
+        size = float(np.sqrt(np.mean((scaled - place) ** 2)))
+    else:
+        place = 0.5 * float(np.max(scaled) + np.min(scaled)) if loc is None else loc
+        size = float(np.max(np.abs(scaled - place))) * (1.0 + 1e-15) / float(_ROOT_3)
+    return place, size if log_scale is None else float(np.exp(log_scale))
 
 
 _LOG_2PI = np.log(2.0 * np.pi)
