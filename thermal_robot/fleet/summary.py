@@ -329,9 +329,10 @@ def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, .
             found, (every, all_found) = found.reindex(in_group.index, fill_value=0), (len(tried), int(found.sum()))
             asked = in_group[(in_group >= settings.FEWEST_IN_GROUP) & (in_group < every)]
             tests += len(asked)
-            for group, own in asked.items():
-                p = float(hypergeom.sf(found[group] - 1, every, all_found, own))
-                counts = int(found[group]), int(own), all_found - int(found[group]), every - int(own)
+            own = found[asked.index]
+            chances = hypergeom.sf(own - 1, every, all_found, asked).tolist()
+            for group, here, robots_here, p in zip(asked.index, own, asked, chances, strict=True):
+                counts = int(here), int(robots_here), all_found - int(here), every - int(robots_here)
                 striking.append(Gathered(str(effect), label, str(group), *counts, p))
     fair = [replace(g, p_value=min(g.p_value * tests, 1.0)) for g in striking]
     kept = sorted((g.p_value, g.effect, g.label, g.group, g) for g in fair if g.p_value < settings.STRIKING)
