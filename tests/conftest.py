@@ -136,21 +136,17 @@ def diagnosed_once(tmp_path_factory):
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "diagnoses"
     folder.mkdir(exist_ok=True)
-    known = {}
 
     def diagnosed(campaign, *, progress=lambda stage: None, **asked):
         campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
-        key = hashlib.sha256(pickle.dumps((campaign, sorted(asked.items())))).hexdigest()
-        file = folder / key
-        if key not in known and file.exists():
-            known[key] = pickle.loads(file.read_bytes())
-        if key not in known:
+        file = folder / hashlib.sha256(pickle.dumps((campaign, sorted(asked.items())))).hexdigest()
+        if not file.exists():
             stages = []
-            known[key] = diagnose(campaign, progress=stages.append, **asked), stages
-            unfinished = folder / f"{key}.{os.getpid()}"
-            unfinished.write_bytes(pickle.dumps(known[key]))
+            answer = pickle.dumps((diagnose(campaign, progress=stages.append, **asked), stages))
+            unfinished = file.with_suffix(f".{os.getpid()}")
+            unfinished.write_bytes(answer)
             unfinished.replace(file)
-        found, stages = known[key]
+        found, stages = pickle.loads(file.read_bytes())  # everyone has arrays of their own to change
         for stage in stages:
             progress(stage)
         return found
