@@ -196,6 +196,7 @@ def test_whoever_asks_for_several_campaigns_has_the_same_single_ones(arms, size)
         ("single", ("rust",), "cannot make 'rust'"),
         ("pair", ("drift",), "no case of kind 'pair'"),
         ("many", ("drift", "backlash"), "many effects together are up to 5, of drift, backlash"),
+        ("both", ("joint_offset", "geometric"), "2 effects together: of joint_offset, geometric any"),
         ("both", ("base_frame",), "no case of kind 'both'"),
         *((kind, ("drift",), f"no case of kind '{kind}' can be made of drift; it takes") for kind in SEVERAL),
         ("series", ("link_compliance",), "no case of kind 'series'"),

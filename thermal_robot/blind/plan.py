@@ -158,6 +158,8 @@ def _apart(effects: Sequence[str]) -> list[str]:
 
 
 def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tuple[str, ...]:
+    if all(map(alike, combinations(apart, min(number, len(apart))))):
+        raise EffectError(f"{number} effects together: of {', '.join(apart)} any so many do the same")
     while True:
         chosen = tuple(apart[k] for k in sorted(rng.permutation(len(apart))[:number]))
         if not alike(chosen):
