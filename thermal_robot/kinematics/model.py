@@ -317,7 +317,7 @@ def build_chain_model(
     for frame in moving:
         _joint_type(full, frame.name)
     in_chain = {frame.parentJoint for frame in moving}
-    model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
+    model = held_at(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
     names = tuple(model.names)[1:]
     coupling = couple(names, ends, tuple(full.names)[1:])
     if not len(coupling.driving):
@@ -356,7 +356,7 @@ def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, .
     return tuple(frame.name for frame in ends)
 
 
-def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
+def held_at(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
     """Hold joints where they are; a link may have the name of a joint."""
     # Pinocchio's reduction asks for frames by name alone, and stops where a link and a joint share one.
     mark = "link "

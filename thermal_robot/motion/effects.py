@@ -1,0 +1,62 @@
+"""Effects of a servo: what each is called, which number of the servo model it moves, and how large it can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from thermal_robot.motion import settings
+from thermal_robot.motion.log import Servo
+
+SOURCED, UNSOURCED = 1.0, 1.5
+"""Standard deviation of the logarithm of an expected size: from logs of real servos, and where nobody knows."""
+
+
+@dataclass(frozen=True)
+class ServoEffect:
+    """One number of the servo model that may differ from what the maker states.
+
+    ``size`` is its one sigma in ``unit``; of a kind ``drive`` a share of what the torque limit deflects, L/K in rad.
+    """
+
+    name: str
+    title: str
+    singular: str
+    label: str
+    number: str
+    unit: str
+    size: float
+    of_limit: bool = False
+    spread: float = SOURCED
+    positive: bool = True
+
+
+EFFECTS = (
+    ServoEffect("zero", "zeros of the joints", "the zero", "zero", "zero", "rad", 20e-3, positive=False),
+    ServoEffect("gain", "gain of the command", "the command's gain", "gain", "gain", "", 10e-3, positive=False),
+    ServoEffect("delay", "delay of the command", "a delay of the command", "delay", "delay", "s", 10e-3, spread=UNSOURCED),
+    ServoEffect("lag", "lag of the servos", "the servo's lag", "time constant", "lag", "s", 80e-3),
+    ServoEffect("armature", "inertia of the drives", "the drive's inertia", "inertia over stiffness", "inertia", "s²",
+                5e-3, of_limit=True),
+    ServoEffect("droop", "droop under load", "droop under load", "compliance", "droop", "rad/(N·m)", 0.07),
+    ServoEffect("kp", "stiffness of the servos", "the servo's stiffness", "change of stiffness", "kp", "", 0.2,
+                positive=False),
+    ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True),
+    ServoEffect("load_friction", "friction that grows with load", "friction that grows with load",
+                "share of the load", "load_friction", "", 0.15),
+    ServoEffect("stribeck", "Stribeck friction", "Stribeck friction", "breakaway", "stribeck", "rad", 0.01,
+                of_limit=True, spread=UNSOURCED),
+    ServoEffect("dead_zone", "dead zone or play", "a dead zone or play", "half width", "dead_zone", "rad", 5e-3),
+    ServoEffect("torque_limit", "saturation of the servos", "the servo's saturation", "inverse of the limit",
+                "saturation", "1/rad", 5.0),
+    ServoEffect("low_stop", "lower end stops", "a lower end stop", "below which it stops", "low", "rad", 0.5,
+                spread=UNSOURCED),
+    ServoEffect("high_stop", "upper end stops", "an upper end stop", "above which it stops", "high", "rad", 0.5,
+                spread=UNSOURCED),
+)  # fmt: skip
+
+
+def size(effect: ServoEffect, servo: Servo) -> float:
+    """Return the expected size of an effect in one joint, in its unit."""
+    if not effect.of_limit:
+        return effect.size
+    return effect.size * (servo.limit or settings.TORQUE_LIMIT) / (servo.kp or settings.STIFFNESS)

@@ -1,0 +1,148 @@
+"""Maximum a posteriori fit of the servo model by Gauss-Newton, and its normal equations, deflated for motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from thermal_robot.arrays import Array
+from thermal_robot.inference.evidence import Gram
+from thermal_robot.motion import settings
+from thermal_robot.motion.model import SHARED, Rows, ServoModel
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A place in parameter space, and the model there.
+
+    ``values`` (P,); ``rows`` of each joint; ``noise`` (J,) root mean square of each joint's residual, rad.
+    """
+
+    values: Array
+    rows: list[Rows]
+    noise: Array
+
+    @classmethod
+    def at(cls, model: ServoModel, values: Array) -> Point:
+        """Linearise the model at some values."""
+        rows = model.all_rows(values)
+        noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
+        return cls(values, rows, noise)
+
+    def products(self) -> tuple[Array, Array]:
+        """Products of the white derivatives with each other (M, P, P) and with the target r + Jθ (M, P), by motion."""
+        count, width = 1 + max(int(one.motion.max()) for one in self.rows), len(self.values)
+        matrix, vector = np.zeros((count, width, width)), np.zeros((count, width))
+        for one, noise in zip(self.rows, self.noise, strict=True):
+            target = one.residual + one.derivative @ self.values[one.columns]
+            ends = np.searchsorted(one.motion, np.arange(count + 1))
+            for m in range(count):
+                own = slice(ends[m], ends[m + 1])
+                columns = one.derivative[own] / noise
+                matrix[m][np.ix_(one.columns, one.columns)] += columns.T @ columns
+                vector[m, one.columns] += columns.T @ target[own] / noise
+        return matrix, vector
+
+
+def fit(model: ServoModel, values: Array, active: Mask, sizes: Array, noise: Array | None = None) -> Array:
+    """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
+
+    ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading.
+    """
+    own = np.flatnonzero(active)
+    values = np.where(active, values, 0.0)
+    lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
+    shared = any(model.parameters[p].joint == SHARED for p in own)
+    joint_of = np.array([one.joint for one in model.parameters])
+    for _ in range(settings.ROUNDS):
+        point = Point.at(model, values)
+        matrix, vector = (one.sum(axis=0) for one in point.products())
+        tight = np.diag(sizes[own] ** -2.0)
+        before = np.array([len(one.residual) for one in point.rows], dtype=float)
+        ahead = []
+        for damping in settings.DAMPINGS:
+            whole = matrix[np.ix_(own, own)]
+            whole = whole + damping * np.diag(np.diag(whole)) + tight
+            pull = vector[own] + damping * np.diag(matrix)[own] * values[own]
+            root = np.linalg.cholesky(whole)
+            step = lsq_linear(root.T, np.linalg.solve(root, pull), bounds=(lower, np.inf)).x
+            ahead.append(values.copy())
+            ahead[-1][own] = step
+        best, gained = values.copy(), 0.0
+        costs = np.stack(model.each(lambda j: (model.residuals(j, np.array(ahead)) ** 2).sum(axis=1) / point.noise[j] ** 2))
+        if shared:
+            k = int(np.argmin(costs.sum(axis=0)))
+            gained = float(before.sum() - costs[:, k].sum())
+            best = ahead[k] if gained > 0.0 else values
+        else:
+            for j, cost in enumerate(costs):
+                k = int(np.argmin(cost))
+                if cost[k] < before[j]:
+                    best[joint_of == j] = ahead[k][joint_of == j]
+                    gained += before[j] - cost[k]
+        values = best
+        if gained < settings.SETTLED * before.sum():
+            break
+    return values
+
+
+def ratios(point: Point) -> Array:
+    """(P,) variance of each parameter's score, clustered by motion, over that of white rows; at least one.
+
+    The sandwich's meat over its bread (White, *Econometrica* 50, 1982; Liang and Zeger 1986). The scores are those
+    that remain once the parameter itself is fitted.
+    """
+    count, found = 1 + max(int(one.motion.max()) for one in point.rows), np.ones(len(point.values))
+    clustered, white = np.zeros(len(found)), np.zeros(len(found))
+    for one, noise in zip(point.rows, point.noise, strict=True):
+        ends = np.searchsorted(one.motion, np.arange(count + 1))
+        pieces = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        if count < settings.CLUSTERS:
+            cuts = np.linspace(0, len(one.residual), settings.BLOCKS + 1).astype(int)
+            pieces = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        score = np.array([one.derivative[p].T @ one.residual[p] for p in pieces]) / noise**2
+        bread = np.array([(one.derivative[p] ** 2).sum(axis=0) for p in pieces]) / noise**2
+        whole = bread.sum(axis=0)
+        rest = score - bread * (score.sum(axis=0) / np.where(whole > 0.0, whole, 1.0))
+        clustered[one.columns] += (rest**2).sum(axis=0) * len(pieces) / (len(pieces) - 1)
+        white[one.columns] += whole
+    seen = white > 0.0
+    found[seen] = np.maximum(clustered[seen] / white[seen], 1.0)
+    for one in point.rows:  # what few motions show has at least the ratio that is usual in its joint
+        found[one.columns] = np.maximum(found[one.columns], np.median(found[one.columns]))
+    return found
+
+
+def deflated(model: ServoModel, point: Point, deflation: Array) -> tuple[Gram, list[tuple[str, int]]]:
+    """Normal equations in units of prior sizes in which each parameter's information is that of its motions.
+
+    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Returns the blocks' effect and joint.
+    """
+    matrix, vector = (one.sum(axis=0) for one in point.products())
+    sizes = np.array([one.size for one in model.parameters])
+    wide = np.diag((settings.WIDE * sizes) ** -2.0)
+    found = np.linalg.solve(matrix + wide, vector)
+    less = np.diag(sizes / np.sqrt(deflation))
+    whole = less @ matrix @ less
+    along = whole @ (found / sizes)
+    each = [float(np.median(deflation[one.columns])) for one in point.rows]
+    equations = sum(len(one.residual) / ratio for one, ratio in zip(point.rows, each, strict=True))
+    blocks: list[tuple[str, int]] = [(one.effect, one.joint) for one in model.parameters]
+    k = range(len(blocks))
+    return Gram(
+        whole,
+        along,
+        equations + float(found / sizes @ along),
+        tuple(slice(i, i + 1) for i in k),
+        tuple(np.eye(1) for _ in k),
+        np.array([one.positive for one in model.parameters]),
+        tuple(int(whole[i, i] > settings.SEEN) for i in k),
+        np.array([one.spread for one in model.parameters]),
+        equations,
+        0.0,
+    ), blocks

@@ -1,0 +1,112 @@
+"""Loads of the joints along a motion, by Pinocchio: gravity, the other joints' motion, and what masses add."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from thermal_robot.arrays import Array
+from thermal_robot.compiling import threads
+from thermal_robot.kinematics.model import held_at
+from thermal_robot.motion import settings
+from thermal_robot.motion.log import MotionLog
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Torques (k, n, J) and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
+
+    The first of the k is that of the model; then that of 1 kg of payload and that of each link's whole mass.
+    """
+
+    torque: Array
+    inertia: Array
+    slope: Array
+
+
+class Dynamics:
+    """Rigid-body dynamics of the joints of a log, the others held at zero."""
+
+    def __init__(self, log: MotionLog) -> None:
+        model = pin.buildModelFromXML(log.robot.urdf)
+        others = [j for j, name in enumerate(model.names) if j and name not in log.joints]
+        model = held_at(model, others, pin.neutral(model))
+        model.gravity.linear = np.asarray(log.robot.gravity)
+        self.model, self.data = model, model.createData()
+        ids = [model.getJointId(name) for name in log.joints]
+        self.at = [model.joints[j].idx_v for j in ids]
+        self._q = [(model.joints[j].idx_q, model.joints[j].nq) for j in ids]
+        self.frame = model.getFrameId(log.robot.tool_frame, pin.FrameType.BODY)
+        frame = model.frames[self.frame]
+        com = frame.placement.act(log.payload[1] if log.payload else np.zeros(3))
+        self.bodies = [model.names[j] for j in range(1, model.njoints) if model.inertias[j].mass > 0.0]
+        models = [model, model.copy()]
+        models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
+        for name in self.bodies:
+            heavier = model.copy()
+            j = heavier.getJointId(name)
+            heavier.inertias[j] += model.inertias[j]
+            models.append(heavier)
+        self._pools = [pin.ModelPool(one, threads()) for one in models]
+
+    def configurations(self, q: Array) -> Array:
+        """(nq, n) Pinocchio's configurations of the joints' positions (n, J)."""
+        whole = np.repeat(pin.neutral(self.model)[:, None], len(q), axis=1)
+        for value, (at, width) in zip(q.T, self._q, strict=True):
+            whole[at : at + width] = value if width == 1 else (np.cos(value), np.sin(value))
+        return np.asfortranarray(whole)
+
+    def along(self, q: Array, v: Array | None = None, a: Array | None = None) -> Loads:
+        """Return the loads along configurations (n, J), at rest unless velocities and accelerations are given.
+
+        At rest they are computed a small turn apart, and linear between.
+        """
+        if v is None and len(q) > 1:
+            way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
+            apart = np.flatnonzero(np.diff(np.floor(way / settings.LOAD_STEP), prepend=-1.0, append=np.inf)[:-1])
+            apart = np.union1d(np.union1d(apart, np.maximum(apart - 1, 0)), [len(q) - 1])
+            if len(apart) < len(q) // 2:
+                few, at = self.along(q[apart]), way[apart]
+                return Loads(*(_between(way, at, one) for one in (few.torque, few.inertia, few.slope)))
+        rest, joints = np.zeros_like(q), range(q.shape[1])
+        v, a = rest if v is None else v, rest if a is None else a
+        units = [np.broadcast_to(np.arange(len(joints)) == j, q.shape).astype(float) for j in joints]
+        each = [self._torques(k, q, v, a) for k in range(len(self._pools))]
+        torque = np.stack([each[0], *(one - each[0] for one in each[1:])])
+        inertia, still = np.zeros_like(torque), [self._torques(k, q, rest, rest) for k in (0, 1)]
+        for j in joints:
+            one, more = (self._torques(k, q, rest, units[j])[:, j] - still[k][:, j] for k in (0, 1))
+            inertia[0, :, j], inertia[1, :, j] = one, more - one
+        # the joint's own acceleration is the servo's business
+        torque[:2] -= inertia[:2] * a
+        step = settings.ANGLE_STEP
+        moved = [self._torques(0, q + step * units[j], rest, rest)[:, j] - still[0][:, j] for j in joints]
+        return Loads(torque, inertia, np.stack(moved, axis=1) / step)
+
+    def _torques(self, k: int, q: Array, v: Array, a: Array) -> Array:
+        """(n, J) torques of the k-th model by the recursive Newton-Euler algorithm."""
+        speed, rate, found = (np.zeros((self.model.nv, len(q)), order="F") for _ in range(3))
+        speed[self.at], rate[self.at] = v.T, a.T
+        pin.rneaInParallel(threads(), self._pools[k], self.configurations(q), speed, rate, found)
+        return found[self.at].T.copy()
+
+    def heights(self, q: Array, up: Array) -> tuple[Array, Array]:
+        """Height of the tool (n,), m, along ``up``, and its derivative (n, J) by each joint, m/rad."""
+        model, data = self.model, self.data
+        height, slope = np.empty(len(q)), np.empty(q.shape)
+        for i, whole in enumerate(self.configurations(q).T):
+            jacobian: Any = pin.computeFrameJacobian(model, data, whole, self.frame, pin.LOCAL_WORLD_ALIGNED)
+            height[i] = up @ data.oMf[self.frame].translation
+            slope[i] = up @ jacobian[:3, self.at]
+        return height, slope
+
+
+def _between(way: Array, at: Array, values: Array) -> Array:
+    """Linear interpolation of values (…, n', J) known at places ``at`` of a way (n,), rising."""
+    right = np.clip(np.searchsorted(at, way), 1, len(at) - 1)
+    width = at[right] - at[right - 1]
+    part = np.clip((way - at[right - 1]) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)[:, None]
+    return np.asarray((1.0 - part) * values[..., right - 1, :] + part * values[..., right, :])

@@ -1,0 +1,252 @@
+"""The servo model of a whole log: its residual on every joint, and the derivative by every parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.compiling import threads
+from thermal_robot.motion import settings
+from thermal_robot.motion.effects import EFFECTS, size
+from thermal_robot.motion.loads import Dynamics
+from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.servo import PARAMETERS, simulate
+
+SHARED = -1
+"""Joint of a parameter that all joints share."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of the servo model: ``number`` of the kernel that it moves in a joint, or weight of a load that all joints share."""
+
+    effect: str
+    joint: int
+    label: str
+    unit: str
+    size: float
+    spread: float
+    positive: bool
+    number: str
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Residual (N,) of one joint, rad, derivatives (N, P') by the parameters ``columns`` (P',), and motions (N,)."""
+
+    residual: Array
+    derivative: Array
+    columns: NDArray[np.int64]
+    motion: NDArray[np.int64]
+
+
+class ServoModel:
+    """Residual and derivative of a log's encoder readings by the parameters of the servo model.
+
+    Parameters of one joint are independent of those of another, but for the loads that masses bring.
+    """
+
+    def __init__(self, log: MotionLog) -> None:
+        self.log, self.dynamics = log, Dynamics(log)
+        self.servos = [log.servos.get(name, Servo()) for name in log.joints]
+        self.coupled = all(servo.kp for servo in self.servos)
+        self.joints = range(len(log.joints))
+        self._grids()
+        self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
+        self.about = np.stack([np.clip(self.commanded[:, j], *self._range(j)) for j in self.joints], axis=1)
+        self.loads = self.dynamics.along(self.about)
+        self.touching, self.pressing = 0.0, np.zeros_like(self.about)
+        self.contact = np.zeros_like(self.about)
+        self.up = -np.asarray(log.robot.gravity) / max(float(np.linalg.norm(log.robot.gravity)), 1e-12)
+        self.lowest = float(self.dynamics.heights(self.commanded, self.up)[0].min())
+        self.parameters = self._parameters()
+
+    def _grids(self) -> None:
+        motions = self.log.motions
+        spacing = np.concatenate([np.diff(m.position.time) for m in motions])
+        self.step = float(np.median(spacing))
+        self.substeps = max(1, int(np.ceil(self.step / settings.STEP)))
+        counts = [int(np.ceil((m.position.time[-1] - m.position.time[0]) / self.step - 1e-9)) + 1 for m in motions]
+        self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        self.first = np.array([m.position.time[0] for m in motions])
+        self.grid = np.concatenate(
+            [t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)]
+        )
+        self.motion_of_grid = np.repeat(np.arange(len(motions)), counts)
+
+    def _range(self, joint: int) -> tuple[float, float]:
+        measured = np.concatenate([m.position.values[:, joint] for m in self.log.motions])
+        return float(np.nanmin(measured)), float(np.nanmax(measured))
+
+    def _held(self, joint: int) -> Array:
+        """(n,) the command of a joint on the grid, held between its stamps."""
+        parts = []
+        for k, motion in enumerate(self.log.motions):
+            grid = self.grid[self.begins[k] : self.begins[k + 1]]
+            at = np.clip(np.searchsorted(motion.command.time, grid + 1e-9, side="right") - 1, 0, None)
+            parts.append(motion.command.values[at, joint])
+        return np.concatenate(parts)
+
+    @cached_property
+    def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
+        """Of each joint the stamps of all motions, the command's integral there and its slope, and where each begins."""
+        found = []
+        begins = np.concatenate([[0], np.cumsum([len(m.command.time) for m in self.log.motions])]).astype(np.int64)
+        for j in range(len(self.log.joints)):
+            parts = []
+            for motion in self.log.motions:
+                t, u = motion.command.time, motion.command.values[:, j]
+                before = np.concatenate([[0.0], np.cumsum(u[:-1] * np.diff(t))])
+                parts.append(np.column_stack([before, u]))
+            times = np.concatenate([m.command.time for m in self.log.motions])
+            found.append((times, np.ascontiguousarray(np.concatenate(parts)), begins))
+        return found
+
+    @cached_property
+    def _samples(self) -> list[tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]]:
+        """Of each joint the readings (N,), their place on the grid and the part of a step beyond it, and motions."""
+        found = []
+        for j in range(len(self.log.joints)):
+            parts = []
+            for k, motion in enumerate(self.log.motions):
+                q, t = motion.position.values[:, j], motion.position.time
+                x = (t - self.first[k]) / self.step
+                i = np.clip(np.floor(x).astype(np.int64), 0, self.begins[k + 1] - self.begins[k] - 2)
+                parts.append(np.column_stack([q, i + self.begins[k], x - i, np.full(len(q), k)])[np.isfinite(q)])
+            rows = np.concatenate(parts)
+            found.append((rows[:, 0], rows[:, 1].astype(np.int64), rows[:, 2], rows[:, 3].astype(np.int64)))
+        return found
+
+    def _parameters(self) -> tuple[Parameter, ...]:
+        found = [
+            Parameter(e.name, j, e.label, e.unit, size(e, servo), e.spread, e.positive, e.number)
+            for j, servo in enumerate(self.servos)
+            for e in EFFECTS
+            if e.number not in (("droop",) if servo.kp else ("kp",))
+        ]
+        if self.log.robot.has_masses:
+            most = np.abs(self.loads.torque[1]).max(axis=0)
+            limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
+            rated = float(np.min(limits[most > 0.0] / most[most > 0.0], initial=np.inf))
+            if np.isfinite(rated):
+                found.append(Parameter("payload", SHARED, "mass", "kg", settings.PAYLOAD * rated, 1.0, False, "payload"))
+            found.append(Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact"))
+        return tuple(found)
+
+    def index(self, effect: str, joint: int = SHARED) -> int | None:
+        """Return the place of a parameter, ``None`` where the model has none of it."""
+        found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
+        return found[0] if found else None
+
+    def start(self) -> Array:
+        """(P,) values from which all effects are fitted: those of most, and stops and limits where the joint ends."""
+        values = np.array([0.5 * one.size if one.positive else 0.0 for one in self.parameters])
+        for joint in range(len(self.log.joints)):
+            command, (low, high) = self.commanded[:, joint], self._range(joint)
+            at = {name: self.index(name, joint) for name in ("low_stop", "high_stop", "torque_limit")}
+            values[at["low_stop"]] = max(low - command.min(), 0.0)
+            values[at["high_stop"]] = max(command.max() - high, 0.0)
+            measured, place, _, _ = self._samples[joint]
+            error = np.abs(command[place] - measured)
+            values[at["torque_limit"]] = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
+        if (p := self.index("contact")) is not None:
+            measured = np.concatenate([m.position.values for m in self.log.motions])
+            height, _ = self.dynamics.heights(measured[np.isfinite(measured).all(axis=1)], self.up)
+            values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
+        return values
+
+    def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
+        """(S, 13) numbers of the kernel and (S, 3) weights of the loads, for sets (S, P) of all parameters."""
+        servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
+        weights = np.zeros((len(values), 3))
+        weights[:, 0] = 1.0
+        for p, parameter in enumerate(self.parameters):
+            if parameter.joint == joint:
+                x[parameter.number] = values[:, p]
+            elif parameter.number == "payload":
+                weights[:, 1] = values[:, p]
+            elif parameter.number == "contact":
+                weights[:, 2] = values[:, p] - self.touching
+        if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
+            stiffness = servo.kp * np.maximum(1.0 + x["kp"], settings.LEAST_STIFFNESS)
+            x["droop"], x["lag"] = 1.0 / stiffness, x["lag"] + (servo.kd or 0.0) / stiffness
+            x["saturation"] = x["saturation"] + (stiffness / servo.limit if servo.limit else 0.0)
+        x["dead_zone"] = x["dead_zone"] + (servo.dead_band or 0.0)
+        reach = self.commanded[:, joint].min(), self.commanded[:, joint].max()
+        x["low"] = np.where(x["low"] > 0.0, reach[0] + x["low"], -np.inf)
+        x["high"] = np.where(x["high"] > 0.0, reach[1] - x["high"], np.inf)
+        return np.column_stack([x[name] for name in PARAMETERS]), weights
+
+    def positions(self, joint: int, values: Array, free: bool = False) -> Array:
+        """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free`` of any contact."""
+        numbers, weights = self.numbers(joint, values)
+        parts = self.loads.torque[:2, :, joint]
+        contact = np.zeros_like(self.contact) if free else self.contact
+        pressing = 0.0 if free else self.pressing[:, joint]
+        loads = np.stack([parts[0] + pressing, parts[1], contact[:, joint]])
+        inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
+        around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
+        start = np.array([m.position.values[np.isfinite(m.position.values[:, joint]), joint][0] for m in self.log.motions])
+        return simulate(
+            numbers, weights, (self.begins, self.first), self._commands[joint], around, start, self.step, self.substeps
+        )
+
+    def residuals(self, joint: int, values: Array) -> Array:
+        """(S, N) measured minus simulated positions of a joint, rad, at the encoder's own stamps."""
+        measured, at, beyond, _ = self._samples[joint]
+        simulated = self.positions(joint, values)
+        return np.asarray(measured - (1.0 - beyond) * simulated[:, at] - beyond * simulated[:, at + 1])
+
+    def rows(self, joint: int, values: Array) -> Rows:
+        """Residual and derivatives of a joint at the parameters (P,), by forward differences."""
+        own = np.array([p for p, x in enumerate(self.parameters) if x.joint in (joint, SHARED)])
+        steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
+        sets = np.tile(values, (1 + len(own), 1))
+        sets[1 + np.arange(len(own)), own] += steps
+        found = self.residuals(joint, sets)
+        return Rows(found[0], (found[0] - found[1:]).T / steps, own, self._samples[joint][3])
+
+    def each(self, function: Callable[[int], Any]) -> list[Any]:
+        """Return a function of every joint's number, several at a time."""
+        with ThreadPoolExecutor(threads()) as pool:
+            return list(pool.map(function, range(len(self.log.joints))))
+
+    def all_rows(self, values: Array) -> list[Rows]:
+        """Residual and derivatives of every joint at the parameters (P,)."""
+        return self.each(lambda joint: self.rows(joint, values))
+
+    def refreshed(self, values: Array) -> None:
+        """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled."""
+        about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
+        speed = rate = None
+        if self.coupled:
+            speed, rate = np.zeros_like(about), np.zeros_like(about)
+            for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+                if b - a > 2:
+                    speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
+                    rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
+        self.about, self.loads = about, self.dynamics.along(about, speed, rate)
+        p = self.index("contact")
+        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(about), np.zeros_like(about)
+        if p is not None and values[p] > 0.0:
+            self._press(values)
+
+    def _press(self, values: Array) -> None:
+        """Let the tool rest on a plane: the joints' springs yield to the force that keeps it there, without friction.
+
+        The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
+        """
+        height, slope = self.dynamics.heights(self.about, self.up)
+        compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
+        yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
+        self.touching = float(values[self.index("contact")])
+        into = self.lowest + self.touching - height
+        self.contact = np.where(into > 0.0, 1.0, 0.0)[:, None] * -slope / yields[:, None]
+        self.pressing = self.contact * np.maximum(into, 0.0)[:, None]

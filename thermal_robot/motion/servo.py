@@ -1,0 +1,145 @@
+"""Servo model of one joint: a free-running simulation of what the encoder reads, from the command alone.
+
+Per joint, everything over the servo's stiffness K (rad for N·m), with the command u, Coulomb and load friction exact in
+sticking,
+
+    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q], ±L) − c load(q) ,   |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
+
+D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of gravity and of the other joints. One step of the
+implicit midpoint rule solves a monotone inclusion for the velocity at its middle (Moreau's time stepping: Acary and
+Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), and a joint that sticks is at rest at its end; a
+command that is held between its stamps is averaged over the step, so that the answer is smooth in the delay.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.compiling import compiled
+
+PARAMETERS = (
+    "zero",
+    "gain",
+    "delay",
+    "lag",
+    "inertia",
+    "droop",
+    "coulomb",
+    "load_friction",
+    "stribeck",
+    "dead_zone",
+    "saturation",
+    "low",
+    "high",
+)
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad."""
+STRIBECK_VELOCITY = 0.1
+"""rad/s: v_s, at which sliding has begun: BAM's measured servos, 0.05 to 0.2."""
+NEWTON_STEPS = 12
+"""Of the piecewise linear equation of a step: it has five pieces, and each step finds another one."""
+
+
+def _simulate(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
+              inertias, start, out):  # type: ignore[no-untyped-def]  # fmt: skip
+    """Integrate all motions for each set of numbers; ``out`` (S, n) is q on the grid."""
+    h = step / substeps
+    half = 0.5 * h
+    for s in range(numbers.shape[0]):
+        zero, gain, delay, lag, inertia, droop = numbers[s, :6]
+        coulomb, load_friction, stribeck, dead, saturation, low, high = numbers[s, 6:]
+        limit = 1.0 / saturation if saturation > 0.0 else 1e9
+        for m in range(len(begins) - 1):
+            q, v = start[m], 0.0
+            k, last = command_begins[m], command_begins[m + 1] - 1
+            late, t = 0.0, first[m] - delay
+            while k < last and times[k + 1] <= t:
+                k += 1
+            before = integral[k, 0] + integral[k, 1] * (t - times[k])
+            for n in range(begins[m], begins[m + 1]):
+                load0, mass = 0.0, 0.0
+                for i in range(weights.shape[1]):
+                    load0 += weights[s, i] * loads[i, n]
+                    mass += weights[s, i] * inertias[i, n]
+                accelerating = 2.0 * (droop * mass + inertia) / h
+                bend = droop * slope[n]
+                force = droop * load0
+                if n > begins[m]:
+                    for _ in range(substeps):
+                        t += h
+                        while k < last and times[k + 1] <= t:
+                            k += 1
+                        late = integral[k, 0] + integral[k, 1] * (t - times[k])
+                        u = (1.0 + gain) * (late - before) / h + zero
+                        before = late
+                        load = force + bend * (q - about[n])
+                        most = coulomb + load_friction * abs(load)
+                        if stribeck > 0.0:
+                            most += stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
+                        e = u - q
+                        pull = accelerating * v - load
+                        drive = 0.0
+                        if e > dead:
+                            drive = min(e - dead, limit)
+                        elif e < -dead:
+                            drive = max(e + dead, -limit)
+                        at_rest = pull + drive
+                        if at_rest > most:
+                            pull -= most
+                        elif at_rest < -most:
+                            pull += most
+                        middle = 0.0
+                        if abs(at_rest) > most:
+                            damping = accelerating + lag + bend * half
+                            w, piece = 0.0, -1
+                            for _ in range(NEWTON_STEPS):
+                                e = u - q - half * w
+                                drive, stiff, now = 0.0, 0.0, 0
+                                if e > dead:
+                                    if e - dead < limit:
+                                        drive, stiff, now = e - dead, half, 1
+                                    else:
+                                        drive, now = limit, 2
+                                elif e < -dead:
+                                    if e + dead > -limit:
+                                        drive, stiff, now = e + dead, half, 3
+                                    else:
+                                        drive, now = -limit, 4
+                                if now == piece:
+                                    break
+                                piece = now
+                                w -= (damping * w - pull - drive) / (damping + stiff + 1e-12)
+                            middle = w if w * at_rest > 0.0 else 0.0
+                        then = q + h * middle
+                        if then < low or then > high:
+                            then, middle = max(min(then, high), low), 0.0
+                        v = 2.0 * middle - v if middle != 0.0 else 0.0
+                        q = then
+                out[s, n] = q
+
+
+_compiled = None
+
+
+def simulate(
+    numbers: Array, weights: Array, grid: tuple[Array, ...], command: tuple[Array, ...], around: tuple[Array, ...],
+    start: Array, step: float, substeps: int,
+) -> Array:
+    """Time stepping of one joint in all motions, for S sets of numbers: (S, n) rad on the grid.
+
+    ``numbers`` (S, 13) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
+    kg·m²; ``grid`` begins of motions and their first instants; ``command`` stamps, integral with slope and begins;
+    ``around`` loads, their slope (n,), N·m/rad, the position (n,) at which they hold, and inertias; ``start`` (M,) rad.
+    """
+    global _compiled
+    if _compiled is None:
+        _compiled = compiled(_simulate)
+    begins, first = grid
+    times, integral, command_begins = command
+    loads, slope, about, inertias = around
+    out = np.empty((len(numbers), begins[-1]))
+    _compiled(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
+              inertias, start, out)  # fmt: skip
+    return out
