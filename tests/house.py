@@ -11,8 +11,8 @@ ROOT = Path(thermal_robot.__file__).parent
 PACKAGE = "thermal_robot"
 ORDER = (
     "arrays errors files percents compiling schema tables kinematics urdf_text robot shapes assembly maps paper "
-    "campaign observations effects inference iso9283 prediction model_file correction simulation teller diagnosis "
-    "planning fleet datasets report console streams blind viewer commands cli __main__"
+    "campaign observations effects inference iso9283 prediction model_file correction motion simulation teller "
+    "diagnosis planning fleet datasets report console streams blind viewer commands cli __main__"
 ).split()
 """Rooms from the ground up: each may import those before it."""
 FREE = {
@@ -29,7 +29,7 @@ LONGEST_BODY = 40
 """Lines of a function: a screen."""
 KNOWING = {"effects", "blind", "paper"}
 """Rooms that may know an effect by name: its own, the trial that withholds it, the paper's."""
-FRAMES = {"campaign", "model_file.py", "robot.py", "cli.py"}
+FRAMES = {"campaign", "motion", "model_file.py", "robot.py", "cli.py"}
 """Rooms for which ``tool_frame`` and ``base_frame`` are frames, not effects."""
 MODULES = sorted(ROOT.rglob("*.py"))
 

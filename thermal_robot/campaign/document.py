@@ -66,6 +66,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "gears": kinds.GEARS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
+FILE_NAME = "campaign.toml"
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
 
 
@@ -74,10 +75,13 @@ class Document:
 
     ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``kinds`` says
     what each key of each section may be; of a section whose keys are the user's own, what the whole may be.
+    ``name`` is what such a file is usually called.
     """
 
-    def __init__(self, file: Path, kinds: Mapping[str, Mapping[str, Kind] | Kind] = KINDS) -> None:
-        self.file, self.kinds = str(file), kinds
+    def __init__(
+        self, file: Path, kinds: Mapping[str, Mapping[str, Kind] | Kind] = KINDS, name: str = FILE_NAME
+    ) -> None:
+        self.file, self.kinds, self.name = str(file), kinds, name
         self.text, data = self._parsed(file)
         for section, content in data.items():
             self._refuse_unknown(section, content)
@@ -86,7 +90,7 @@ class Document:
     def _parsed(self, file: Path) -> tuple[str, dict[str, Any]]:
         try:
             if file.stat().st_size > _LARGEST_FILE:
-                raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 64 KiB")
+                raise CampaignError(self.file, f"is larger than any {self.name}", expected="at most 64 KiB")
             text = file.read_text(encoding="utf-8-sig")
             return text, tomllib.loads(text)
         except OSError as error:
@@ -109,6 +113,8 @@ class Document:
             if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
                 current = header[1].strip("\"'")
                 if current == section and not key:
+                    return number
+                if key and current == f"{section}.{key}":
                     return number
             elif current == section and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
                 return number
@@ -160,7 +166,6 @@ class Document:
         raise self._error("is missing", section, column=f"{section}.{key}", expected=f"{expected} under [{section}]")
 
 
-FILE_NAME = "campaign.toml"
 _MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 
@@ -184,9 +189,7 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     CampaignError
         No such file, a syntax error, a section or key that is unknown or missing, a value of the wrong kind.
     """
-    file = path / FILE_NAME if is_folder(path) else path
-    if not is_file(file):
-        raise _absent(path)
+    file = declared_file(path)
     document = Document(file)
     for key in ("angle_unit", "length_unit"):
         document.required("measurements", key)
@@ -196,25 +199,44 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     settings = Settings.stated(document.sections, **ends)
     folder = file.parent if folder is None else folder
     table = folder / document.required("measurements", "file")
-    robot = settings.urdf if settings.urdf.startswith((EXAMPLE_ROBOT_DATA, BUILTIN)) else folder / settings.urdf
+    robot = robot_reference(settings.urdf, folder)
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
     kinematics = folder / stated["kinematics"] if stated.get("kinematics") else None
     return Declaration(file, table, robot, settings, rows, kinematics)
 
 
-def _absent(path: Path) -> CampaignError:
+def robot_reference(urdf: str, folder: Path) -> str | Path:
+    """Return what :func:`~thermal_robot.load_robot` wants: a known robot as it is named, a path from the folder."""
+    return urdf if urdf.startswith((EXAMPLE_ROBOT_DATA, BUILTIN)) else folder / urdf
+
+
+def declared_file(path: Path, name: str = FILE_NAME, section: str = "measurements") -> Path:
+    """Return the file of a declaration, or of that in a folder; ``section`` tells it from other files.
+
+    Raises
+    ------
+    CampaignError
+        No such file; it says which there are beside it.
+    """
+    file = path / name if is_folder(path) else path
+    if not is_file(file):
+        raise _absent(path, name, f"[{section}]".encode())
+    return file
+
+
+def _absent(path: Path, name: str, section: bytes) -> CampaignError:
     """Say that there is no campaign, and which there are beside it: files that have its section, folders its file."""
-    problem, folder = f"this folder has no {FILE_NAME}", path
+    problem, folder = f"this folder has no {name}", path
     if not is_folder(path):
         problem, folder = "there is no such file", path.parent
     try:
         inside = sorted(folder.iterdir())
-        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
-        found = [f.name for f in (*files, *(f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()))]
+        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and section in f.read_bytes()]
+        found = [f.name for f in (*files, *(f for f in inside if f.is_dir() and (f / name).is_file()))]
     except (OSError, ValueError):  # nothing can be proposed where nothing can be read
         found = []
     beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
-    return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
+    return CampaignError(str(path), problem + beside, expected=f"{name}, or the folder that holds it")
 
 
 _LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them

@@ -276,6 +276,28 @@ def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array,
     return np.where(gaps, between, values), f"interpolated {'between rows' if clock is None else 'in time'}"
 
 
+def stated_path(call: str, path: str | Path, name: str = FILE_NAME) -> Path:
+    """Return the path that a call was given of a file of this ``name``; refuse what is none, and an empty one."""
+    require(call, path, (str, os.PathLike), f"the path of a {name}, or of its folder")
+    if path == "":  # which Path takes for the folder that one stands in
+        raise CampaignError(call, "the path is empty", expected=f"that of a {name}, or of its folder")
+    return Path(path)
+
+
+def name_of(file: Path, usual: str = FILE_NAME) -> str:
+    """Return the name of what a file declares: its folder's, where the file is called as usual."""
+    file = Path(os.path.abspath(file))  # the parent of "." and ".." has a name, too
+    return file.parent.name if file.name == usual else file.stem
+
+
+def stated_robot(file: Path, reference: str | Path, tool_frame: str, **ends: Any) -> Robot:
+    """Load the robot that the section ``[robot]`` of a file states; a :class:`RobotError` names the file, too."""
+    try:
+        return load_robot(reference, tool_frame, **ends)
+    except RobotError as error:
+        raise RobotError(f"{file}, [robot]: {error}", name=error.name, candidates=error.candidates) from error
+
+
 def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Campaign:
     """Read and validate a campaign.
 
@@ -305,22 +327,14 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
     >>> tr.read_campaign(file)
     <Campaign 'hall_3': 120 samples of position, 5 joints, 8 covariates>
     """
-    require("read_campaign()", path, (str, os.PathLike), f"the path of a {FILE_NAME}, or of its folder")
-    if path == "":  # which Path takes for the folder that one stands in
-        raise CampaignError("read_campaign()", "the path is empty", expected=f"that of a {FILE_NAME}, or of its folder")
-    declaration = read_declaration(Path(path), None if folder is None else Path(folder))
+    declaration = read_declaration(stated_path("read_campaign()", path), None if folder is None else Path(folder))
     settings = declaration.settings
-    root, gravity = settings.root_frame, settings.gravity
-    try:
-        robot = load_robot(declaration.robot, settings.tool_frame, root_frame=root, gravity=gravity)
-    except RobotError as error:
-        told = f"{declaration.file}, [robot]: {error}"
-        raise RobotError(told, name=error.name, candidates=error.candidates) from error
+    ends = {"root_frame": settings.root_frame, "gravity": settings.gravity}
+    robot = stated_robot(declaration.file, declaration.robot, settings.tool_frame, **ends)
     if declaration.kinematics:
         robot = with_kinematics(robot, declaration.kinematics)
     check_joints(str(declaration.file), "gears", settings.gears, robot.joint_names, declaration.gear_rows)
-    file = Path(os.path.abspath(declaration.file))  # the parent of "." and ".." has a name, too
-    name = file.parent.name if file.name == FILE_NAME else file.stem
+    name = name_of(declaration.file)
     return build_campaign(read_table(declaration.table), settings, robot, name=name)
 
 

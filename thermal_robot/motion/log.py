@@ -1,0 +1,112 @@
+"""The log of a motion: command, encoder and what else was recorded of a robot's joints, each with its own stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from thermal_robot.arrays import Array
+from thermal_robot.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Samples of one quantity of the joints.
+
+    Attributes
+    ----------
+    time
+        (N,) s, increasing: the channel's own stamps.
+    values
+        (N, joints), NaN where a joint has no sample.
+    """
+
+    time: Array
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One uninterrupted motion; its clock begins at its first stamp of any channel.
+
+    Attributes
+    ----------
+    name, kind
+        Label, and label of the type of motion, empty where none is given.
+    command, position
+        rad, m for a prismatic joint.
+    velocity, torque, current, volts, temperature
+        rad/s (m/s), N·m (N), A, V, °C; ``None`` where nothing was recorded.
+    """
+
+    name: str
+    kind: str
+    command: Channel
+    position: Channel
+    velocity: Channel | None = None
+    torque: Channel | None = None
+    current: Channel | None = None
+    volts: Channel | None = None
+    temperature: Channel | None = None
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Position servo of a joint as its maker states it, SI; ``None`` where unknown.
+
+    Attributes
+    ----------
+    kp, kd
+        Stiffness, N·m/rad, and damping, N·m·s/rad.
+    limit
+        Largest torque, N·m.
+    dead_band
+        Error within which the servo does nothing, rad.
+    """
+
+    kp: float | None = None
+    kd: float | None = None
+    limit: float | None = None
+    dead_band: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLog:
+    """Commanded and measured motion of a robot's joints, in several motions, SI.
+
+    Attributes
+    ----------
+    name
+        Of the log.
+    robot
+        Chain that holds the joints; of an MJCF, translated from it.
+    joints
+        Names of those that are recorded, in the order of the channels' values.
+    motions
+        In the order of the log.
+    servos
+        What is known of the servos, by joint.
+    payload
+        Mass, kg, and centre of mass (3,), m, in the frame of the chain's last link; ``None`` without one.
+    tolerance
+        What an output must move by to be shown, rad, by joint.
+    notes
+        What was odd about the log and was accepted, a sentence each.
+    """
+
+    name: str
+    robot: Robot
+    joints: tuple[str, ...]
+    motions: tuple[Motion, ...]
+    servos: Mapping[str, Servo] = field(default_factory=dict)
+    payload: tuple[float, Array] | None = None
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        seconds = sum(float(motion.position.time[-1] - motion.position.time[0]) for motion in self.motions)
+        return f"<MotionLog {self.name!r}: {len(self.motions)} motions of {len(self.joints)} joints, {seconds:.0f} s>"
+
+
+CHANNELS = ("command", "position", "velocity", "torque", "current", "volts", "temperature")
+"""Fields of a motion that are channels."""

@@ -1,0 +1,154 @@
+"""The robot of an MJCF, by MuJoCo's compiler: its bodies and joints as a URDF, its position actuators as servos.
+
+A joint turns about its anchor by qpos − qpos0 (MuJoCo, *Computation*, "Joints"); a URDF's link begins at its joint, so
+each body's frame is shifted there. Geoms, tendons and equalities are left out; a free joint is held.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error
+from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import quaternion_to_rotation
+from thermal_robot.kinematics.lie import exp3
+from thermal_robot.kinematics.urdf import xyz_rpy
+from thermal_robot.motion.log import Servo
+
+_FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
+_FAR = 1e3  # m: limit of a joint that slides without one
+
+
+def _model(file: Path) -> Any:
+    if not file.is_file():
+        raise CampaignError(str(file), "there is no such file", expected="the robot's MJCF")
+    return compiled(file)
+
+
+def gravity_of_mjcf(file: Path) -> tuple[float, float, float]:
+    """Return gravity in the world's frame, m/s²."""
+    x, y, z = map(float, _model(file).opt.gravity)
+    return x, y, z
+
+
+def servos_of_mjcf(file: Path) -> dict[str, Servo]:
+    """Return stiffness, damping and limit of the position actuators, by joint, as they act on the joint."""
+    mujoco, model, found = mujoco_or_error(), _model(file), {}
+    for k in range(model.nu):
+        joint, gear = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0])
+        gain, (_, stiff, damp) = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k, :3]
+        at_joint = model.actuator_trntype[k] == mujoco.mjtTrn.mjTRN_JOINT
+        if at_joint and gain > 0.0 and np.isclose(stiff, -gain):
+            limits = [abs(gear) * float(model.actuator_forcerange[k, 1])] if model.actuator_forcelimited[k] else []
+            limits += [float(model.jnt_actfrcrange[joint, 1])] if model.jnt_actfrclimited[joint] else []
+            limit = min(limits, default=None)
+            found[model.joint(joint).name] = Servo(gain * gear**2, -float(damp) * gear**2 or None, limit)
+    return found
+
+
+def urdf_of_mjcf(file: Path) -> str:
+    """Return the bodies, joints and sites of an MJCF as URDF text, with all digits.
+
+    Raises
+    ------
+    CampaignError
+        If MuJoCo is not installed or does not take the file, or if a joint is a ball.
+    """
+    model = _model(file)
+    robot = ElementTree.Element("robot", name=file.stem)
+    anchors, links = {0: np.zeros(3)}, {0: "world"}
+    ElementTree.SubElement(robot, "link", name="world")
+    for body in range(1, model.nbody):
+        _body(robot, model, body, anchors, links, str(file))
+    for site in range(model.nsite):
+        name, body = model.site(site).name, int(model.site_bodyid[site])
+        if name and name not in {link.get("name") for link in robot.iter("link")}:
+            ElementTree.SubElement(robot, "link", name=name)
+            pose = _pose(model.site_pos[site] - anchors[body], model.site_quat[site])
+            _joint(robot, f"{name} is fixed", "fixed", (links[body], name), pose)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: dict[int, str], file: str) -> None:
+    """Add a body: a link for each of its joints, the last of which is the body's own."""
+    parent, own = int(model.body_parentid[body]), model.body(body).name or f"body {body}"
+    before = links[parent]
+    pose = _pose(model.body_pos[body] - anchors[parent], model.body_quat[body])
+    first = int(model.body_jntadr[body])
+    joints = [k for k in range(first, first + int(model.body_jntnum[body])) if model.jnt_type[k] != _FREE]
+    anchor = np.zeros(3)
+    for joint in joints:
+        if model.jnt_type[joint] == _BALL:
+            raise CampaignError(file, f"joint {model.joint(joint).name!r} is a ball", expected="hinges and slides")
+        link = own if joint == joints[-1] else f"{own} before joint {joint + 1}"
+        pose = pose @ _shift(model.jnt_pos[joint] - anchor)
+        anchor = np.array(model.jnt_pos[joint])
+        _moving(robot, model, joint, (before, link), pose)
+        before, pose = link, np.eye(4)
+        _link(robot, model, body if link == own else None, link, anchor)
+    if not joints:
+        _joint(robot, f"{own} is fixed", "fixed", (before, own), pose)
+        _link(robot, model, body, own, anchor)
+    anchors[body], links[body] = anchor, own
+
+
+def _moving(robot: Any, model: Any, joint: int, between: tuple[str, str], pose: Array) -> None:
+    axis, zero = np.array(model.jnt_axis[joint]), float(model.qpos0[model.jnt_qposadr[joint]])
+    slides, limited = model.jnt_type[joint] == _SLIDE, bool(model.jnt_limited[joint])
+    back = _shift(-zero * axis) if slides else np.eye(4)
+    if not slides:
+        back[:3, :3] = exp3(-zero * axis)
+    kind = "prismatic" if slides else "revolute" if limited else "continuous"
+    element = _joint(robot, model.joint(joint).name or f"joint {joint}", kind, between, pose @ back)
+    ElementTree.SubElement(element, "axis", xyz=_digits(axis))
+    low, high = model.jnt_range[joint] if limited else (-_FAR, _FAR)
+    if kind != "continuous":
+        ElementTree.SubElement(
+            element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort="0", velocity="0"
+        )
+
+
+def _joint(robot: Any, name: str, kind: str, between: tuple[str, str], pose: Array) -> Any:
+    element = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+    for end, link in zip(("parent", "child"), between, strict=True):
+        ElementTree.SubElement(element, end, link=link)
+    _origin(element, pose)
+    return element
+
+
+def _link(robot: Any, model: Any, body: int | None, name: str, anchor: Array) -> None:
+    """Add a link, with the mass of a body where it is one's own."""
+    link = ElementTree.SubElement(robot, "link", name=name)
+    if body is None or not model.body_mass[body] > 0.0:
+        return
+    inertial = ElementTree.SubElement(link, "inertial")
+    _origin(inertial, _pose(model.body_ipos[body] - anchor, model.body_iquat[body]))
+    ElementTree.SubElement(inertial, "mass", value=repr(float(model.body_mass[body])))
+    ixx, iyy, izz = (repr(float(value)) for value in model.body_inertia[body])
+    ElementTree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
+
+
+def _origin(element: Any, pose: Array) -> None:
+    xyz, rpy = xyz_rpy(pose)
+    ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
+
+
+def _pose(place: Array, quaternion: Array) -> Array:
+    pose = _shift(place)
+    pose[:3, :3] = quaternion_to_rotation(quaternion)
+    return pose
+
+
+def _shift(by: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, 3] = by
+    return pose
+
+
+def _digits(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,468 @@
+"""From motion.toml and its tables, or from data frames, to a log of motions: checked, in SI, each with its stamps."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import settings as kinds
+from thermal_robot.campaign.checked import check_joints, first_true
+from thermal_robot.campaign.document import Document, declared_file, robot_reference
+from thermal_robot.campaign.names import did_you_mean, listed
+from thermal_robot.campaign.read import name_of, stated_path, stated_robot
+from thermal_robot.campaign.settings import given
+from thermal_robot.campaign.table import Table, read_table, table_from_frame
+from thermal_robot.campaign.units import Units
+from thermal_robot.errors import CampaignError, RobotError, require
+from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, scale_of, sources
+from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo
+from thermal_robot.motion.refuse import refused
+from thermal_robot.motion.settings import FEWEST_SAMPLES, LONGEST_GAP
+from thermal_robot.robot import Robot
+from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, either, mapping, record, text
+from thermal_robot.schema import listed as list_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FILE_NAME = "motion.toml"
+_COLUMN = text("the name of a column")
+_PATH = text("the path of a table")
+_OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": NOT_NEGATIVE}
+SERVOS = mapping(record(_OF_A_SERVO, may_lack=_OF_A_SERVO))
+PAYLOAD = record({"mass": NOT_NEGATIVE, "com": kinds.VECTOR}, may_lack=["com"])
+TOLERANCE = mapping(NOT_NEGATIVE)
+KINDS: dict[str, Mapping[str, Kind] | Kind] = {
+    "robot": {
+        "urdf": text("the path of the robot's URDF file"),
+        "mjcf": text("the path of the robot's MJCF file"),
+        "tool_frame": text("the link at the end of the chain"),
+        "root_frame": text("the link where the chain starts"),
+        "gravity": kinds.GRAVITY,
+    },
+    "motion": {
+        "log": either(_PATH, list_of(_PATH)),
+        "time": _COLUMN,
+        "motion": _COLUMN,
+        "kind": _COLUMN,
+        "angle_unit": kinds.ANGLE_UNIT,
+        "length_unit": kinds.LENGTH_UNIT,
+    },
+    "servo": SERVOS,
+    "payload": {"mass": NOT_NEGATIVE, "com": kinds.VECTOR},
+    "channels": channels_kind,
+    "tolerance": TOLERANCE,
+}
+"""What each key of each section of motion.toml may be."""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What motion.toml says of its tables, or a call; lengths of the payload in m, the rest of the servo in SI."""
+
+    name: str
+    units: Units = field(default_factory=Units)
+    labels: Mapping[str, str] = field(default_factory=dict)  # columns of time, motion and kind, where stated
+    channels: Mapping[str, Stated] = field(default_factory=dict)
+    servos: Mapping[str, Servo] = field(default_factory=dict)
+    payload: tuple[float, Array] | None = None
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]]) -> Declaration:
+        """Return what sections of motion.toml say."""
+        motion, payload = sections["motion"], sections.get("payload", {})
+        units = Units(motion["angle_unit"], motion.get("length_unit", "m"))
+        com = np.array(payload.get("com", (0.0, 0.0, 0.0))) * units.length_scale
+        return cls(
+            name,
+            units,
+            {key: motion[key] for key in ("time", "motion", "kind") if motion.get(key)},
+            sections.get("channels", {}),
+            {joint: Servo(**said) for joint, said in sections.get("servo", {}).items()},
+            (payload["mass"], com) if "mass" in payload else None,
+            sections.get("tolerance", {}),
+        )
+
+
+def read_motion(path: str | Path, *, folder: str | Path | None = None) -> MotionLog:
+    """Command and encoder series of a robot's joints, as for system identification, from a motion.toml.
+
+    Parameters
+    ----------
+    path
+        motion.toml, or the directory that holds it.
+    folder
+        Against which the paths in it are resolved; its own where absent.
+
+    Returns
+    -------
+    MotionLog
+        SI, each channel with its own stamps; what was odd stands in its ``notes``.
+
+    Raises
+    ------
+    CampaignError
+        A file that cannot be used: names file, row and column, what was found and what was expected; or a log that
+        tells nothing of the joints' servos, with the reason.
+    RobotError
+        A robot that cannot be loaded, or has no such frame.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.read_motion("no_such_folder")
+    ... except tr.CampaignError as error:
+    ...     print(error)
+    no_such_folder: there is no such file...
+    """
+    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
+    document = Document(file, KINDS, FILE_NAME)
+    base = file.parent if folder is None else Path(folder)
+    log = document.required("motion", "log")
+    document.required("motion", "angle_unit")
+    tables = [read_table(base / each) for each in ((log,) if isinstance(log, str) else log)]
+    declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections)
+    held = sources(tables, declaration.channels)
+    robot, servos = _robot(document, file, base, _joints_of(held))
+    declaration = replace(declaration, servos={**servos, **declaration.servos})
+    for section in ("servo", "tolerance"):
+        lines = {joint: document.row(section, joint) for joint in document.sections.get(section, {})}
+        check_joints(str(file), section, lines, robot.joint_names, lines)
+    return build_motions(tables, held, declaration, robot)
+
+
+def _robot(document: Document, file: Path, folder: Path, joints: Sequence[str]) -> tuple[Robot, dict[str, Servo]]:
+    """Return the robot, and what its MJCF says of the servos."""
+    said = document.sections.get("robot", {})
+    if ("urdf" in said) == ("mjcf" in said):
+        found = "both" if "urdf" in said else "neither"
+        raise CampaignError(str(file), "which robot it is", column="robot", found=found, expected="urdf or mjcf")
+    servos: dict[str, Servo] = {}
+    reference: str | Path
+    if "mjcf" in said:
+        from thermal_robot.motion.mjcf import gravity_of_mjcf, servos_of_mjcf, urdf_of_mjcf
+
+        mjcf = folder / said["mjcf"]
+        reference, servos = urdf_of_mjcf(mjcf), servos_of_mjcf(mjcf)
+        said = {"gravity": gravity_of_mjcf(mjcf), **said}
+    else:
+        reference = robot_reference(said["urdf"], folder)
+    ends = {"root_frame": said.get("root_frame"), "gravity": said.get("gravity")}
+    if "tool_frame" in said:
+        return stated_robot(file, reference, said["tool_frame"], **ends), servos
+    return _fullest(file, reference, ends, joints), servos
+
+
+def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints: Sequence[str]) -> Robot:
+    """Load the chain, to one of the links at the ends of the tree, that holds most of the joints."""
+    from thermal_robot.kinematics.model import leaf_links
+    from thermal_robot.urdf_text import urdf_text
+
+    described, source, _ = urdf_text(reference)
+    chains = []
+    for leaf in leaf_links(described, source):
+        try:
+            chains.append(stated_robot(file, reference, leaf, **ends))
+        except RobotError:  # a hand beside the arm may have joints of another kind, or none
+            continue
+    if not chains:  # say why
+        return stated_robot(file, reference, "", **ends)
+    return max(chains, key=lambda robot: len(set(joints) & set(robot.joint_names)))
+
+
+def motion_from_table(
+    robot: Robot,
+    table: pd.DataFrame | Sequence[pd.DataFrame],
+    *,
+    angle_unit: str = "rad",
+    length_unit: str = "m",
+    time: str = "",
+    motion: str = "",
+    kind: str = "",
+    channels: Mapping[str, Any] | None = None,
+    servos: Mapping[str, Servo] | None = None,
+    payload: tuple[float, Sequence[float]] | None = None,
+    tolerance: Mapping[str, float] | None = None,
+    name: str = "table",
+) -> MotionLog:
+    """Command and encoder series of a robot's joints, from pandas data frames; columns are those of a motion.toml.
+
+    Parameters
+    ----------
+    robot
+        From :func:`thermal_robot.load_robot`; its chain must hold the joints.
+    table
+        One frame, or several with stamps of their own (command in one, encoder in another).
+    angle_unit, length_unit
+        Units of ``cmd``, ``q`` and ``qd``; ``length_unit`` where a joint slides, and of the payload's centre.
+    time, motion, kind
+        Names of the columns of the stamps, and of the labels of motions and of their type; where left out, those of
+        these names where they are there.
+    channels, servos, tolerance
+        As the sections of a motion.toml.
+    payload
+        Mass, kg, and centre of mass in the frame of the chain's last link.
+    name
+        Of the log.
+
+    Raises
+    ------
+    CampaignError
+        As for a file.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.motion import motion_from_table
+    >>> t = np.arange(0.0, 10.0, 0.02)
+    >>> moved = {"time": t, "cmd.joint_1": np.sin(t), "q.joint_1": 0.98 * np.sin(t - 0.06)}
+    >>> motion_from_table(tr.load_robot("builtin:rv_m2", "tool0"), pd.DataFrame(moved))
+    <MotionLog 'table': 1 motions of 1 joints, 10 s>
+    """
+    import pandas as pd
+
+    call = "motion_from_table()"
+    require(f"{call}, robot", robot, (Robot,), "a robot, as load_robot gives it")
+    frames = [table] if isinstance(table, pd.DataFrame) else list(table)
+    for frame in frames:
+        require(f"{call}, table", frame, (pd.DataFrame,), "pandas DataFrames")
+    tables = [table_from_frame(f, "<table>" if len(frames) == 1 else f"<table {k}>") for k, f in enumerate(frames)]
+    units = Units(angle_unit, length_unit)
+    declaration = Declaration(
+        given(call, "name", name, text(empty=True)),
+        units,
+        {key: column for key, column in (("time", time), ("motion", motion), ("kind", kind)) if column},
+        given(call, "channels", channels or {}, channels_kind),
+        dict(servos or {}),
+        None if payload is None else (float(payload[0]), np.array(payload[1], dtype=float) * units.length_scale),
+        given(call, "tolerance", tolerance or {}, TOLERANCE),
+    )
+    for key, named in (("servos", declaration.servos), ("tolerance", declaration.tolerance)):
+        check_joints(call, key, named, robot.joint_names)
+    return build_motions(tables, sources(tables, declaration.channels), declaration, robot)
+
+
+def _joints_of(held: Sequence[Source]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(source.joint for source in held if source.joint))
+
+
+def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: Declaration, robot: Robot) -> MotionLog:
+    """Validate tables and return the log; what cannot be used is refused with row and column."""
+    joints, notes = _joints(tables, held, robot)
+    clocks = [_Clock.of(table, declaration) for table in tables]
+    _require_labels(tables, clocks)
+    notes += [note for clock in clocks for note in clock.notes]
+    read = {source.column for source in held} | {clock.column for clock in clocks} | set(declaration.labels.values())
+    unread = [c for table in tables for c in table.columns if c not in read and c not in ("motion", "kind")]
+    notes += [f"columns that were not read: {listed(unread, 6)}"] if unread else []
+    channels = {
+        name: _channel(tables, clocks, [s for s in held if s.quantity == q], declaration, robot, joints)
+        for q, name in FIELDS.items()
+    }
+    motions: list[Motion] = []
+    for label in dict.fromkeys(label for clock in clocks for label in clock.order):
+        parts = {name: channel.get(label) for name, channel in channels.items()}
+        if parts["command"] is None or parts["position"] is None:
+            lacking = "command" if parts["command"] is None else "position"
+            notes.append(f"motion {label!r} has no {lacking} and is left out")
+            continue
+        kind = next((clock.kinds[label] for clock in clocks if clock.kinds.get(label)), "")
+        motions += _motions(label or declaration.name, kind, parts, notes)
+    if not motions:
+        files = " and ".join(table.file for table in tables)
+        expected = "motions with both, of the same label and clock"
+        raise CampaignError(files, "no motion has command and position", expected=expected)
+    log = MotionLog(
+        declaration.name,
+        robot,
+        joints,
+        tuple(motions),
+        declaration.servos,
+        declaration.payload,
+        declaration.tolerance,
+        (*(warning for table in tables for warning in table.warnings), *notes),
+    )
+    return refused(log, " and ".join(table.file for table in tables))
+
+
+def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tuple[tuple[str, ...], list[str]]:
+    """Return the joints with command and position, and what is left out; refuse foreign ones and none."""
+    notes = []
+    named: dict[str, set[str]] = {}
+    for source in held:
+        named.setdefault(source.joint, set()).add(source.quantity)
+        if source.joint and source.joint not in (*robot.joint_names, *robot.urdf_joints):
+            table = tables[source.table]
+            problem = f"the robot has no joint {source.joint!r}{did_you_mean(source.joint, robot.joint_names)}"
+            raise table.error(problem, source.column, expected=f"one of {listed(robot.joint_names)}")
+    named.pop("", None)
+    files = " and ".join(table.file for table in tables)
+    both = [joint for joint in robot.joint_names if {"cmd", "q"} <= named.get(joint, set())]
+    if not any("q" in quantities for quantities in named.values()):
+        raise CampaignError(files, "no joint's position is recorded", expected="columns q.<joint>, or [channels]")
+    if not any("cmd" in quantities for quantities in named.values()):
+        problem = "no command is recorded: of an arm that was guided by hand an external force is the cause"
+        raise CampaignError(files, problem, expected="columns cmd.<joint>, or [channels]")
+    if not both:
+        found = f"{listed(named)}; the chain to {robot.tool_frame!r} has {listed(robot.joint_names)}"
+        raise CampaignError(files, "no joint of the chain has command and position", found=found, expected="both")
+    beside = [joint for joint in named if joint not in both]
+    if beside:
+        notes.append(f"left out, not on the chain to {robot.tool_frame!r} or without command or position: "
+                     f"{listed(beside)}")  # fmt: skip
+    return tuple(both), notes
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """Stamps of a table's rows, (N,) s, and to which motion each belongs: (N,) indices into ``order``."""
+
+    column: str
+    time: Array
+    order: tuple[str, ...]
+    index: NDArray[np.int64]
+    kinds: Mapping[str, str]  # of motion, by its label
+    kept: NDArray[np.bool_]  # (N,) rows whose stamp is not that of the row before
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, table: Table, declaration: Declaration) -> _Clock:
+        """Read the clock of a table; refuse rows out of order."""
+        column = declaration.labels.get("time", "time")
+        stated = declaration.channels.get("time", Stated())
+        column = stated.column or column
+        if column not in table.columns:
+            problem = f"has no column of time{did_you_mean(column, table.columns)}"
+            raise table.error(problem, column, expected="stamps of the rows; its name is [motion] time")
+        time = table.numbers(column) * (stated.scale or 1.0)
+        label = declaration.labels.get("motion", "motion")
+        labels = np.array(table.text(label) if label in table.columns else [""] * len(time), dtype=np.str_)
+        found, first, index = np.unique(labels, return_index=True, return_inverse=True)
+        rank = np.argsort(np.argsort(first))
+        order = tuple(str(found[k]) for k in np.argsort(first))
+        kept, notes = _in_order(table, column, time, rank[index])
+        return cls(column, time, order, rank[index], _kinds(table, declaration, order, rank[index]), kept, notes)
+
+
+def _in_order(
+    table: Table, column: str, time: Array, motion: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Return the rows whose stamps are new, and what is said of the others; refuse rows out of order."""
+    rows = np.argsort(motion, kind="stable")
+    step, same = np.diff(time[rows]), np.diff(motion[rows]) == 0
+    back = first_true(same & (step < 0.0))
+    if back is not None:
+        at, before = int(rows[back + 1]), int(rows[back])
+        told = {"found": f"{time[at]:.9g} s after {time[before]:.9g} s", "expected": "stamps that increase in a motion"}
+        raise table.error("rows are out of order, or two motions have one label", column, at, **told)
+    kept = np.ones(len(time), dtype=bool)
+    kept[rows[1:][same & (step == 0.0)]] = False
+    repeated = int((~kept).sum())
+    return kept, (f"{table.file}: {table.told(~kept)} left out: the stamp of the row before",) if repeated else ()
+
+
+def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion: NDArray[np.int64]) -> dict[str, str]:
+    column = declaration.labels.get("kind", "kind")
+    if column not in table.columns:
+        return {}
+    texts = np.array(table.text(column), dtype=np.str_)
+    found = {}
+    for k, label in enumerate(order):
+        rows = np.flatnonzero(motion == k)
+        other = first_true(texts[rows] != texts[rows[0]])
+        if other is not None:
+            told = {"found": repr(str(texts[rows[other]])), "expected": repr(str(texts[rows[0]]))}
+            raise table.error("a motion has two types", column, int(rows[other]), **told)
+        found[label] = str(texts[rows[0]])
+    return found
+
+
+def _require_labels(tables: Sequence[Table], clocks: Sequence[_Clock]) -> None:
+    """Refuse a table without labels beside one with several."""
+    several = any(len(clock.order) > 1 for clock in clocks)
+    for table, clock in zip(tables, clocks, strict=True):
+        if several and clock.order == ("",):
+            expected = "a column that says which motion each row belongs to, as in the other table"
+            raise CampaignError(table.file, "has no labels of motions", expected=expected)
+
+
+def _channel(
+    tables: Sequence[Table],
+    clocks: Sequence[_Clock],
+    held: Sequence[Source],
+    declaration: Declaration,
+    robot: Robot,
+    joints: tuple[str, ...],
+) -> dict[str, Channel]:
+    """Return the samples of a quantity by motion, clocks as recorded; rows in which no joint has any are left out."""
+    kinds_of = dict(zip(robot.joint_names, robot.joint_types, strict=True))
+    parts: dict[str, list[tuple[Array, Array]]] = {}
+    for number, clock in enumerate(clocks):
+        values = np.full((len(clock.time), len(joints)), np.nan)
+        own = [source for source in held if source.table == number]
+        for source in sorted(own, key=lambda each: bool(each.joint)):  # a joint's own column counts for more
+            if source.joint and source.joint not in joints:
+                continue
+            scale = scale_of(source, declaration.channels, declaration.units, kinds_of.get(source.joint, "revolute"))
+            cells = tables[number].numbers(source.column, gaps=True) * scale
+            chosen = joints.index(source.joint) if source.joint else slice(None)
+            values[:, chosen] = cells if source.joint else cells[:, None]
+        some = clock.kept & ~np.isnan(values).all(axis=1)
+        for k, label in enumerate(clock.order if some.any() else ()):
+            rows = np.flatnonzero(some & (clock.index == k))
+            if len(rows):
+                parts.setdefault(label, []).append((clock.time[rows], values[rows]))
+    return {label: _merged(several) for label, several in parts.items()}
+
+
+def _merged(parts: Sequence[tuple[Array, Array]]) -> Channel:
+    """Return the samples of one or several tables in the order of their stamps."""
+    if len(parts) == 1:
+        return _frozen(*parts[0])
+    time = np.unique(np.concatenate([stamps for stamps, _ in parts]))
+    values = np.full((len(time), parts[0][1].shape[1]), np.nan)
+    for stamps, own in parts:
+        at = np.searchsorted(time, stamps)
+        values[at] = np.where(np.isnan(own), values[at], own)
+    return _frozen(time, values)
+
+
+def _frozen(time: Array, values: Array) -> Channel:
+    time.setflags(write=False)
+    values.setflags(write=False)
+    return Channel(time, values)
+
+
+def _motions(label: str, kind: str, parts: Mapping[str, Channel | None], notes: list[str]) -> Iterator[Motion]:
+    """Yield the uninterrupted parts of a motion, from the first stamp on; say what is too short."""
+    position = parts["position"]
+    assert position is not None
+    breaks = np.flatnonzero(np.diff(position.time) > LONGEST_GAP)
+    edges = [-np.inf, *((position.time[k] + position.time[k + 1]) / 2.0 for k in breaks), np.inf]
+    if len(breaks):
+        notes.append(f"motion {label!r} is interrupted {len(breaks)} times and counts as {len(breaks) + 1}")
+    for k, (begin, end) in enumerate(itertools.pairwise(edges)):
+        name = label if k == 0 else f"{label} ({k + 1})"
+        cut = {key: _cut(channel, begin, end) for key, channel in parts.items() if channel is not None}
+        own = {key: channel for key, channel in cut.items() if len(channel.time)}
+        if any(key not in own or len(own[key].time) < FEWEST_SAMPLES for key in ("command", "position")):
+            notes.append(f"motion {name!r} has fewer than {FEWEST_SAMPLES} samples and is left out")
+            continue
+        zero = min(float(channel.time[0]) for channel in own.values())
+        began = {key: _frozen(channel.time - zero, channel.values) for key, channel in own.items()}
+        yield Motion(name, kind, **{key: began.get(key) for key in FIELDS.values()})  # type: ignore[arg-type]
+
+
+def _cut(channel: Channel, begin: float, end: float) -> Channel:
+    inside = slice(*np.searchsorted(channel.time, [begin, end]))
+    return Channel(channel.time[inside], channel.values[inside])

@@ -1,0 +1,80 @@
+"""Logs that tell nothing of the joints' servos, refused with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.names import listed
+from thermal_robot.errors import CampaignError
+from thermal_robot.motion.following import Moves, at, usual_step
+from thermal_robot.motion.log import Motion, MotionLog
+from thermal_robot.motion.settings import FOREIGN, LEAST_RATE, LONGEST_LAG, NO_LAG, STILL_COMMAND
+
+
+def refused(log: MotionLog, files: str) -> MotionLog:
+    """Return the log with notes on what is doubtful; refuse one that tells nothing, naming its files."""
+    _refuse_slow(log, files)
+    guided = [motion.name for motion in log.motions if _foreign(motion) > FOREIGN]
+    copied = [motion.name for motion in log.motions if _copied(motion)]
+    if len({*guided, *copied}) == len(log.motions):
+        how = "the command is the encoder's own reading" if copied else "the joints move while the command stands still"
+        problem = f"{how}: an external force, such as a hand that guides the arm, moved it, and no servo"
+        raise CampaignError(files, problem, expected="motions that follow a command")
+    notes = list(log.notes)
+    if guided or copied:
+        notes.append(f"moved by an external force and not by their commands: the motions {listed([*guided, *copied])}")
+    if _fed_forward(log):
+        problem = "the joints follow their commands without the lag of a position servo: feed-forward unknown"
+        if all(motion.torque is None for motion in log.motions):
+            expected = "columns tau.<joint>, or [servo.<joint>] kp where it is a position servo"
+            raise CampaignError(files, f"{problem}; a cascaded controller's gap tells no effect", expected=expected)
+        notes.append(f"{problem}; the torque tells, and the gap does not")
+    return replace(log, notes=tuple(notes))
+
+
+def _refuse_slow(log: MotionLog, files: str) -> None:
+    rate = 1.0 / float(np.median([usual_step(motion.position) for motion in log.motions]))
+    if rate < LEAST_RATE:
+        raise CampaignError(files, "is sampled too slowly", found=f"{rate:.3g} Hz", expected="at least 30 Hz")
+
+
+def _foreign(motion: Motion) -> float:
+    """Share of the square of the measured moves that comes while no command has moved; 0 where nothing moves."""
+    moves = Moves.of(motion)
+    moving = np.abs(moves.commanded).max(axis=1) > STILL_COMMAND
+    reach = int(np.ceil(LONGEST_LAG / moves.step))
+    near = np.convolve(moving, np.ones(2 * reach + 1), "same") > 0.5
+    energy = (moves.measured**2).sum(axis=1)
+    return float(energy[~near].sum() / max(energy.sum(), 1e-12))
+
+
+def _copied(motion: Motion) -> bool:
+    """Whether the command is what the encoder read at that instant or before."""
+    q, moved = at(motion.position, motion.command.time), np.ptp(motion.position.values, axis=0) > STILL_COMMAND
+    same = np.isclose(q, motion.command.values, rtol=0.0, atol=1e-9) | np.isnan(motion.command.values)
+    return bool(moved.any() and same[:, moved].all())
+
+
+def _fed_forward(log: MotionLog) -> bool:
+    """Whether every joint that moves, and whose servo is not stated, follows its command without a lag."""
+    lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
+    lags = lags[:, [log.servos.get(joint) is None or log.servos[joint].kp is None for joint in log.joints]]
+    moving = ~np.isnan(lags).all(axis=0)
+    return bool(moving.any()) and bool((np.abs(np.nanmedian(lags[:, moving], axis=0)) < NO_LAG).all())
+
+
+def _lags(motion: Motion) -> Array:
+    """(joints,) s by which the position lags: regression of the gap on commanded position and velocity."""
+    times = motion.position.time
+    command, q = at(motion.command, times), motion.position.values
+    speed = np.gradient(command, times, axis=0)
+    lags = np.full(q.shape[1], np.nan)
+    for j in range(q.shape[1]):
+        kept = ~np.isnan(q[:, j] + command[:, j])
+        if np.ptp(command[kept, j], axis=0) > 100.0 * STILL_COMMAND if kept.any() else False:
+            columns = np.column_stack([np.ones(kept.sum()), command[kept, j], speed[kept, j]])
+            lags[j] = -np.linalg.lstsq(columns, q[kept, j] - command[kept, j], rcond=None)[0][2]
+    return lags
