@@ -54,6 +54,9 @@ EFFECTS = (
                 spread=UNSOURCED),
 )  # fmt: skip
 
+TITLES = {effect.name: effect.title for effect in EFFECTS}
+SHARED_TITLES = {"payload": "payload or masses", "contact": "contact of the tool with a plane"}
+
 
 def size(effect: ServoEffect, servo: Servo) -> float:
     """Return the expected size of an effect in one joint, in its unit."""

@@ -28,9 +28,11 @@ class Point:
     noise: Array
 
     @classmethod
-    def at(cls, model: ServoModel, values: Array) -> Point:
-        """Linearise the model at some values."""
-        rows = model.all_rows(values)
+    def at(
+        cls, model: ServoModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None
+    ) -> Point:
+        """Linearise the model at some values by the parameters ``wanted``, unless the rows are known."""
+        rows = model.all_rows(values, wanted) if rows is None else rows
         noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
         return cls(values, rows, noise)
 
@@ -49,21 +51,33 @@ class Point:
         return matrix, vector
 
 
-def fit(model: ServoModel, values: Array, active: Mask, sizes: Array, noise: Array | None = None) -> Array:
+def fit(
+    model: ServoModel,
+    values: Array,
+    active: Mask,
+    sizes: Array,
+    motions: Mask | None = None,
+    rows: list[Rows] | None = None,
+) -> Array:
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
-    ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading.
+    ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading. ``motions``
+    (M,) are those that are fitted, by default all; ``rows`` the model at the values, where it is known.
     """
     own = np.flatnonzero(active)
     values = np.where(active, values, 0.0)
     lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
     shared = any(model.parameters[p].joint == SHARED for p in own)
     joint_of = np.array([one.joint for one in model.parameters])
-    for _ in range(settings.ROUNDS):
-        point = Point.at(model, values)
-        matrix, vector = (one.sum(axis=0) for one in point.products())
+    motions = np.ones(len(model.log.motions), dtype=bool) if motions is None else motions
+    used = [motions[model.motion_of(joint)] for joint in model.joints]
+    for number in range(settings.ROUNDS):
+        point = Point.at(model, values, active, rows if number == 0 else None)
+        matrix, vector = (one[motions].sum(axis=0) for one in point.products())
         tight = np.diag(sizes[own] ** -2.0)
-        before = np.array([len(one.residual) for one in point.rows], dtype=float)
+        before = np.array(
+            [(one.residual[u] ** 2).sum() / n**2 for one, u, n in zip(point.rows, used, point.noise, strict=True)]
+        )
         ahead = []
         for damping in settings.DAMPINGS:
             whole = matrix[np.ix_(own, own)]
@@ -74,7 +88,10 @@ def fit(model: ServoModel, values: Array, active: Mask, sizes: Array, noise: Arr
             ahead.append(values.copy())
             ahead[-1][own] = step
         best, gained = values.copy(), 0.0
-        costs = np.stack(model.each(lambda j: (model.residuals(j, np.array(ahead)) ** 2).sum(axis=1) / point.noise[j] ** 2))
+        sets, noise = np.array(ahead), point.noise
+        costs = np.stack(
+            model.each(lambda j, s=sets, n=noise: (model.residuals(j, s)[:, used[j]] ** 2).sum(axis=1) / n[j] ** 2)
+        )
         if shared:
             k = int(np.argmin(costs.sum(axis=0)))
             gained = float(before.sum() - costs[:, k].sum())

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from thermal_robot.motion.effects import EFFECTS, size
 from thermal_robot.motion.loads import Dynamics
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHARED = -1
 """Joint of a parameter that all joints share."""
@@ -204,23 +207,63 @@ class ServoModel:
         simulated = self.positions(joint, values)
         return np.asarray(measured - (1.0 - beyond) * simulated[:, at] - beyond * simulated[:, at + 1])
 
-    def rows(self, joint: int, values: Array) -> Rows:
-        """Residual and derivatives of a joint at the parameters (P,), by forward differences."""
-        own = np.array([p for p, x in enumerate(self.parameters) if x.joint in (joint, SHARED)])
+    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+        """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
+        places = [p for p, x in enumerate(self.parameters) if x.joint in (joint, SHARED)]
+        own = np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         found = self.residuals(joint, sets)
         return Rows(found[0], (found[0] - found[1:]).T / steps, own, self._samples[joint][3])
 
+    def motion_of(self, joint: int) -> NDArray[np.int64]:
+        """(N,) number of the motion of each reading of a joint."""
+        return self._samples[joint][3]
+
+    def noise(self, joint: int) -> float:
+        """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""
+        steps = np.abs(np.diff(np.unique(np.round(self._samples[joint][0], 9))))
+        return max(float(np.median(steps)) / np.sqrt(12.0) if len(steps) else 0.0, settings.LEAST_NOISE)
+
+    def quantities(self, joint: int) -> dict[str, Array]:
+        """(N,) what a joint's residual may follow, at its readings: position, velocity, load and time."""
+        _, at, _, motion = self._samples[joint]
+        velocity = np.gradient(self.about[:, joint], self.step)
+        load = self.loads.torque[0, :, joint]
+        return {
+            f"the position of {self.log.joints[joint]}": self.about[at, joint],
+            "velocity": velocity[at],
+            "load": load[at],
+            "time": self.grid[at] - self.first[motion],
+        }
+
+    def curves(self, joint: int, values: Array) -> pd.DataFrame:
+        """Command, measured and simulated positions of a joint at its readings, rad; simulated without effects, too."""
+        import pandas as pd
+
+        measured, at, beyond, motion = self._samples[joint]
+        left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
+        return pd.DataFrame(
+            {
+                "motion": motion,
+                "time": self.grid[at] + beyond * self.step - self.first[motion],
+                "command": self.commanded[at, joint],
+                "measured": measured,
+                "nominal": measured - left[0],
+                "simulated": measured - left[1],
+                "load": self.loads.torque[0, at, joint],
+            }
+        )
+
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
         with ThreadPoolExecutor(threads()) as pool:
             return list(pool.map(function, range(len(self.log.joints))))
 
-    def all_rows(self, values: Array) -> list[Rows]:
+    def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
         """Residual and derivatives of every joint at the parameters (P,)."""
-        return self.each(lambda joint: self.rows(joint, values))
+        return self.each(lambda joint: self.rows(joint, values, wanted))
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled."""

@@ -23,3 +23,62 @@ external force: an arm that falls back into a stiff joint leaves 0.01, one that 
 NO_LAG = 2e-3
 """s: a position servo lags by its damping over its stiffness, 50 to 100 ms in hobby servos and 10 ms in the stiffest
 simulated ones; a controller that lags by less knows the velocity beforehand."""
+
+STIFFNESS = 1.0 / 0.07
+"""N·m/rad: of a servo whose gain nobody states, from a hobby servo's logs (0.07 rad/(N·m))."""
+TORQUE_LIMIT = 3.0
+"""N·m: of a servo of which nobody states it, that of a hobby servo's data sheet."""
+FASTEST = 5.0
+"""rad/s: of a joint of which the URDF states no velocity."""
+STEP = 4e-3
+"""s: longest time step, a tenth of the shortest lag that is found."""
+COMMON_RATE = 50.0
+"""Hz: of a log without a rate of its own."""
+DIFFERENCE = 0.05
+"""Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
+CLUSTERS, BLOCKS = 8, 20
+"""Motions from which they count as independent; below, the rows are cut into so many blocks, and ± is said to be weak."""
+ROUNDS = 8
+"""Gauss-Newton steps at most of one fit."""
+SETTLED = 1e-4
+"""Of the sum of squares: a smaller gain ends the fit."""
+DAMPINGS = (0.0, 1e-2, 1.0)
+"""Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
+ANGLE_STEP = 1e-4
+"""rad: step by which a load's slope is told; a load is linear over it, and rounding stays below 1e-10 of it."""
+LOAD_STEP = 0.02
+"""rad along the way: loads are linear between configurations so near, to 5e-5 of themselves."""
+LEAST_NOISE = 1e-5
+"""rad: no encoder of a joint is finer; a simulated log may leave nothing."""
+WIDE = 10.0
+"""Times the expected size: prior of the least-squares values that the deflation keeps; it only bounds what is not seen."""
+SEEN = 1e-5
+"""Squared length of a column at its expected size, in units of the noise, below which the data do not see it."""
+PAYLOAD = 0.3
+"""Expected payload over the rated one: the mass that the weakest joint can hold with the arm stretched as it moved."""
+LEAST_STIFFNESS = 0.05
+"""Of the stated stiffness: a servo with less does not hold its arm."""
+LEAST_COMPLIANCE = 1e-3
+"""rad/(N·m): of a joint whose droop is not known yet, where contact divides a force among joints."""
+FEW = 0.999
+"""Quantile of the tracking error from which a saturation is looked for."""
+REFRESHES = 3
+"""Times that loads are taken anew where the joints go, and all effects fitted: the third moves a residual by 1 %."""
+SELECTIONS = 2
+"""Choices among all effects: at the fit of all, then at the exact fit of what was chosen."""
+ODDS = 9.0
+"""Against nothing in its place, from which an effect is kept: nine to one, as for poses."""
+ALIKE = 2.2
+"""Log evidence, nine to one, within which another effect may stand in the place of a chosen one."""
+GATE = 3.0
+"""Times what the other kinds of motion leave: of a kind that leaves more, no verdict is given."""
+FOLDS = 5
+"""Parts of the motions that are held out in turn."""
+BOOTSTRAPS, BOOTSTRAP_SEED = 400, 7
+"""Draws of motions that tell the interval of a shrinkage; the same log always gets the same answer."""
+SURE = 0.9
+"""Probability from which an effect is told for itself, though another could stand in its place."""
+NOISY = 1.5
+"""Times the encoder's noise: what remains below it is that noise."""
+STRUCTURE, LEVELS = 0.1, 10
+"""Share of what remains that a curve must explain in motions held out to be told; and levels of such a curve."""

@@ -1,0 +1,255 @@
+"""One verb for motions: a log goes in, a diagnosis comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.names import did_you_mean
+from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
+from thermal_robot.errors import EffectError
+from thermal_robot.motion import settings
+from thermal_robot.motion.effects import SHARED_TITLES, TITLES
+from thermal_robot.motion.fit import fit
+from thermal_robot.motion.log import MotionLog
+from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
+from thermal_robot.motion.select import Choice, held_out_loss, select
+
+Mask = NDArray[np.bool_]
+ALL = (*TITLES, *SHARED_TITLES)
+
+
+def diagnose_motion(
+    log: MotionLog,
+    *,
+    only: Iterable[str] = (),
+    without: Iterable[str] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> MotionDiagnosis:
+    """System identification by model selection: which effects make the joints leave their command.
+
+    Parameters
+    ----------
+    log
+        Commands and encoders; see :func:`thermal_robot.read_motion`.
+    only, without
+        Names of effects to consider (all where empty), or to leave out.
+    progress
+        Called with a few words at each stage.
+
+    Raises
+    ------
+    EffectError
+        If an effect's name is not known.
+    CampaignError
+        If no joint of the log can be used.
+    """
+    only, without = tuple(only), tuple(without)
+    for name in (*only, *without):
+        if name not in ALL:
+            raise EffectError(f"no effect of motions is called {name!r}{did_you_mean(name, ALL)}")
+    kept = [name for name in ALL if name not in without and (not only or name in only)]
+    model = ServoModel(log)
+    allowed = np.array([one.effect in kept for one in model.parameters])
+    choice = select(model, allowed, progress)
+    refused = _gate(model, choice)
+    if refused:
+        progress("without the motions that nothing explains")
+        motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
+        model = ServoModel(replace(log, motions=motions))
+        choice = select(model, allowed, progress)
+    return _answer(model, choice, refused, tuple(name for name in ALL if name not in kept), progress)
+
+
+def _gate(model: ServoModel, choice: Choice) -> dict[str, float]:
+    """Return kinds of motion of which much more remains than of the others, with how many times as much.
+
+    Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
+    """
+    kinds = np.array([m.kind or m.name for m in model.log.motions])
+    each = np.zeros((len(kinds), len(choice.point.rows)))
+    for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
+        count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
+        each[:, j] = np.bincount(one.motion, (one.residual / noise) ** 2, len(kinds)) / count
+    square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
+    usual = float(np.median(list(square.values())))
+    far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}
+    return far if sum(kinds == k for k in far).sum() * 2 < len(kinds) else {} if far else {}
+
+
+def _nothing(model: ServoModel) -> list[Array]:
+    zero = np.zeros((1, len(model.parameters)))
+    return model.each(lambda joint: model.residuals(joint, zero)[0])
+
+
+def _folds(model: ServoModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
+    """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
+    count, found = len(model.log.motions), [one.residual.copy() for one in choice.point.rows]
+    folds = min(settings.FOLDS, count)
+    if folds < 2 or not choice.active.any():
+        return found
+    for fold in range(folds):
+        progress(f"motions held out, part {fold + 1} of {folds}")
+        held = np.arange(count) % folds == fold
+        values = fit(model, choice.point.values, choice.active, choice.sizes, ~held, choice.point.rows)
+        for joint, left in enumerate(model.each(lambda j, v=values: model.residuals(j, v[None])[0])):
+            out = held[choice.point.rows[joint].motion]
+            found[joint][out] = left[out]
+    return found
+
+
+def _answer(
+    model: ServoModel, choice: Choice, refused: dict[str, float], left_out: tuple[str, ...], progress: Any
+) -> MotionDiagnosis:
+    log, point = model.log, choice.point
+    before, held = _nothing(model), _folds(model, choice, progress)
+    noise = [model.noise(j) for j in model.joints]
+    joints = {
+        name: JointGap(rms(before[j]), rms(point.rows[j].residual), rms(held[j]), noise[j])
+        for j, name in enumerate(log.joints)
+    }
+    weights = 1.0 / np.array([max(len(one), 1) for one in before])
+    square = [_by_motion(model, before, weights), _by_motion(model, held, weights)]
+    shrinkage = 1.0 - float(square[1].sum() / max(square[0].sum(), 1e-300))
+    drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(0, len(square[0]), (settings.BOOTSTRAPS, len(square[0])))
+    ratios = 1.0 - square[1][drawn].sum(axis=1) / np.maximum(square[0][drawn].sum(axis=1), 1e-300)
+    low, high = np.quantile(ratios, [0.025, 0.975])
+    total = [float(np.sqrt(one.sum() / len(before))) for one in square]
+    folds = min(settings.FOLDS, len(log.motions))
+    held_out = HeldOut("motion", folds, *total, shrinkage, (float(low), float(high)))
+    findings, shares = _findings(model, choice, before, weights)
+    verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
+    values = {
+        (one.effect, "" if one.joint == SHARED else log.joints[one.joint]): float(point.values[p])
+        for p, one in enumerate(model.parameters)
+        if choice.active[p]
+    }
+    return MotionDiagnosis(
+        log, joints, held_out, findings, verdict, _probability(model, choice), _unexplained(model, choice, noise), values,
+        {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
+        shares=shares,
+    )  # fmt: skip
+
+
+def _by_motion(model: ServoModel, residuals: list[Array], weights: Array) -> Array:
+    """(M,) sums of squares of all joints by motion, each joint's readings weighing one together."""
+    motions = range(len(model.log.motions))
+    return np.asarray(
+        sum(
+            w * np.bincount(model.motion_of(j), one**2, len(motions))
+            for j, (one, w) in enumerate(zip(residuals, weights, strict=True))
+        )
+    )
+
+
+def _probability(model: ServoModel, choice: Choice) -> float:
+    """Posterior probability of exactly the effects of the choice, in whatever joints."""
+    found, weights = choice.search.probabilities()
+    names = [frozenset(model.parameters[b].effect for b in one.blocks) for one in found]
+    best = frozenset(model.parameters[b].effect for b in choice.best.blocks)
+    return min(float(sum(w for n, w in zip(names, weights, strict=True) if n == best)), 1.0)
+
+
+def _findings(
+    model: ServoModel, choice: Choice, before: list[Array], weights: Array
+) -> tuple[tuple[Finding, ...], dict[str, float]]:
+    """Return a finding for every effect, the largest share first, and the share of each joint."""
+    log, point, deviations = model.log, choice.point, choice.deviations()
+    whole = sum(float(w * (one**2).sum()) for one, w in zip(before, weights, strict=True))
+    scale = np.array([point.noise[j] ** 2 * weights[j] for j in model.joints]) / max(whole, 1e-300)
+    base = held_out_loss(point, choice.active, choice.sizes, by_joint=True)
+    share = {}
+    for block in choice.best.blocks:
+        less = choice.active.copy()
+        less[block] = False
+        gain = held_out_loss(point, less, choice.sizes, by_joint=True) - base
+        share[block] = gain.sum(axis=0) * scale
+    found = []
+    for name in ALL:
+        own = [p for p, one in enumerate(model.parameters) if one.effect == name]
+        title = TITLES.get(name) or SHARED_TITLES[name]
+        if not own:
+            found.append(Finding(name, "not_testable", title=title, needs=_needs(name)))
+            continue
+        active = [p for p in own if choice.active[p]]
+        probability = max(choice.probability([p]) for p in own)
+        if not active:
+            found.append(Finding(name, "not_found", probability, 0.0, title=title))
+            continue
+        rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
+        sums = {p: float(share[p].sum()) for p in active}
+        places = [
+            Location("joint", log.joints[model.parameters[p].joint], sums[p])
+            for p in active
+            if model.parameters[p].joint != SHARED
+        ]
+        total = sum(sums.values())
+        estimates = tuple(
+            Estimate(
+                ", ".join(
+                    (one.label, *([log.joints[one.joint]] if one.joint != SHARED else []))
+                ), float(point.values[p]), float(deviations[p]), one.unit, True,
+            )
+            for p in active
+            for one in (model.parameters[p],)
+        )  # fmt: skip
+        status = "confounded" if rivals and probability < settings.SURE else "found"
+        found.append(
+            Finding(
+                name, status, probability, total, None, (), tuple(sorted(rivals)) if status == "confounded" else (),
+                tuple(sorted(places, key=lambda one: -one.share)), estimates, title=title,
+            )
+        )  # fmt: skip
+    found.sort(key=lambda one: (-(one.shrinkage or 0.0), one.status not in ("found", "confounded")))
+    joints = {
+        name: float(weights[j] * ((before[j] ** 2).sum() - (point.rows[j].residual ** 2).sum()) / max(whole, 1e-300))
+        for j, name in enumerate(log.joints)
+    }
+    return tuple(found), joints
+
+
+def _needs(name: str) -> tuple[str, ...]:
+    if name == "kp":
+        return ("servo.kp",)
+    return () if name == "droop" else ("masses in the URDF",)
+
+
+def _unexplained(model: ServoModel, choice: Choice, noise: list[float]) -> Unexplained:
+    """Test what remains against smooth curves of position, velocity, load and time, motions held out."""
+    tested = []
+    for j in model.joints:
+        left, motion = choice.point.rows[j].residual, choice.point.rows[j].motion
+        if rms(left) < settings.NOISY * noise[j]:
+            continue
+        for name, values in model.quantities(j).items():
+            gain = _curve_gain(left, values, motion)
+            tested.append((gain, name, j))
+    flagged = [one for one in tested if one[0] > settings.STRUCTURE]
+    if not flagged:
+        return Unexplained(False, 0.0, 1.0)
+    flagged.sort(reverse=True)
+    worst = flagged[0]
+    name = model.log.joints[worst[2]]
+    reason = f"{100.0 * worst[0]:.0f} % of what remains in {name} follows {worst[1]}"
+    places = tuple(Location("joint", model.log.joints[j], gain) for gain, _, j in flagged[:3])
+    follows = tuple(dict.fromkeys(one[1] for one in flagged))
+    left = float(np.sqrt(np.mean([rms(one.residual) ** 2 for one in choice.point.rows])))
+    return Unexplained(True, left, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
+
+
+def _curve_gain(left: Array, values: Array, motion: NDArray[np.int64]) -> float:
+    """Share of a residual that a curve of ten levels of a quantity explains in motions held out."""
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, settings.LEVELS + 1)[1:-1]))
+    level = np.digitize(values, edges)
+    count = 1 + int(motion.max(initial=0))
+    sums, counts = (np.zeros((count, len(edges) + 1)) for _ in range(2))
+    np.add.at(sums, (motion, level), left)
+    np.add.at(counts, (motion, level), 1.0)
+    rest = (sums.sum(axis=0) - sums) / np.maximum(counts.sum(axis=0) - counts, 1.0)
+    return 1.0 - float(np.sum((left - rest[motion, level]) ** 2) / max(np.sum(left**2), 1e-300))
