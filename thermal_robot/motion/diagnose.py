@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,19 @@ from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
 from thermal_robot.errors import EffectError
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import SHARED_TITLES, TITLES
+from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.model import SHARED, JointModel, ServoModel
+from thermal_robot.motion.torque import TorqueModel
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 Mask = NDArray[np.bool_]
-ALL = (*TITLES, *SHARED_TITLES)
+ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
 
 
 def diagnose_motion(
@@ -55,19 +59,21 @@ def diagnose_motion(
         if name not in ALL:
             raise EffectError(f"no effect of motions is called {name!r}{did_you_mean(name, ALL)}")
     kept = [name for name in ALL if name not in without and (not only or name in only)]
-    model = ServoModel(log)
+    torques = all(motion.torque is not None for motion in log.motions)
+    kind = TorqueModel if torques else ServoModel
+    model = kind(log)
     allowed = np.array([one.effect in kept for one in model.parameters])
     choice = select(model, allowed, progress)
     refused = _gate(model, choice)
     if refused:
         progress("without the motions that nothing explains")
         motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
-        model = ServoModel(replace(log, motions=motions))
+        model = kind(replace(log, motions=motions))
         choice = select(model, allowed, progress)
     return _answer(model, choice, refused, tuple(name for name in ALL if name not in kept), progress)
 
 
-def _gate(model: ServoModel, choice: Choice) -> dict[str, float]:
+def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     """Return kinds of motion of which much more remains than of the others, with how many times as much.
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
@@ -83,12 +89,12 @@ def _gate(model: ServoModel, choice: Choice) -> dict[str, float]:
     return far if sum(kinds == k for k in far).sum() * 2 < len(kinds) else {} if far else {}
 
 
-def _nothing(model: ServoModel) -> list[Array]:
+def _nothing(model: JointModel) -> list[Array]:
     zero = np.zeros((1, len(model.parameters)))
     return model.each(lambda joint: model.residuals(joint, zero)[0])
 
 
-def _folds(model: ServoModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
+def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
     count, found = len(model.log.motions), [one.residual.copy() for one in choice.point.rows]
     folds = min(settings.FOLDS, count)
@@ -105,7 +111,7 @@ def _folds(model: ServoModel, choice: Choice, progress: Callable[[str], None]) -
 
 
 def _answer(
-    model: ServoModel, choice: Choice, refused: dict[str, float], left_out: tuple[str, ...], progress: Any
+    model: JointModel, choice: Choice, refused: dict[str, float], left_out: tuple[str, ...], progress: Any
 ) -> MotionDiagnosis:
     log, point = model.log, choice.point
     before, held = _nothing(model), _folds(model, choice, progress)
@@ -132,12 +138,19 @@ def _answer(
     }
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, _probability(model, choice), _unexplained(model, choice, noise), values,
-        {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
+        {name: _curves(model, j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
         shares=shares,
     )  # fmt: skip
 
 
-def _by_motion(model: ServoModel, residuals: list[Array], weights: Array) -> Array:
+def _curves(model: JointModel, joint: int, values: Array) -> pd.DataFrame:
+    """Return what is drawn of a joint as a table."""
+    import pandas as pd
+
+    return pd.DataFrame(model.drawn(joint, values))
+
+
+def _by_motion(model: JointModel, residuals: list[Array], weights: Array) -> Array:
     """(M,) sums of squares of all joints by motion, each joint's readings weighing one together."""
     motions = range(len(model.log.motions))
     return np.asarray(
@@ -148,7 +161,7 @@ def _by_motion(model: ServoModel, residuals: list[Array], weights: Array) -> Arr
     )
 
 
-def _probability(model: ServoModel, choice: Choice) -> float:
+def _probability(model: JointModel, choice: Choice) -> float:
     """Posterior probability of exactly the effects of the choice, in whatever joints."""
     found, weights = choice.search.probabilities()
     names = [frozenset(model.parameters[b].effect for b in one.blocks) for one in found]
@@ -157,7 +170,7 @@ def _probability(model: ServoModel, choice: Choice) -> float:
 
 
 def _findings(
-    model: ServoModel, choice: Choice, before: list[Array], weights: Array
+    model: JointModel, choice: Choice, before: list[Array], weights: Array
 ) -> tuple[tuple[Finding, ...], dict[str, float]]:
     """Return a finding for every effect, the largest share first, and the share of each joint."""
     log, point, deviations = model.log, choice.point, choice.deviations()
@@ -173,7 +186,7 @@ def _findings(
     found = []
     for name in ALL:
         own = [p for p, one in enumerate(model.parameters) if one.effect == name]
-        title = TITLES.get(name) or SHARED_TITLES[name]
+        title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
         if not own:
             found.append(Finding(name, "not_testable", title=title, needs=_needs(name)))
             continue
@@ -220,7 +233,7 @@ def _needs(name: str) -> tuple[str, ...]:
     return () if name == "droop" else ("masses in the URDF",)
 
 
-def _unexplained(model: ServoModel, choice: Choice, noise: list[float]) -> Unexplained:
+def _unexplained(model: JointModel, choice: Choice, noise: list[float]) -> Unexplained:
     """Test what remains against smooth curves of position, velocity, load and time, motions held out."""
     tested = []
     for j in model.joints:

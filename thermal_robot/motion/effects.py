@@ -55,7 +55,16 @@ EFFECTS = (
 )  # fmt: skip
 
 TITLES = {effect.name: effect.title for effect in EFFECTS}
-SHARED_TITLES = {"payload": "payload or masses", "contact": "contact of the tool with a plane"}
+SHARED_TITLES = {
+    "payload": "payload",
+    "contact": "contact of the tool with a plane",
+    "masses": "masses of the links",
+}
+TORQUE_TITLES = {
+    "offset": "offsets of the torque channel",
+    "viscous": "viscous friction",
+    "torque_constant": "the torque channel's constant",
+}
 
 
 def size(effect: ServoEffect, servo: Servo) -> float:

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import Gram
 from thermal_robot.motion import settings
-from thermal_robot.motion.model import SHARED, Rows, ServoModel
+from thermal_robot.motion.model import SHARED, Rows, JointModel
 
 Mask = NDArray[np.bool_]
 
@@ -29,7 +29,7 @@ class Point:
 
     @classmethod
     def at(
-        cls, model: ServoModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None
+        cls, model: JointModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None
     ) -> Point:
         """Linearise the model at some values by the parameters ``wanted``, unless the rows are known."""
         rows = model.all_rows(values, wanted) if rows is None else rows
@@ -52,7 +52,7 @@ class Point:
 
 
 def fit(
-    model: ServoModel,
+    model: JointModel,
     values: Array,
     active: Mask,
     sizes: Array,
@@ -135,7 +135,7 @@ def ratios(point: Point) -> Array:
     return found
 
 
-def deflated(model: ServoModel, point: Point, deflation: Array) -> tuple[Gram, list[tuple[str, int]]]:
+def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, list[tuple[str, int]]]:
     """Normal equations in units of prior sizes in which each parameter's information is that of its motions.
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Returns the blocks' effect and joint.

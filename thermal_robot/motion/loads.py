@@ -59,10 +59,11 @@ class Dynamics:
             whole[at : at + width] = value if width == 1 else (np.cos(value), np.sin(value))
         return np.asfortranarray(whole)
 
-    def along(self, q: Array, v: Array | None = None, a: Array | None = None) -> Loads:
+    def along(self, q: Array, v: Array | None = None, a: Array | None = None, whole: bool = False) -> Loads:
         """Return the loads along configurations (n, J), at rest unless velocities and accelerations are given.
 
-        At rest they are computed a small turn apart, and linear between.
+        At rest they are computed a small turn apart, and linear between. A joint's own acceleration is not in them, as
+        it is the servo's business, unless they are ``whole``.
         """
         if v is None and len(q) > 1:
             way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
@@ -76,11 +77,12 @@ class Dynamics:
         units = [np.broadcast_to(np.arange(len(joints)) == j, q.shape).astype(float) for j in joints]
         each = [self._torques(k, q, v, a) for k in range(len(self._pools))]
         torque = np.stack([each[0], *(one - each[0] for one in each[1:])])
+        if whole:
+            return Loads(torque, np.zeros_like(torque), rest)
         inertia, still = np.zeros_like(torque), [self._torques(k, q, rest, rest) for k in (0, 1)]
         for j in joints:
             one, more = (self._torques(k, q, rest, units[j])[:, j] - still[k][:, j] for k in (0, 1))
             inertia[0, :, j], inertia[1, :, j] = one, more - one
-        # the joint's own acceleration is the servo's business
         torque[:2] -= inertia[:2] * a
         step = settings.ANGLE_STEP
         moved = [self._torques(0, q + step * units[j], rest, rest)[:, j] - still[0][:, j] for j in joints]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,6 @@ from thermal_robot.motion.effects import EFFECTS, size
 from thermal_robot.motion.loads import Dynamics
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SHARED = -1
 """Joint of a parameter that all joints share."""
@@ -50,17 +47,57 @@ class Rows:
     motion: NDArray[np.int64]
 
 
-class ServoModel:
+class JointModel:
+    """What all models of a log's joints share: parameters by name, and work on several joints at a time."""
+
+    parameters: tuple[Parameter, ...] = ()
+    unit = "rad"
+
+    def __init__(self, log: MotionLog) -> None:
+        self.log, self.joints = log, range(len(log.joints))
+
+    def index(self, effect: str, joint: int = SHARED) -> int | None:
+        """Return the place of a parameter, ``None`` where the model has none of it."""
+        found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
+        return found[0] if found else None
+
+    def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+        """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
+        places = [p for p, one in enumerate(self.parameters) if one.joint in (joint, SHARED)]
+        return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
+
+    def rated(self, torque: Array) -> float:
+        """Expected payload, kg: a share of what the weakest joint can hold, by the torques (n, J) of one kilogram."""
+        most = np.abs(torque).max(axis=0)
+        servos = [self.log.servos.get(name, Servo()) for name in self.log.joints]
+        limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in servos])
+        return settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
+
+    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+        """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
+        raise NotImplementedError
+
+    def each(self, function: Callable[[int], Any]) -> list[Any]:
+        """Return a function of every joint's number, several at a time."""
+        with ThreadPoolExecutor(threads()) as pool:
+            return list(pool.map(function, self.joints))
+
+    def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
+        """Residual and derivatives of every joint at the parameters (P,)."""
+        return self.each(lambda joint: self.rows(joint, values, wanted))
+
+
+class ServoModel(JointModel):
     """Residual and derivative of a log's encoder readings by the parameters of the servo model.
 
     Parameters of one joint are independent of those of another, but for the loads that masses bring.
     """
 
     def __init__(self, log: MotionLog) -> None:
-        self.log, self.dynamics = log, Dynamics(log)
+        super().__init__(log)
+        self.dynamics = Dynamics(log)
         self.servos = [log.servos.get(name, Servo()) for name in log.joints]
         self.coupled = all(servo.kp for servo in self.servos)
-        self.joints = range(len(log.joints))
         self._grids()
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
         self.about = np.stack([np.clip(self.commanded[:, j], *self._range(j)) for j in self.joints], axis=1)
@@ -135,18 +172,10 @@ class ServoModel:
             if e.number not in (("droop",) if servo.kp else ("kp",))
         ]
         if self.log.robot.has_masses:
-            most = np.abs(self.loads.torque[1]).max(axis=0)
-            limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
-            rated = float(np.min(limits[most > 0.0] / most[most > 0.0], initial=np.inf))
-            if np.isfinite(rated):
-                found.append(Parameter("payload", SHARED, "mass", "kg", settings.PAYLOAD * rated, 1.0, False, "payload"))
+            size_of = self.rated(self.loads.torque[1])
+            found.append(Parameter("payload", SHARED, "mass", "kg", size_of, 1.0, False, "payload"))
             found.append(Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact"))
         return tuple(found)
-
-    def index(self, effect: str, joint: int = SHARED) -> int | None:
-        """Return the place of a parameter, ``None`` where the model has none of it."""
-        found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
-        return found[0] if found else None
 
     def start(self) -> Array:
         """(P,) values from which all effects are fitted: those of most, and stops and limits where the joint ends."""
@@ -209,8 +238,7 @@ class ServoModel:
 
     def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
-        places = [p for p, x in enumerate(self.parameters) if x.joint in (joint, SHARED)]
-        own = np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
+        own = self.own(joint, wanted)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
@@ -238,32 +266,15 @@ class ServoModel:
             "time": self.grid[at] - self.first[motion],
         }
 
-    def curves(self, joint: int, values: Array) -> pd.DataFrame:
+    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
         """Command, measured and simulated positions of a joint at its readings, rad; simulated without effects, too."""
-        import pandas as pd
-
         measured, at, beyond, motion = self._samples[joint]
         left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        return pd.DataFrame(
-            {
-                "motion": motion,
-                "time": self.grid[at] + beyond * self.step - self.first[motion],
-                "command": self.commanded[at, joint],
-                "measured": measured,
-                "nominal": measured - left[0],
-                "simulated": measured - left[1],
-                "load": self.loads.torque[0, at, joint],
-            }
-        )
-
-    def each(self, function: Callable[[int], Any]) -> list[Any]:
-        """Return a function of every joint's number, several at a time."""
-        with ThreadPoolExecutor(threads()) as pool:
-            return list(pool.map(function, range(len(self.log.joints))))
-
-    def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
-        """Residual and derivatives of every joint at the parameters (P,)."""
-        return self.each(lambda joint: self.rows(joint, values, wanted))
+        return {
+            "motion": motion, "time": self.grid[at] + beyond * self.step - self.first[motion],
+            "command": self.commanded[at, joint], "measured": measured, "nominal": measured - left[0],
+            "simulated": measured - left[1], "load": self.loads.torque[0, at, joint],
+        }  # fmt: skip
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled."""

@@ -14,7 +14,7 @@ from thermal_robot.inference.search import Search
 from thermal_robot.inference.settings import PRIOR_PROBABILITY
 from thermal_robot.motion import settings
 from thermal_robot.motion.fit import Point, deflated, fit, ratios
-from thermal_robot.motion.model import ServoModel
+from thermal_robot.motion.model import JointModel
 
 Mask = NDArray[np.bool_]
 
@@ -64,7 +64,7 @@ class Choice:
         return found
 
 
-def everything(model: ServoModel, allowed: Mask, progress: Callable[[str], None]) -> Array:
+def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Array:
     """Maximum a posteriori values of all effects together, loads taken where the joints go, until both agree."""
     sizes = np.array([one.size for one in model.parameters])
     values = np.where(allowed, model.start(), 0.0)
@@ -75,7 +75,7 @@ def everything(model: ServoModel, allowed: Mask, progress: Callable[[str], None]
     return values
 
 
-def select(model: ServoModel, allowed: Mask, progress: Callable[[str], None]) -> Choice:
+def select(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Choice:
     """Search the effects by evidence at the fit of all, then at the exact fit of the choice, and prune by one rule."""
     sizes = np.array([one.size for one in model.parameters])
     values = everything(model, allowed, progress)
@@ -95,7 +95,7 @@ def select(model: ServoModel, allowed: Mask, progress: Callable[[str], None]) ->
 
 
 def _weighed(
-    model: ServoModel, values: Array, allowed: Mask, sizes: Array, deflation: Array | None, start: Mask | None
+    model: JointModel, values: Array, allowed: Mask, sizes: Array, deflation: Array | None, start: Mask | None
 ) -> Choice:
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
@@ -128,7 +128,7 @@ def held_out_loss(point: Point, active: Mask, sizes: Array, by_joint: bool = Fal
     return each if by_joint else np.asarray(each.sum(axis=1))
 
 
-def _pruned(model: ServoModel, choice: Choice, allowed: Mask, values: Array) -> Choice:
+def _pruned(model: JointModel, choice: Choice, allowed: Mask, values: Array) -> Choice:
     """Drop what has odds below nine to one or harms motions held out, the worst first, and fit what stays exactly."""
     while True:
         least: tuple[float, int] | None = None

@@ -82,3 +82,9 @@ NOISY = 1.5
 """Times the encoder's noise: what remains below it is that noise."""
 STRUCTURE, LEVELS = 0.1, 10
 """Share of what remains that a curve must explain in motions held out to be told; and levels of such a curve."""
+MOST_PAYLOAD = 100.0
+"""kg: where no joint feels a payload."""
+SMOOTHED = 0.1
+"""s: window of the local cubics that differentiate positions; shorter than a joint's accelerations, long beside counts."""
+PRANDTL = 4e-3
+"""rad over which a joint's friction builds up when it turns back: what public logs of arms show."""
