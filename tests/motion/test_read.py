@@ -133,7 +133,8 @@ def _fed_forward(state, command):
 
 
 def _without_labels(state, command):
-    return state, command.drop(columns="motion")
+    command = command.drop(columns="motion")
+    return state, command.assign(time=0.02 * command.index)
 
 
 @pytest.mark.parametrize(
@@ -144,9 +145,10 @@ def _without_labels(state, command):
         (_no_command, 1, "no command is recorded"),
         (_by_hand, 2, "external force"),
         (_copied, 1, "external force"),
-        (_slow, 1, "sampled too slowly; found 16.7 Hz"),
+        (_slow, 1, "sampled too slowly; found 16.6 Hz"),
         (_fed_forward, 1, "feed-forward unknown"),
         (_without_labels, 2, "has no labels of motions"),
+        (lambda state, command: (state, command.drop(columns="motion")), 2, "or two motions have one label"),
     ],
 )
 def test_a_log_that_tells_nothing_is_refused_with_the_reason(spoil, motions, said):

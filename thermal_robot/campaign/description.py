@@ -22,10 +22,10 @@ _MOST_SESSIONS = 8  # Sessions named in one line; more would not fit beside each
 def text(campaign: Any) -> str:
     """Return blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
     blocks = [
-        [f"Campaign {campaign.name}", *_aligned(_facts(campaign))],
-        ["Joints", *_aligned(_joints(campaign))],
-        ["Conditions recorded", *_aligned(_covariates(campaign)), *_not_recorded(campaign)],
-        ["Repetition", *_aligned(_repetition(campaign))],
+        [f"Campaign {campaign.name}", *aligned(_facts(campaign))],
+        ["Joints", *aligned(_joints(campaign))],
+        ["Conditions recorded", *aligned(_covariates(campaign)), *_not_recorded(campaign)],
+        ["Repetition", *aligned(_repetition(campaign))],
         ["Warnings", *([f"  - {warning}" for warning in campaign.warnings] or ["  none"])],
     ]
     return "\n\n".join("\n".join(block) for block in blocks)
@@ -162,7 +162,7 @@ def _range(low: float, high: float) -> str:
     return f"{low:.6g} .. {high:.6g}"
 
 
-def _aligned(rows: Iterator[Sequence[str]]) -> list[str]:
+def aligned(rows: Iterator[Sequence[str]]) -> list[str]:
     """Return the rows as lines, indented, every column as wide as its widest cell."""
     table = list(rows)
     columns = max(len(row) for row in table)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import SMALLEST
@@ -66,6 +66,8 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "gears": kinds.GEARS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
+Kinds: TypeAlias = Mapping[str, "Mapping[str, Kind] | Kind"]
+"""What each key of each section may be; of a section whose keys are the user's own, what the whole may be."""
 FILE_NAME = "campaign.toml"
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
 
@@ -74,18 +76,16 @@ class Document:
     """A parsed TOML file together with its text, so that an error can name the line.
 
     ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``kinds`` says
-    what each key of each section may be; of a section whose keys are the user's own, what the whole may be.
-    ``name`` is what such a file is usually called.
+    what each key of each section may be; of a section whose keys are the user's own, what the whole may be. ``data`` is
+    what stands there as it is, ``name`` is what such a file is usually called.
     """
 
-    def __init__(
-        self, file: Path, kinds: Mapping[str, Mapping[str, Kind] | Kind] = KINDS, name: str = FILE_NAME
-    ) -> None:
+    def __init__(self, file: Path, kinds: Kinds = KINDS, name: str = FILE_NAME) -> None:
         self.file, self.kinds, self.name = str(file), kinds, name
-        self.text, data = self._parsed(file)
-        for section, content in data.items():
+        self.text, self.data = self._parsed(file)
+        for section, content in self.data.items():
             self._refuse_unknown(section, content)
-        self.sections = {section: self._fitted(section, content) for section, content in data.items()}
+        self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
 
     def _parsed(self, file: Path) -> tuple[str, dict[str, Any]]:
         try:
@@ -164,6 +164,12 @@ class Document:
         except MisfitError as error:
             expected = error.expected
         raise self._error("is missing", section, column=f"{section}.{key}", expected=f"{expected} under [{section}]")
+
+
+def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values by section and key as the kinds want them; a :class:`MisfitError` tells another."""
+    whole = {s: record(k, may_lack=k) if isinstance(k, Mapping) else k for s, k in kinds.items()}
+    return {section: whole[section](content, section) for section, content in sections.items()}
 
 
 _MOST_NAMED = 5  # campaigns of a folder in one sentence

@@ -21,8 +21,16 @@ if TYPE_CHECKING:
 
 
 def check(options: argparse.Namespace) -> None:
-    """Read a campaign and describe it."""
-    tell(options, describe(read(options)))
+    """Read a campaign, or a log of motion, and describe it."""
+    from thermal_robot.motion.read import declares_motion
+
+    if not declares_motion(Path(options.campaign)):
+        return tell(options, describe(read(options)))
+    from thermal_robot.motion import find_faults, read_motion
+    from thermal_robot.motion.description import text
+
+    log = read_motion(options.campaign, folder=Path() if options.piped else None)
+    return tell(options, text(log, find_faults(log)))
 
 
 def effects(options: argparse.Namespace) -> None:

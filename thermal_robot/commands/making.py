@@ -40,7 +40,10 @@ def import_files(options: argparse.Namespace) -> None:
     """Import the files and say what became of them."""
     from thermal_robot.campaign.importers.plan import Plan, planned, read_mapping
     from thermal_robot.campaign.importers.run import import_files
+    from thermal_robot.motion.importers import MOTION_FORMATS
 
+    if options.format in MOTION_FORMATS:
+        return _import_motion(options)
     ends = dict(zip(("urdf", *ENDS), (options.robot, options.tool, options.root), strict=True))
     said = {
         "robot": {**ends, "kinematics": options.kinematics},
@@ -49,7 +52,23 @@ def import_files(options: argparse.Namespace) -> None:
     stated = {section: {k: v for k, v in content.items() if v is not None} for section, content in said.items()}
     plan = planned(stated).over(read_mapping(Path(options.mapping)) if options.mapping else Plan())
     done = import_files(options.format, [Path(file) for file in options.files], Path(options.output), plan)
-    tell(options, f"{options.format}: {'; '.join(done.notes)}; written to {done.file}")
+    return tell(options, f"{options.format}: {'; '.join(done.notes)}; written to {done.file}")
+
+
+def _import_motion(options: argparse.Namespace) -> None:
+    from thermal_robot.motion.importers import import_motion
+
+    kind = "mjcf" if (options.robot or "").endswith(".xml") else "urdf"
+    ends = zip((kind, *ENDS), (options.robot, options.tool, options.root), strict=True)
+    log, file, notes = import_motion(
+        options.format,
+        [Path(each) for each in options.files],
+        Path(options.output),
+        robot={key: value for key, value in ends if value is not None},
+        angle_unit=options.angle_unit or "",
+        mapping=Path(options.mapping) if options.mapping else None,
+    )
+    tell(options, f"{options.format}: {'; '.join((repr(log)[1:-1], *notes))}; written to {file}")
 
 
 def paper(options: argparse.Namespace) -> None:

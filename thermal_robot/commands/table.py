@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from thermal_robot.blind import command as blind
+from thermal_robot.campaign.importers.plan import Format
 from thermal_robot.campaign.importers.run import FORMATS
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.errors import CampaignError
 from thermal_robot.fleet.settings import TIME_LIMIT
+from thermal_robot.motion.importers import MOTION_FORMATS, MotionFormat
 from thermal_robot.viewer.settings import PORT
 
 _LAST_PORT = 65535
@@ -144,7 +146,8 @@ _CHOICE = (_effects("--without", "leave effects out", default=[]), _effects("--o
 _ROBOT = "its file, or a robot that comes along, as in campaign.toml"
 _ROOT = _value("LINK", "--root", "where the chain starts; the root of the URDF where left out")
 _TARGET = "the link that carries the target"
-_WIDE = max(map(len, FORMATS))
+ALL_FORMATS: dict[str, Format | MotionFormat] = {**FORMATS, **MOTION_FORMATS}
+_WIDE = max(map(len, ALL_FORMATS))
 _ALL = {"only": None, "without": ()}
 
 COMMANDS = {
@@ -180,7 +183,10 @@ COMMANDS = {
         ],
     ),
     "check": Command(
-        "validate and describe a campaign; nothing is fitted", " campaign.toml", "campaigns:check", [_CAMPAIGN]
+        "validate and describe a campaign, or a motion.toml; nothing is fitted",
+        " campaign.toml",
+        "campaigns:check",
+        [_CAMPAIGN],
     ),
     "effects": Command(
         "list the effects that are considered, and what each needs",
@@ -308,11 +314,11 @@ COMMANDS = {
         ],
     ),
     "import": Command(
-        "make a campaign of other programs' files",
+        "make a campaign, or a log of motion, of other programs' files",
         " table log.csv --mapping mapping.toml -o campaign",
         "making:import_files",
         [
-            _value("FORMAT", "format", "what the files are, see below", choices=FORMATS),
+            _value("FORMAT", "format", "what the files are, see below", choices=ALL_FORMATS),
             _value("FILES", "files", "to read, as many as the format has", nargs="+"),
             _value("DIR", "-o", "--output", "folder of the campaign, made if need be", required=True),
             _value("URDF", "--robot", _ROBOT),
@@ -324,7 +330,9 @@ COMMANDS = {
             _value("F.toml", "--mapping", "what the columns are, and the campaign's declarations"),
         ],
         epilog="formats:\n"
-        + "\n".join(f"  {name:{_WIDE}}  {each.does}\n  {'':{_WIDE}}  {each.files}" for name, each in FORMATS.items()),
+        + "\n".join(
+            f"  {name:{_WIDE}}  {each.does}\n  {'':{_WIDE}}  {each.files}" for name, each in ALL_FORMATS.items()
+        ),
     ),
     "map": Command(
         "map the workspace: scatter, thermal displacement, probability of joining, C_p, clearance",

@@ -1,14 +1,17 @@
-"""How measured moves follow commanded ones: cross-correlation on one clock, per pair of joints."""
+"""How measured moves follow commanded ones: cross-correlation on one clock, for each pair of joints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.motion.log import Channel, Motion
-from thermal_robot.motion.settings import STRIDE
+from thermal_robot.motion.log import Channel, Motion, MotionLog
+from thermal_robot.motion.settings import FEWEST_CLUSTERS, LONGEST_LAG, STRIDE
+
+_SMALL = 1e-12  # rad² below which nothing has moved
 
 
 def at(channel: Channel, times: Array) -> Array:
@@ -31,7 +34,7 @@ def usual_step(channel: Channel) -> float:
 
 @dataclass(frozen=True)
 class Moves:
-    """Moves within :data:`STRIDE` of one motion, commanded and measured, (n, joints) each, every ``step`` s."""
+    """Moves within :data:`STRIDE` of one motion or a part of it, commanded and measured, (n, joints), on one clock."""
 
     step: float
     time: Array  # (n,) s, of the middle
@@ -39,12 +42,99 @@ class Moves:
     measured: Array
 
     @classmethod
-    def of(cls, motion: Motion, measured: Channel | None = None) -> Moves:
-        """Take the moves of a motion on the grid of its encoder; 0 for a joint that has none."""
-        measured = measured or motion.position
-        step = usual_step(measured)
+    def of(cls, motion: Motion, step: float = 0.0) -> Moves:
+        """Take the moves of a motion, by default on the grid of its encoder; 0 for a joint that has none."""
+        measured = motion.position
+        step = step or usual_step(measured)
         half = max(1, round(STRIDE / step / 2.0))
         grid = np.arange(measured.time[0], measured.time[-1] + step / 2.0, step)
         both = (np.nan_to_num(at(channel, grid)) for channel in (motion.command, measured))
         commanded, found = (values[2 * half :] - values[: -2 * half] for values in both)
         return cls(step, grid[half:-half], commanded, found)
+
+    def parts(self, count: int) -> Iterator[Moves]:
+        """Yield as many parts of equal length."""
+        for rows in np.array_split(np.arange(len(self.time)), count):
+            yield replace(self, time=self.time[rows], commanded=self.commanded[rows], measured=self.measured[rows])
+
+
+def clusters(log: MotionLog) -> list[Moves]:
+    """Return the moves of each motion, of a part of each where there are few: what scatters independently."""
+    return [part for motion in log.motions for part in Moves.of(motion).parts(parts(log))]
+
+
+def parts(log: MotionLog) -> int:
+    """Return into how many parts each motion falls, so that there are enough that scatter."""
+    return -(-FEWEST_CLUSTERS // len(log.motions))
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Cross-correlation of the moves, rad²: (L, joints, joints) by lag, measured and commanded joint."""
+
+    lags: Array  # (L,) s
+    sums: Array
+    commanded: Array  # (joints,) sum of squares, and measured
+    measured: Array
+
+    @classmethod
+    def of(cls, moves: Moves, longest: float = LONGEST_LAG) -> Correlation:
+        """Correlate by FFT within the longest lag either way."""
+        size = 1 << (2 * len(moves.time) - 1).bit_length()
+        reach = min(round(longest / moves.step), len(moves.time) - 1)
+        u, q = (np.fft.rfft(values, size, axis=0) for values in (moves.commanded, moves.measured))
+        shifts = np.arange(-reach, reach + 1)
+        each = [np.fft.irfft(np.conj(u) * q[:, [i]], size, axis=0)[shifts] for i in range(q.shape[1])]
+        sums = np.stack(each, axis=1).astype(np.float64)
+        return cls(
+            np.array(shifts * moves.step, dtype=np.float64),
+            sums,
+            (moves.commanded**2).sum(axis=0),
+            (moves.measured**2).sum(axis=0),
+        )
+
+    @property
+    def peaks(self) -> Array:
+        """(joints, joints) sum of the largest size, signed, of each measured and commanded joint."""
+        best = np.abs(self.sums).argmax(axis=0)
+        return np.asarray(np.take_along_axis(self.sums, best[None], axis=0)[0])
+
+    @property
+    def explained(self) -> Array:
+        """(joints, joints) rad²: part of the measured moves' square that each command explains."""
+        return self.peaks**2 / np.maximum(self.commanded, _SMALL)
+
+    def best(self) -> tuple[float, float]:
+        """Return the lag, s, at which all measured moves are most like a command's, and the share that is then told.
+
+        Neither a sign nor an exchange of joints matters.
+        """
+        norm = np.sqrt(np.maximum(np.outer(self.measured, self.commanded), _SMALL))
+        told = ((self.sums / norm) ** 2).max(axis=2) @ self.measured / max(self.measured.sum(), _SMALL)
+        k = int(np.clip(told.argmax(), 1, len(told) - 2))
+        before, here, after = told[k - 1 : k + 2]
+        curve = before - 2.0 * here + after
+        shift = 0.5 * (before - after) / curve if curve < 0.0 else 0.0
+        return float(self.lags[k] + np.clip(shift, -1.0, 1.0) * (self.lags[1] - self.lags[0])), float(here)
+
+
+def slope(squares: Array, products: Array) -> tuple[Array, Array]:
+    """Slope through the origin and its standard error by the scatter between clusters (sandwich estimator).
+
+    Parameters
+    ----------
+    squares, products
+        (clusters, k) sums of x·x and of x·y in each cluster.
+
+    Returns
+    -------
+    tuple of ndarray
+        (k,) slopes, NaN where no x; (k,) standard errors.
+    """
+    total = squares.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = np.where(total > _SMALL, products.sum(axis=0) / total, np.nan)
+        scores = products - found * squares
+        count = max(len(squares), 2)
+        errors = np.sqrt((scores**2).sum(axis=0) * count / (count - 1)) / total
+    return found, errors

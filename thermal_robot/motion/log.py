@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from thermal_robot.arrays import Array
 from thermal_robot.robot import Robot
@@ -110,3 +111,8 @@ class MotionLog:
 
 CHANNELS = ("command", "position", "velocity", "torque", "current", "volts", "temperature")
 """Fields of a motion that are channels."""
+
+
+def with_channels(motion: Motion, channels: Mapping[str, Any]) -> Motion:
+    """Return a motion with other channels, by the names of their fields."""
+    return replace(motion, **channels)

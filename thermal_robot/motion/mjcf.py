@@ -7,7 +7,7 @@ each body's frame is shifted there. Geoms, tendons and equalities are left out; 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,6 +49,26 @@ def servos_of_mjcf(file: Path) -> dict[str, Servo]:
             limit = min(limits, default=None)
             found[model.joint(joint).name] = Servo(gain * gear**2, -float(damp) * gear**2 or None, limit)
     return found
+
+
+class Places(NamedTuple):
+    """Where each joint stands in the arrays of ``mjData``: index and scale, by array and joint; and the step, s."""
+
+    arrays: dict[str, dict[str, tuple[int, float]]]
+    step: float
+
+
+def places(file: Path) -> Places:
+    """Return where the joints of an MJCF stand in qpos, qvel, qfrc_actuator and, by position actuators, in ctrl."""
+    model, ctrl = _model(file), {}
+    for k in range(model.nu):
+        joint = model.joint(int(model.actuator_trnid[k, 0])).name
+        if joint in servos_of_mjcf(file):
+            ctrl[joint] = (k, 1.0 / float(model.actuator_gear[k, 0]))
+    single = [k for k in range(model.njnt) if model.jnt_type[k] in (_SLIDE, _HINGE)]
+    q = {model.joint(k).name: (int(model.jnt_qposadr[k]), 1.0) for k in single}
+    v = {model.joint(k).name: (int(model.jnt_dofadr[k]), 1.0) for k in single}
+    return Places({"ctrl": ctrl, "qpos": q, "qvel": v, "qfrc_actuator": v}, float(model.opt.timestep))
 
 
 def urdf_of_mjcf(file: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import check_joints, first_true
+from thermal_robot.campaign.document import FILE_NAME as CAMPAIGN
 from thermal_robot.campaign.document import Document, declared_file, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import name_of, stated_path, stated_robot
@@ -21,6 +23,7 @@ from thermal_robot.campaign.settings import given
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError, RobotError, require
+from thermal_robot.files import is_file, is_folder
 from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, scale_of, sources
 from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo
 from thermal_robot.motion.refuse import refused
@@ -92,6 +95,12 @@ class Declaration:
         )
 
 
+def declares_motion(path: Path) -> bool:
+    """Tell whether a file, or that of a folder, is a motion.toml rather than a campaign.toml."""
+    file = path / FILE_NAME if is_folder(path) and not is_file(path / CAMPAIGN) else path
+    return is_file(file) and re.search(rb"^\s*\[motion\]", file.read_bytes(), re.MULTILINE) is not None
+
+
 def read_motion(path: str | Path, *, folder: str | Path | None = None) -> MotionLog:
     """Command and encoder series of a robot's joints, as for system identification, from a motion.toml.
 
@@ -132,7 +141,7 @@ def read_motion(path: str | Path, *, folder: str | Path | None = None) -> Motion
     tables = [read_table(base / each) for each in ((log,) if isinstance(log, str) else log)]
     declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections)
     held = sources(tables, declaration.channels)
-    robot, servos = _robot(document, file, base, _joints_of(held))
+    robot, servos = robot_of(document.sections.get("robot", {}), file, base, joints_of(held))
     declaration = replace(declaration, servos={**servos, **declaration.servos})
     for section in ("servo", "tolerance"):
         lines = {joint: document.row(section, joint) for joint in document.sections.get(section, {})}
@@ -140,9 +149,10 @@ def read_motion(path: str | Path, *, folder: str | Path | None = None) -> Motion
     return build_motions(tables, held, declaration, robot)
 
 
-def _robot(document: Document, file: Path, folder: Path, joints: Sequence[str]) -> tuple[Robot, dict[str, Servo]]:
-    """Return the robot, and what its MJCF says of the servos."""
-    said = document.sections.get("robot", {})
+def robot_of(
+    said: Mapping[str, Any], file: Path, folder: Path, joints: Sequence[str]
+) -> tuple[Robot, dict[str, Servo]]:
+    """Return the robot of the section ``[robot]``, and what its MJCF says of the servos."""
     if ("urdf" in said) == ("mjcf" in said):
         found = "both" if "urdf" in said else "neither"
         raise CampaignError(str(file), "which robot it is", column="robot", found=found, expected="urdf or mjcf")
@@ -252,7 +262,8 @@ def motion_from_table(
     return build_motions(tables, sources(tables, declaration.channels), declaration, robot)
 
 
-def _joints_of(held: Sequence[Source]) -> tuple[str, ...]:
+def joints_of(held: Sequence[Source]) -> tuple[str, ...]:
+    """Return the joints that columns name."""
     return tuple(dict.fromkeys(source.joint for source in held if source.joint))
 
 

@@ -20,7 +20,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.checked import first_true, no_orientation
 from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
-from thermal_robot.campaign.document import Document
+from thermal_robot.campaign.document import Document, fitted_sections
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
 from thermal_robot.campaign.recognise import bare, headings, size, wanted
@@ -310,8 +310,7 @@ class Plan:
 
 def planned(sections: Mapping[str, Mapping[str, Any]]) -> Plan:
     """Return the plan that a format brings along, written as a mapping is."""
-    kinds = {s: record(k, may_lack=k) if isinstance(k, Mapping) else k for s, k in KINDS.items()}
-    return Plan("", {section: kinds[section](content, section) for section, content in sections.items()})
+    return Plan("", fitted_sections(KINDS, sections))
 
 
 def read_mapping(path: Path) -> Plan:

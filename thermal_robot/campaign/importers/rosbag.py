@@ -19,7 +19,8 @@ the place of the target are fitted together to what was measured in motion.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -319,7 +320,7 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
 
 
 ENDINGS = (".bag", ".mcap", ".db3")
-_JOINT_STATES = ("sensor_msgs/msg/JointState",)
+JOINT_STATES = ("sensor_msgs/msg/JointState",)
 _TARGETS = {
     "geometry_msgs/msg/PoseStamped": "pose",
     "geometry_msgs/msg/TransformStamped": "transform",
@@ -338,6 +339,16 @@ def read_bag(
     topics to choose from and a joint that is not recorded.
     """
     file = str(path)
+    with opened(path) as reader:
+        states = messages(file, reader, JOINT_STATES, joint_topic, "joints")
+        targets = messages(file, reader, tuple(_TARGETS), target_topic, "pose")
+    return _joint_stream(file, states, joints), _target_stream(file, targets)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """Give the ``AnyReader`` of a bag of ROS 1 or 2; refuse one that cannot be read."""
+    file = str(path)
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.typesys import Stores, get_typestore
@@ -345,14 +356,12 @@ def read_bag(
         raise CampaignError(file, "bags need rosbags, which is not installed", expected=WITH_ROSBAGS) from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            states = _messages(file, reader, _JOINT_STATES, joint_topic, "joints")
-            targets = _messages(file, reader, tuple(_TARGETS), target_topic, "pose")
+            yield reader
     except AnyReaderError as error:
         raise CampaignError(file, f"cannot be read as a bag ({error})", expected="a bag of ROS 1 or ROS 2") from error
-    return _joint_stream(file, states, joints), _target_stream(file, targets)
 
 
-def _messages(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
+def messages(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
     """Return the messages of one topic: when each was recorded, itself, and its type."""
     fitting = [c for c in reader.connections if c.msgtype in types]
     topics, kinds = sorted({c.topic for c in fitting}), " or ".join(types)
@@ -369,7 +378,7 @@ def _messages(file: str, reader: Any, types: Sequence[str], topic: str | None, k
     ]
 
 
-def _instant(stamp: int, message: Any) -> float:
+def instant(stamp: int, message: Any) -> float:
     """Return when a message was measured, s; when it was recorded where it does not say."""
     header = message.header.stamp
     return header.sec + header.nanosec * _NANOSECOND if header.sec or header.nanosec else stamp * _NANOSECOND
@@ -380,7 +389,7 @@ def _joint_stream(file: str, messages: Sequence[Any], joints: Sequence[str]) -> 
     for stamp, message, _ in messages:
         where = joint_columns(message.name, joints)
         if len(where) == len(joints):  # a hand may speak in messages of its own
-            times.append(_instant(stamp, message))
+            times.append(instant(stamp, message))
             rows.append([message.position[message.name.index(where[joint])] for joint in joints])
     if messages and not rows:
         recorded = sorted({name for _, message, _ in messages for name in message.name})
@@ -395,7 +404,7 @@ def _target_stream(file: str, messages: Sequence[Any]) -> Stream | None:
         held = getattr(message, _TARGETS[kind])
         place = next((getattr(held, name) for name in ("position", "translation") if hasattr(held, name)), held)
         turn = next((getattr(held, name) for name in ("orientation", "rotation") if hasattr(held, name)), None)
-        times.append(_instant(stamp, message))
+        times.append(instant(stamp, message))
         rows.append([place.x, place.y, place.z, *([turn.w, turn.x, turn.y, turn.z] if turn else [])])
     whole = names.MEASURED[: len(rows[0])] if rows else ()
     return stream(file, np.array(times), np.array(rows, dtype=float), whole) if rows else None

@@ -39,6 +39,22 @@ class Imported(NamedTuple):
     notes: tuple[str, ...]  # how many rows were read, what was left out and why, what was found out; a sentence each
 
 
+def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str]) -> None:
+    """Refuse a folder in which files that are read, or a declaration that was not imported, would be overwritten.
+
+    ``names`` are those of the files that will be written, the declaration's first.
+    """
+    read = {Path(file).resolve() for file in files}
+    for name in names:
+        if (directory / name).resolve() in read:
+            problem = "is read from, and would be overwritten"
+            raise CampaignError(str(directory / name), problem, expected="another folder to write")
+    there = directory / names[0]
+    if there.is_file() and not there.read_text(encoding="utf-8", errors="replace").startswith(f"# {IMPORTED}"):
+        expected = "another folder: what is there was not imported, and would be overwritten"
+        raise CampaignError(str(there), "there is a campaign already", expected=expected)
+
+
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
     """Read files of a format and write them as a campaign.
 
@@ -53,15 +69,7 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
     RobotError
         A robot that cannot be loaded.
     """
-    read = {Path(file).resolve() for file in files}
-    for name in (FILE_NAME, TABLE_NAME, ROBOT_NAME):
-        if (directory / name).resolve() in read:
-            problem = "is read from, and would be overwritten"
-            raise CampaignError(str(directory / name), problem, expected="another folder to write")
-    there = directory / FILE_NAME
-    if there.is_file() and not there.read_text(encoding="utf-8", errors="replace").startswith(f"# {IMPORTED}"):
-        expected = "another folder: what is there was not imported, and would be overwritten"
-        raise CampaignError(str(there), "there is a campaign already", expected=expected)
+    require_imported(files, directory, (FILE_NAME, TABLE_NAME, ROBOT_NAME))
     given = plan or Plan()
     source = FORMATS[format].source(files, given)
     full = given.over(source.plan)

@@ -1,0 +1,162 @@
+"""Faults of a log's stamps: jitter, clocks of different rates, stamps that are shifted between two channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.motion.following import Correlation, Moves, slope, usual_step
+from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog, with_channels
+from thermal_robot.motion.settings import CLEAR, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
+
+_COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
+_MOST = 8  # motions that tell a rate roughly
+_NEAR = 2.0  # s that clocks may differ by at their beginning
+_SIGMA = 1.4826  # standard deviation over median absolute deviation of a normal law
+
+
+def reclocked(motion: Motion, clock: Callable[[Array], Array]) -> Motion:
+    """Return a motion whose measured channels have other stamps, those of the command kept."""
+    named = {name: getattr(motion, name) for name in CHANNELS if name != "command"}
+    return with_channels(motion, {k: Channel(clock(c.time), c.values) for k, c in named.items() if c is not None})
+
+
+def two_clocks(log: MotionLog) -> bool:
+    """Whether commands and readings have stamps of their own."""
+    return any(not np.array_equal(each.command.time, each.position.time) for each in log.motions)
+
+
+def jitter(log: MotionLog) -> tuple[float, float, float]:
+    """Return the scatter of the encoder's steps over their median, and the share of it that the readings feel.
+
+    Second differences of q follow those of the stamps times the velocity where the stamps are right, and do not where
+    the samples are even and only their stamps late; the share is their slope, with its standard error.
+    """
+    spread, squares, products = [], [], []
+    for motion in log.motions:
+        t, q = motion.position.time, motion.position.values
+        steps = np.diff(t)
+        usual = np.median(steps)
+        spread.append(_SIGMA * np.median(np.abs(steps - usual)) / usual)
+        speed = (q[4:] - q[:-4]) / (t[4:] - t[:-4])[:, None]
+        even = (np.abs(steps / usual - 1.0) < 0.5).astype(float)
+        whole = (even[:-3] * even[1:-2] * even[2:-1] * even[3:])[:, None] > 0.0
+        x = np.where(whole, speed * (steps[2:-1] - steps[1:-2])[:, None], np.nan)
+        y = q[3:-1] - 2.0 * q[2:-2] + q[1:-3]
+        squares.append([np.nansum(x * x)])
+        products.append([np.nansum(x * y)])
+    felt, error = slope(np.array(squares), np.array(products))
+    return float(np.median(spread)), float(felt[0]), float(error[0])
+
+
+def evened(motion: Motion) -> Motion:
+    """Return a motion whose readings have even stamps: those of the line through their own; late rows stay late."""
+    t = motion.position.time
+    number = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(np.diff(t) / np.median(np.diff(t))), 1.0))])
+    line = np.polynomial.Polynomial.fit(number, t, 1)
+    return reclocked(motion, lambda stamps: np.interp(stamps, t, line(number)))
+
+
+def rate(log: MotionLog) -> tuple[float, float]:
+    """Rate of the command's clock over the readings', and its standard error: drift of the lag along the motions.
+
+    A grid of rates finds where the moves are most alike; then the lags of pieces of ten seconds are fitted by a line in
+    each motion with a common slope. The standard error is that of the scatter between motions or, in few, between
+    pieces; and a servo's own lag may change by :data:`STRIDE` within a motion that grows faster, such as a chirp.
+    """
+    drift, error, far = _drift(log.motions)
+    found = _searched(log) if far else 1.0
+    for _ in range(3):
+        drift, error, _ = _drift([reclocked(motion, partial(np.multiply, found)) for motion in log.motions])
+        found *= 1.0 - drift
+        if abs(drift) < 0.1 * error:
+            break
+    spans = [float(motion.position.time[-1]) for motion in log.motions]
+    return found, float(np.hypot(error, STRIDE / np.linalg.norm(spans)))
+
+
+def _searched(log: MotionLog) -> float:
+    """Return the rate of a grid at which the moves of the longest motions are most like their commands'."""
+    longest = sorted(log.motions, key=lambda motion: -float(motion.position.time[-1]))[:_MOST]
+    spans = [float(m.position.time[-1] - m.position.time[0]) for m in longest]
+    lengths = [float(np.ptp(m.command.time)) / span for m, span in zip(longest, spans, strict=True)]
+    fine = 2.0 * STRIDE / max(spans)
+    grid = np.arange(1.0 - RATES, 1.0 + RATES, fine)
+    centre = float(np.median(lengths))
+    grid = np.union1d(grid, centre * grid[np.abs(grid - 1.0) < 0.01]) if abs(centre - 1.0) > RATES else grid
+    scores = [sum(_likeness(motion, r) for motion in longest) for r in grid]
+    return float(grid[int(np.argmax(scores))])
+
+
+def _likeness(motion: Motion, r: float) -> float:
+    moves = Moves.of(reclocked(motion, lambda t: r * t), _COARSE * STRIDE)
+    return Correlation.of(moves, _NEAR).best()[1] * len(moves.time)
+
+
+def _drift(motions: Sequence[Motion]) -> tuple[float, float, bool]:
+    """Slope of the lag over time within the motions, its standard error, and whether lags are far or not to be had."""
+    squares, products, sizes, lost = [], [], [0.0], 0
+    for motion in motions:
+        moves = Moves.of(motion)
+        pieces = list(moves.parts(max(1, round((moves.time[-1] - moves.time[0]) / PIECE))))
+        told = [(piece.time.mean(), *Correlation.of(piece, _NEAR).best()) for piece in pieces]
+        t, lag = np.array([(t, lag) for t, lag, share in told if share > FOLLOWS] or np.empty((0, 2))).T
+        lost += len(told) - len(t)
+        sizes += np.abs(lag).tolist()
+        if len(t) > 1:
+            away = np.abs(lag - np.median(lag))
+            kept = away <= CLEAR * max(_SIGMA * np.median(away), STRIDE)
+            t, lag = t[kept] - t[kept].mean(), lag[kept] - lag[kept].mean()
+            whole = len(motions) >= _MOST
+            squares += [(t @ t,)] if whole else [(each * each,) for each in t]
+            products += [(t @ lag,)] if whole else [(a * b,) for a, b in zip(t, lag, strict=True)]
+    far = lost > len(sizes) or max(sizes) > _NEAR / 4.0
+    if not squares:
+        return 0.0, np.inf, far
+    found, error = slope(np.array(squares), np.array(products))
+    return float(found[0]), float(error[0]), far
+
+
+def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
+    """Return by how much the readings' stamps are late, s, and its standard error, by motion; those that stand out.
+
+    A reading before its command is no robot's; else a motion whose lag stands out from the others', once the lag that
+    friction makes, an angle over a speed, is taken off.
+    """
+    lags, slow, spread, names, steps = [], [], [], [], []
+    for motion in log.motions:
+        moves = Moves.of(motion)
+        told = [Correlation.of(part, _NEAR).best() for part in moves.parts(4)]
+        whole, share = Correlation.of(moves, _NEAR).best()
+        if share > FOLLOWS:
+            near = [each for each, part in told if part > FOLLOWS] or [whole]
+            lags.append(whole)
+            spread.append(max(float(np.std(near)) / np.sqrt(len(near)), moves.step / 2.0))
+            slow.append(1.0 / max(float(np.sqrt((moves.commanded**2).mean())), 1e-6))
+            names.append(motion.name)
+            steps.append(usual_step(motion.position))
+    if not lags:
+        return {}
+    lag, error, step, slowness = (np.array(each) for each in (lags, spread, steps, slow))
+    usual, scatter = _usual_lag(lag, slowness)
+    early = lag < -np.maximum(FAR * step, CLEAR * error)
+    away = np.abs(lag - usual) > np.maximum(FAR * step, OUTLIER * np.hypot(scatter, error))
+    size = np.where(early & ~away, lag, lag - usual)
+    return {names[k]: (float(size[k]), float(error[k])) for k in np.flatnonzero(early | away)}
+
+
+def _usual_lag(lag: Array, slow: Array) -> tuple[Array, float]:
+    """Return the lag that the other motions lead to expect, s, and how they scatter about it (repeated medians)."""
+    if len(lag) < FAR * 2:
+        return np.full(len(lag), np.median(lag)), np.inf
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = (lag[:, None] - lag) / (slow[:, None] - slow)
+    np.fill_diagonal(slopes, np.nan)
+    slopes[~np.isfinite(slopes)] = np.nan
+    angle = max(float(np.nanmedian(np.nanmedian(slopes, axis=1))), 0.0) if not np.isnan(slopes).all() else 0.0
+    rest = lag - angle * slow
+    usual = np.median(rest)
+    return usual + angle * slow, float(_SIGMA * np.median(np.abs(rest - usual)))
