@@ -44,7 +44,7 @@ def _joints(sound: Sound) -> Iterator[Sequence[str]]:
         commanded = np.concatenate([motion.command.values[:, j] for motion in log.motions])
         gaps = [m.position.values[:, j] - at(m.command, m.position.time)[:, j] for m in log.motions]
         gap = float(np.sqrt(np.nanmean(np.concatenate(gaps) ** 2)))
-        slides = log.robot.joint_types[log.robot.joint_names.index(joint)] == "prismatic"
+        slides = log.kinds[joint] == "prismatic"
         servo = log.servos.get(joint)
         stated = {} if servo is None else {key: value for key, value in vars(servo).items() if value is not None}
         told = ", ".join(f"{key} {value:g}" for key, value in stated.items()) or "unknown"

@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
-from thermal_robot.errors import EffectError
+from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
+from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import SHARED, JointModel, ServoModel
-from thermal_robot.motion.torque import TorqueModel
+from thermal_robot.motion.refuse import fed_forward
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
+from thermal_robot.motion.torque import TorqueModel
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,8 +61,14 @@ def diagnose_motion(
         if name not in ALL:
             raise EffectError(f"no effect of motions is called {name!r}{did_you_mean(name, ALL)}")
     kept = [name for name in ALL if name not in without and (not only or name in only)]
+    progress("faults of the log")
+    sound = find_faults(log)
+    if not sound.joints:
+        told = "; ".join(fault.told for fault in sound.faults)
+        raise CampaignError(log.name, f"no joint of the log can be used: {told}", expected="a log without such faults")
+    log = sound.log.with_joints(sound.joints)
     torques = all(motion.torque is not None for motion in log.motions)
-    kind = TorqueModel if torques else ServoModel
+    kind = TorqueModel if torques and (not log.commanded or fed_forward(log)) else ServoModel
     model = kind(log)
     allowed = np.array([one.effect in kept for one in model.parameters])
     choice = select(model, allowed, progress)
@@ -70,7 +78,9 @@ def diagnose_motion(
         motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
         model = kind(replace(log, motions=motions))
         choice = select(model, allowed, progress)
-    return _answer(model, choice, refused, tuple(name for name in ALL if name not in kept), progress)
+    left_out = tuple(name for name in ALL if name not in kept)
+    found = _answer(model, choice, refused, left_out, progress)
+    return replace(found, faults=tuple(fault.told for fault in sound.faults))
 
 
 def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
@@ -78,6 +88,8 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
     """
+    if model.pieces > 1:  # what one motion leaves has no others to be compared with
+        return {}
     kinds = np.array([m.kind or m.name for m in model.log.motions])
     each = np.zeros((len(kinds), len(choice.point.rows)))
     for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
@@ -86,7 +98,7 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
     usual = float(np.median(list(square.values())))
     far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}
-    return far if sum(kinds == k for k in far).sum() * 2 < len(kinds) else {} if far else {}
+    return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
 def _nothing(model: JointModel) -> list[Array]:
@@ -96,7 +108,7 @@ def _nothing(model: JointModel) -> list[Array]:
 
 def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
-    count, found = len(model.log.motions), [one.residual.copy() for one in choice.point.rows]
+    count, found = model.clusters, [one.residual.copy() for one in choice.point.rows]
     folds = min(settings.FOLDS, count)
     if folds < 2 or not choice.active.any():
         return found
@@ -123,11 +135,13 @@ def _answer(
     weights = 1.0 / np.array([max(len(one), 1) for one in before])
     square = [_by_motion(model, before, weights), _by_motion(model, held, weights)]
     shrinkage = 1.0 - float(square[1].sum() / max(square[0].sum(), 1e-300))
-    drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(0, len(square[0]), (settings.BOOTSTRAPS, len(square[0])))
+    drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(
+        0, len(square[0]), (settings.BOOTSTRAPS, len(square[0]))
+    )
     ratios = 1.0 - square[1][drawn].sum(axis=1) / np.maximum(square[0][drawn].sum(axis=1), 1e-300)
     low, high = np.quantile(ratios, [0.025, 0.975])
     total = [float(np.sqrt(one.sum() / len(before))) for one in square]
-    folds = min(settings.FOLDS, len(log.motions))
+    folds = min(settings.FOLDS, model.clusters)
     held_out = HeldOut("motion", folds, *total, shrinkage, (float(low), float(high)))
     findings, shares = _findings(model, choice, before, weights)
     verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
@@ -152,10 +166,10 @@ def _curves(model: JointModel, joint: int, values: Array) -> pd.DataFrame:
 
 def _by_motion(model: JointModel, residuals: list[Array], weights: Array) -> Array:
     """(M,) sums of squares of all joints by motion, each joint's readings weighing one together."""
-    motions = range(len(model.log.motions))
+    count = model.clusters
     return np.asarray(
         sum(
-            w * np.bincount(model.motion_of(j), one**2, len(motions))
+            w * np.bincount(model.motion_of(j), one**2, count)
             for j, (one, w) in enumerate(zip(residuals, weights, strict=True))
         )
     )
@@ -176,13 +190,12 @@ def _findings(
     log, point, deviations = model.log, choice.point, choice.deviations()
     whole = sum(float(w * (one**2).sum()) for one, w in zip(before, weights, strict=True))
     scale = np.array([point.noise[j] ** 2 * weights[j] for j in model.joints]) / max(whole, 1e-300)
-    base = held_out_loss(point, choice.active, choice.sizes, by_joint=True)
+    base = held_out_loss(point, choice.active, choice.sizes)
     share = {}
     for block in choice.best.blocks:
         less = choice.active.copy()
         less[block] = False
-        gain = held_out_loss(point, less, choice.sizes, by_joint=True) - base
-        share[block] = gain.sum(axis=0) * scale
+        share[block] = (held_out_loss(point, less, choice.sizes) - base).sum(axis=1) * scale
     found = []
     for name in ALL:
         own = [p for p, one in enumerate(model.parameters) if one.effect == name]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scipy.optimize import lsq_linear
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import Gram
 from thermal_robot.motion import settings
-from thermal_robot.motion.model import SHARED, Rows, JointModel
+from thermal_robot.motion.model import SHARED, JointModel, Rows
 
 Mask = NDArray[np.bool_]
 
@@ -28,27 +29,31 @@ class Point:
     noise: Array
 
     @classmethod
-    def at(
-        cls, model: JointModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None
-    ) -> Point:
+    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None) -> Point:
         """Linearise the model at some values by the parameters ``wanted``, unless the rows are known."""
         rows = model.all_rows(values, wanted) if rows is None else rows
         noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
         return cls(values, rows, noise)
 
-    def products(self) -> tuple[Array, Array]:
-        """Products of the white derivatives with each other (M, P, P) and with the target r + Jθ (M, P), by motion."""
+    @cached_property
+    def products(self) -> tuple[Array, Array, Array]:
+        """Products of the white derivatives with each other, (J, M, P, P), with the target r + Jθ, (J, M, P), and its.
+
+        By joint and motion.
+        """
         count, width = 1 + max(int(one.motion.max()) for one in self.rows), len(self.values)
-        matrix, vector = np.zeros((count, width, width)), np.zeros((count, width))
-        for one, noise in zip(self.rows, self.noise, strict=True):
-            target = one.residual + one.derivative @ self.values[one.columns]
+        shape = len(self.rows), count
+        matrix, vector, total = np.zeros((*shape, width, width)), np.zeros((*shape, width)), np.zeros(shape)
+        for j, (one, noise) in enumerate(zip(self.rows, self.noise, strict=True)):
+            target = (one.residual + one.derivative @ self.values[one.columns]) / noise
             ends = np.searchsorted(one.motion, np.arange(count + 1))
             for m in range(count):
                 own = slice(ends[m], ends[m + 1])
                 columns = one.derivative[own] / noise
-                matrix[m][np.ix_(one.columns, one.columns)] += columns.T @ columns
-                vector[m, one.columns] += columns.T @ target[own] / noise
-        return matrix, vector
+                matrix[j, m][np.ix_(one.columns, one.columns)] = columns.T @ columns
+                vector[j, m, one.columns] = columns.T @ target[own]
+                total[j, m] = target[own] @ target[own]
+        return matrix, vector, total
 
 
 def fit(
@@ -62,18 +67,18 @@ def fit(
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
     ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading. ``motions``
-    (M,) are those that are fitted, by default all; ``rows`` the model at the values, where it is known.
+    (M,) are the clusters that are fitted, by default all; ``rows`` the model at the values, where it is known.
     """
     own = np.flatnonzero(active)
     values = np.where(active, values, 0.0)
     lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
     shared = any(model.parameters[p].joint == SHARED for p in own)
     joint_of = np.array([one.joint for one in model.parameters])
-    motions = np.ones(len(model.log.motions), dtype=bool) if motions is None else motions
+    motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     used = [motions[model.motion_of(joint)] for joint in model.joints]
     for number in range(settings.ROUNDS):
         point = Point.at(model, values, active, rows if number == 0 else None)
-        matrix, vector = (one[motions].sum(axis=0) for one in point.products())
+        matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
         tight = np.diag(sizes[own] ** -2.0)
         before = np.array(
             [(one.residual[u] ** 2).sum() / n**2 for one, u, n in zip(point.rows, used, point.noise, strict=True)]
@@ -119,9 +124,6 @@ def ratios(point: Point) -> Array:
     for one, noise in zip(point.rows, point.noise, strict=True):
         ends = np.searchsorted(one.motion, np.arange(count + 1))
         pieces = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        if count < settings.CLUSTERS:
-            cuts = np.linspace(0, len(one.residual), settings.BLOCKS + 1).astype(int)
-            pieces = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
         score = np.array([one.derivative[p].T @ one.residual[p] for p in pieces]) / noise**2
         bread = np.array([(one.derivative[p] ** 2).sum(axis=0) for p in pieces]) / noise**2
         whole = bread.sum(axis=0)
@@ -140,7 +142,7 @@ def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, l
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Returns the blocks' effect and joint.
     """
-    matrix, vector = (one.sum(axis=0) for one in point.products())
+    matrix, vector = (one.sum(axis=(0, 1)) for one in point.products[:2])
     sizes = np.array([one.size for one in model.parameters])
     wide = np.diag((settings.WIDE * sizes) ** -2.0)
     found = np.linalg.solve(matrix + wide, vector)

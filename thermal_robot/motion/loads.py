@@ -19,7 +19,7 @@ from thermal_robot.motion.log import MotionLog
 class Loads:
     """Torques (k, n, J) and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
 
-    The first of the k is that of the model; then that of 1 kg of payload and that of each link's whole mass.
+    The first of the k is that of the model; then that of 1 kg of payload, and of each link that of its whole mass and of 1 kg·m along each of its axes.
     """
 
     torque: Array
@@ -46,10 +46,14 @@ class Dynamics:
         models = [model, model.copy()]
         models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
         for name in self.bodies:
+            j = model.getJointId(name)
             heavier = model.copy()
-            j = heavier.getJointId(name)
             heavier.inertias[j] += model.inertias[j]
             models.append(heavier)
+            for axis in np.eye(3):  # two opposite masses a metre apart each way: a first moment alone
+                moved = model.copy()
+                moved.inertias[j] = _with_moment(model.inertias[j], axis)
+                models.append(moved)
         self._pools = [pin.ModelPool(one, threads()) for one in models]
 
     def configurations(self, q: Array) -> Array:
@@ -104,6 +108,13 @@ class Dynamics:
             height[i] = up @ data.oMf[self.frame].translation
             slope[i] = up @ jacobian[:3, self.at]
         return height, slope
+
+
+def _with_moment(inertia: pin.Inertia, moment: Array) -> pin.Inertia:
+    """Return an inertia with a first moment more, kg·m, its mass and its second moment about the origin as before."""
+    numbers = inertia.toDynamicParameters()
+    numbers[1:4] += moment
+    return pin.Inertia.FromDynamicParameters(numbers)
 
 
 def _between(way: Array, at: Array, values: Array) -> Array:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.robot import Robot
@@ -104,6 +106,33 @@ class MotionLog:
     tolerance: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Type of every joint of the robot's description, by name, on the chain or beside it."""
+        return joint_kinds(self.robot)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether commands were recorded; where none were, they are the encoder's readings, and torques tell."""
+        return any(motion.command is not motion.position for motion in self.motions)
+
+    def with_joints(self, joints: Sequence[str]) -> MotionLog:
+        """Return the log of some of its joints."""
+        at = [self.joints.index(name) for name in joints]
+
+        def cut(channel: Channel | None) -> Channel | None:
+            return None if channel is None else Channel(channel.time, channel.values[:, at])
+
+        def only(motion: Motion) -> Motion:
+            position = cut(motion.position)
+            command = position if motion.command is motion.position else cut(motion.command)
+            rest = {
+                name: cut(getattr(motion, name)) for name in ("velocity", "torque", "current", "volts", "temperature")
+            }
+            return replace(motion, command=command, position=position, **rest)
+
+        return replace(self, joints=tuple(joints), motions=tuple(only(motion) for motion in self.motions))
+
     def __repr__(self) -> str:
         seconds = sum(float(motion.position.time[-1] - motion.position.time[0]) for motion in self.motions)
         return f"<MotionLog {self.name!r}: {len(self.motions)} motions of {len(self.joints)} joints, {seconds:.0f} s>"
@@ -116,3 +145,9 @@ CHANNELS = ("command", "position", "velocity", "torque", "current", "volts", "te
 def with_channels(motion: Motion, channels: Mapping[str, Any]) -> Motion:
     """Return a motion with other channels, by the names of their fields."""
     return replace(motion, **channels)
+
+
+def joint_kinds(robot: Robot) -> dict[str, str]:
+    """Type of every joint of a robot's description, by name."""
+    joints = etree.fromstring(robot.urdf.encode()).iter("{*}joint")
+    return {joint.get("name", ""): joint.get("type", "fixed") for joint in joints}

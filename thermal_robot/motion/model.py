@@ -56,6 +56,23 @@ class JointModel:
     def __init__(self, log: MotionLog) -> None:
         self.log, self.joints = log, range(len(log.joints))
 
+    @cached_property
+    def clusters(self) -> int:
+        """Number of motions, or of the pieces into which few are cut: what counts as independent."""
+        return len(self.log.motions) * self.pieces
+
+    @cached_property
+    def pieces(self) -> int:
+        """Pieces of every motion: one, unless there are too few motions to be counted."""
+        count = len(self.log.motions)
+        return 1 if count >= settings.CLUSTERS else -(-settings.BLOCKS // count)
+
+    def cluster_of(self, motion: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(N,) number of the cluster of readings whose motions (N,) are in order."""
+        counts = np.bincount(motion, minlength=len(self.log.motions))
+        place = np.arange(len(motion)) - (np.cumsum(counts) - counts)[motion]
+        return np.asarray(motion * self.pieces + place * self.pieces // np.maximum(counts[motion], 1))
+
     def index(self, effect: str, joint: int = SHARED) -> int | None:
         """Return the place of a parameter, ``None`` where the model has none of it."""
         found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
@@ -116,9 +133,7 @@ class ServoModel(JointModel):
         counts = [int(np.ceil((m.position.time[-1] - m.position.time[0]) / self.step - 1e-9)) + 1 for m in motions]
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first = np.array([m.position.time[0] for m in motions])
-        self.grid = np.concatenate(
-            [t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)]
-        )
+        self.grid = np.concatenate([t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)])
         self.motion_of_grid = np.repeat(np.arange(len(motions)), counts)
 
     def _range(self, joint: int) -> tuple[float, float]:
@@ -174,7 +189,9 @@ class ServoModel(JointModel):
         if self.log.robot.has_masses:
             size_of = self.rated(self.loads.torque[1])
             found.append(Parameter("payload", SHARED, "mass", "kg", size_of, 1.0, False, "payload"))
-            found.append(Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact"))
+            found.append(
+                Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact")
+            )
         return tuple(found)
 
     def start(self) -> Array:
@@ -225,7 +242,9 @@ class ServoModel(JointModel):
         loads = np.stack([parts[0] + pressing, parts[1], contact[:, joint]])
         inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
         around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
-        start = np.array([m.position.values[np.isfinite(m.position.values[:, joint]), joint][0] for m in self.log.motions])
+        start = np.array(
+            [m.position.values[np.isfinite(m.position.values[:, joint]), joint][0] for m in self.log.motions]
+        )
         return simulate(
             numbers, weights, (self.begins, self.first), self._commands[joint], around, start, self.step, self.substeps
         )
@@ -243,11 +262,11 @@ class ServoModel(JointModel):
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         found = self.residuals(joint, sets)
-        return Rows(found[0], (found[0] - found[1:]).T / steps, own, self._samples[joint][3])
+        return Rows(found[0], (found[0] - found[1:]).T / steps, own, self.motion_of(joint))
 
     def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the motion of each reading of a joint."""
-        return self._samples[joint][3]
+        """(N,) number of the cluster of each reading of a joint."""
+        return self.cluster_of(self._samples[joint][3])
 
     def noise(self, joint: int) -> float:
         """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""

@@ -25,7 +25,7 @@ from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.files import is_file, is_folder
 from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, scale_of, sources
-from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo
+from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo, joint_kinds
 from thermal_robot.motion.refuse import refused
 from thermal_robot.motion.settings import FEWEST_SAMPLES, LONGEST_GAP
 from thermal_robot.robot import Robot
@@ -283,6 +283,8 @@ def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: 
     motions: list[Motion] = []
     for label in dict.fromkeys(label for clock in clocks for label in clock.order):
         parts = {name: channel.get(label) for name, channel in channels.items()}
+        if not channels["command"] and parts["torque"] is not None:
+            parts["command"] = parts["position"]
         if parts["command"] is None or parts["position"] is None:
             lacking = "command" if parts["command"] is None else "position"
             notes.append(f"motion {label!r} has no {lacking} and is left out")
@@ -318,19 +320,23 @@ def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tu
             raise table.error(problem, source.column, expected=f"one of {listed(robot.joint_names)}")
     named.pop("", None)
     files = " and ".join(table.file for table in tables)
-    both = [joint for joint in robot.joint_names if {"cmd", "q"} <= named.get(joint, set())]
+    # a gripper's joint lies beside the chain
+    order = [*robot.joint_names, *(name for name in robot.urdf_joints if name not in robot.joint_names)]
+    torques = not any("cmd" in quantities for quantities in named.values())
+    both = [joint for joint in order if {"tau" if torques else "cmd", "q"} <= named.get(joint, set())]
     if not any("q" in quantities for quantities in named.values()):
         raise CampaignError(files, "no joint's position is recorded", expected="columns q.<joint>, or [channels]")
-    if not any("cmd" in quantities for quantities in named.values()):
+    if torques and not both:
         problem = "no command is recorded: of an arm that was guided by hand an external force is the cause"
-        raise CampaignError(files, problem, expected="columns cmd.<joint>, or [channels]")
+        raise CampaignError(files, problem, expected="columns cmd.<joint>, or tau.<joint>")
     if not both:
-        found = f"{listed(named)}; the chain to {robot.tool_frame!r} has {listed(robot.joint_names)}"
-        raise CampaignError(files, "no joint of the chain has command and position", found=found, expected="both")
+        found = f"{listed(named)}; the robot has {listed(robot.joint_names)}"
+        raise CampaignError(files, "no joint has command and position", found=found, expected="both")
     beside = [joint for joint in named if joint not in both]
     if beside:
-        notes.append(f"left out, not on the chain to {robot.tool_frame!r} or without command or position: "
-                     f"{listed(beside)}")  # fmt: skip
+        notes.append(f"left out, without command or position: {listed(beside)}")
+    if torques:
+        notes.append("no command is recorded: the torques along the measured motion are explained, and no servo")
     return tuple(both), notes
 
 
@@ -416,7 +422,7 @@ def _channel(
     joints: tuple[str, ...],
 ) -> dict[str, Channel]:
     """Return the samples of a quantity by motion, clocks as recorded; rows in which no joint has any are left out."""
-    kinds_of = dict(zip(robot.joint_names, robot.joint_types, strict=True))
+    kinds_of = joint_kinds(robot)
     parts: dict[str, list[tuple[Array, Array]]] = {}
     for number, clock in enumerate(clocks):
         values = np.full((len(clock.time), len(joints)), np.nan)
@@ -471,6 +477,8 @@ def _motions(label: str, kind: str, parts: Mapping[str, Channel | None], notes: 
             continue
         zero = min(float(channel.time[0]) for channel in own.values())
         began = {key: _frozen(channel.time - zero, channel.values) for key, channel in own.items()}
+        if parts["command"] is position:
+            began["command"] = began["position"]
         yield Motion(name, kind, **{key: began.get(key) for key in FIELDS.values()})  # type: ignore[arg-type]
 
 

@@ -17,6 +17,8 @@ from thermal_robot.motion.settings import FOREIGN, LEAST_RATE, LONGEST_LAG, NO_L
 def refused(log: MotionLog, files: str) -> MotionLog:
     """Return the log with notes on what is doubtful; refuse one that tells nothing, naming its files."""
     _refuse_slow(log, files)
+    if not log.commanded:
+        return log
     guided = [motion.name for motion in log.motions if _foreign(motion) > FOREIGN]
     copied = [motion.name for motion in log.motions if _copied(motion)]
     if len({*guided, *copied}) == len(log.motions):
@@ -26,7 +28,7 @@ def refused(log: MotionLog, files: str) -> MotionLog:
     notes = list(log.notes)
     if guided or copied:
         notes.append(f"moved by an external force and not by their commands: the motions {listed([*guided, *copied])}")
-    if _fed_forward(log):
+    if fed_forward(log):
         problem = "the joints follow their commands without the lag of a position servo: feed-forward unknown"
         if all(motion.torque is None for motion in log.motions):
             expected = "columns tau.<joint>, or [servo.<joint>] kp where it is a position servo"
@@ -58,7 +60,7 @@ def _copied(motion: Motion) -> bool:
     return bool(moved.any() and same[:, moved].all())
 
 
-def _fed_forward(log: MotionLog) -> bool:
+def fed_forward(log: MotionLog) -> bool:
     """Whether every joint that moves, and whose servo is not stated, follows its command without a lag."""
     lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
     lags = lags[:, [log.servos.get(joint) is None or log.servos[joint].kp is None for joint in log.joints]]

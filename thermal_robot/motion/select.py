@@ -95,8 +95,9 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None]) ->
 
 
 def _weighed(
-    model: JointModel, values: Array, allowed: Mask, sizes: Array, deflation: Array | None, start: Mask | None
+    model: JointModel, values: Array, allowed: Mask, sizes: Array, deflation: Array | None, start: Mask | None, final: bool = False
 ) -> Choice:
+    """Search by evidence at some values; where ``final`` the choice is the start, and the search tells its rivals."""
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
     gram, _ = deflated(model, point, deflation)
@@ -104,49 +105,53 @@ def _weighed(
     prior = float(np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY)))
     search = Search(gram, [prior] * len(values), out=barred)
     best = search.run(() if start is None else np.flatnonzero(start).tolist())
+    if final and start is not None:
+        best = search.evaluate(np.flatnonzero(start).tolist())
     return Choice(np.isin(np.arange(len(values)), best.blocks), point, best, search, gram, deflation, sizes)
 
 
-def held_out_loss(point: Point, active: Mask, sizes: Array, by_joint: bool = False) -> Array:
-    """Leave-one-motion-out, linearised: squared residual of each motion (M,) over the noise, fitted to the others.
-
-    ``by_joint`` keeps the joints apart, (M, J).
-    """
-    matrix, vector = point.products()
+def held_out_loss(point: Point, active: Mask, sizes: Array) -> Array:
+    """Leave-one-motion-out, linearised: squared residual (J, M) over the noise of each joint in each motion held out."""
+    matrix, vector, total = point.products
     own = np.flatnonzero(active)
-    found = np.zeros(vector.shape)
-    if len(own):
-        whole, along = matrix[:, own[:, None], own], vector[:, own]
-        rest = whole.sum(axis=0) - whole + np.diag(sizes[own] ** -2.0), along.sum(axis=0) - along
-        found[:, own] = np.linalg.solve(rest[0], rest[1][:, :, None])[:, :, 0]
-    losses = []
-    for one, noise in zip(point.rows, point.noise, strict=True):
-        target = one.residual + one.derivative @ point.values[one.columns]
-        left = (target - (one.derivative * found[one.motion][:, one.columns]).sum(axis=1)) / noise
-        losses.append(np.bincount(one.motion, left**2, len(matrix)))
-    each = np.stack(losses, axis=1)
-    return each if by_joint else np.asarray(each.sum(axis=1))
+    if not len(own):
+        return total
+    whole, along = matrix[:, :, own[:, None], own], vector[:, :, own]
+    others, pull = (one.sum(axis=(0, 1)) - one.sum(axis=0) for one in (whole, along))
+    found = np.linalg.solve(others + np.diag(sizes[own] ** -2.0), pull[:, :, None])[:, :, 0]
+    fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
+    return np.asarray(total + fitted - 2.0 * (found * along).sum(axis=2))
 
 
 def _pruned(model: JointModel, choice: Choice, allowed: Mask, values: Array) -> Choice:
-    """Drop what has odds below nine to one or harms motions held out, the worst first, and fit what stays exactly."""
-    while True:
-        least: tuple[float, int] | None = None
-        whole = held_out_loss(choice.point, choice.active, choice.sizes).sum()
-        for block in choice.best.blocks:
-            less = choice.active.copy()
-            less[block] = False
-            harm = whole - held_out_loss(choice.point, less, choice.sizes).sum()
-            odds = choice.odds(block)
-            if (odds < np.log(settings.ODDS) or harm > 0.0) and (least is None or odds < least[0]):
-                least = odds, block
-        if least is None:
-            return choice
-        allowed = allowed.copy()
-        allowed[least[1]] = False
-        kept = choice.active & allowed
+    """Backward elimination by odds below nine to one or harm in motions held out, the worst first.
+
+    What stays is fitted exactly, and judged again there.
+    """
+    for _ in range(settings.SELECTIONS):
+        kept = _kept(choice)
+        allowed = allowed & (kept | ~choice.active)
         values = fit(model, np.where(kept, values, 0.0), kept, choice.sizes)
-        choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, kept)
-        if not (choice.active == kept).all():
-            values = fit(model, np.where(choice.active, values, 0.0), choice.active, choice.sizes)
-            choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, choice.active)
+        choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, kept, final=True)
+        if (_kept(choice) == kept).all():
+            break
+    return choice
+
+
+def _kept(choice: Choice) -> Mask:
+    """Return which parameters of a choice stay, by the linear problem at its fit."""
+    active, search = choice.active.copy(), choice.search
+    while active.any():
+        best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)
+        whole, worst = held_out_loss(choice.point, active, choice.sizes).sum(), None
+        for block in best.blocks:
+            less = active.copy()
+            less[block] = False
+            odds = best.log_evidence - search.evaluate(np.flatnonzero(less).tolist(), best).log_evidence
+            harm = whole - held_out_loss(choice.point, less, choice.sizes).sum()
+            if (odds < np.log(settings.ODDS) or harm > 0.0) and (worst is None or odds < worst[0]):
+                worst = odds, block
+        if worst is None:
+            break
+        active[worst[1]] = False
+    return active

@@ -124,8 +124,14 @@ _compiled = None
 
 
 def simulate(
-    numbers: Array, weights: Array, grid: tuple[Array, ...], command: tuple[Array, ...], around: tuple[Array, ...],
-    start: Array, step: float, substeps: int,
+    numbers: Array,
+    weights: Array,
+    grid: tuple[Array, ...],
+    command: tuple[Array, ...],
+    around: tuple[Array, ...],
+    start: Array,
+    step: float,
+    substeps: int,
 ) -> Array:
     """Time stepping of one joint in all motions, for S sets of numbers: (S, n) rad on the grid.
 

@@ -123,3 +123,5 @@ SMOOTHED = 0.1
 """s: window of the local cubics that differentiate positions; shorter than a joint's accelerations, long beside counts."""
 PRANDTL = 4e-3
 """rad over which a joint's friction builds up when it turns back: what public logs of arms show."""
+LINK = 0.3
+"""m: length of a link, of which a tenth is how far its centre of mass may be off."""

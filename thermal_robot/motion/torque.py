@@ -38,6 +38,7 @@ class TorqueModel(JointModel):
         self._q, self._v, self._a = (np.concatenate([one[k] for one in parts]) for k in range(3))
         self._loads = dynamics.along(self._q, self._v, self._a, whole=True)
         self._bodies = dynamics.bodies
+        self._masses = [dynamics.model.inertias[dynamics.model.getJointId(name)].mass for name in dynamics.bodies]
         lengths = [len(m.position.time) for m in log.motions]
         self._motion = np.repeat(np.arange(len(log.motions)), lengths)
         self._time = np.concatenate([m.position.time - m.position.time[0] for m in log.motions])
@@ -64,11 +65,16 @@ class TorqueModel(JointModel):
             ):
                 found.append(Parameter(name, j, label, unit, size, spread, positive, name))
         if self.log.robot.has_masses:
-            found.append(Parameter("payload", SHARED, "mass", "kg", self.rated(self._loads.torque[1]), 1.0, False, "payload"))
-            found += [
-                Parameter("masses", SHARED, f"mass of {name}", "", 0.1, 1.0, False, f"mass {k}")
-                for k, name in enumerate(self._bodies)
-            ]
+            found.append(
+                Parameter("payload", SHARED, "mass", "kg", self.rated(self._loads.torque[1]), 1.0, False, "payload")
+            )
+            for k, name in enumerate(self._bodies):
+                found.append(Parameter("masses", SHARED, f"mass of {name}", "", 0.1, 1.0, False, f"mass {4 * k}"))
+                moment = 0.1 * self._masses[k] * settings.LINK
+                found += [
+                    Parameter("masses", SHARED, f"moment of {name} along {axis}", "kg·m", moment, 1.0, False, f"mass {4 * k + i}")
+                    for i, axis in enumerate("xyz", 1)
+                ]
         return tuple(found)
 
     @cached_property
@@ -87,7 +93,7 @@ class TorqueModel(JointModel):
                 "armature": self._a[:, j],
                 "load_friction": sign * np.abs(load[0]),
                 "payload": load[1],
-                **{f"mass {k}": load[2 + k] for k in range(len(self._bodies))},
+                **{f"mass {k}": load[2 + k] for k in range(4 * len(self._bodies))},
                 "nominal": load[0],
             }
             found.append({name: values[rows] for name, values in own.items()})
@@ -106,7 +112,9 @@ class TorqueModel(JointModel):
                     elif parameter.number != "offset":
                         told += one[p] * columns[parameter.number]
             offset = self.index("offset", joint)
-            found.append(self._measured[self._used[joint], joint] - factor * told - (one[offset] if offset is not None else 0))
+            found.append(
+                self._measured[self._used[joint], joint] - factor * told - (one[offset] if offset is not None else 0)
+            )
         return np.array(found)
 
     def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
@@ -135,8 +143,8 @@ class TorqueModel(JointModel):
         """Nothing: loads are those of the measured motion."""
 
     def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the motion of each reading of a joint."""
-        return self._motion[self._used[joint]]
+        """(N,) number of the cluster of each reading of a joint."""
+        return self.cluster_of(self._motion[self._used[joint]])
 
     def noise(self, joint: int) -> float:
         """One sigma of a joint's torque, N·m: the scatter of neighbouring readings about a straight line."""
