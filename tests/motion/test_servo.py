@@ -1,0 +1,115 @@
+"""Time stepping of a servo against closed forms of the equation of motion."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba", reason="the extra fast is not installed")
+
+from thermal_robot.motion.servo import PARAMETERS, simulate
+
+STEP = 0.02
+
+
+def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, **numbers):
+    """Position after a step of the command (or a table of stamps and values), and its instants."""
+    times, values = (np.array([0.0]), np.array([command])) if np.isscalar(command) else map(np.asarray, command)
+    times = np.append(times, times[-1] + 2 * seconds)
+    values = np.append(values, values[-1]).astype(float)
+    integral = np.column_stack([np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))]), values])
+    n = round(seconds / STEP) + 1
+    row = np.zeros(len(PARAMETERS))
+    row[PARAMETERS.index("low")], row[PARAMETERS.index("high")] = -np.inf, np.inf
+    for name, value in numbers.items():
+        row[PARAMETERS.index(name)] = value
+    flat = np.ones((1, n))
+    around = load * flat, slope * flat[0], 0.0 * flat[0], 0.0 * flat
+    grid = np.array([0, n]), np.zeros(1)
+    ends = np.array([0, len(times)])
+    found = simulate(row[None], np.ones((1, 1)), grid, (times, integral, ends), around, np.array([start]), STEP, substeps)
+    return found[0], STEP * np.arange(n)
+
+
+def test_lag_follows_its_exponential():
+    q, t = moved(lag=0.07)
+    np.testing.assert_allclose(q, 1.0 - np.exp(-t / 0.07), atol=2e-4)
+
+
+@pytest.mark.parametrize(("substeps", "error"), [(5, 2e-3), (10, 5e-4), (20, 1.3e-4)])
+def test_inertia_rings_as_an_oscillator_to_second_order_of_the_step(substeps, error):
+    inertia, lag = 1e-3, 0.02
+    q, t = moved(lag=lag, inertia=inertia, substeps=substeps)
+    root, decay = 1.0 / np.sqrt(inertia), lag / (2.0 * inertia)
+    rings = np.sqrt(root**2 - decay**2)
+    exact = 1.0 - np.exp(-decay * t) * (np.cos(rings * t) + decay / rings * np.sin(rings * t))
+    np.testing.assert_allclose(q, exact, atol=error)
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-3])
+def test_friction_stops_the_joint_within_its_width_and_holds_it(inertia):
+    q, _ = moved(lag=0.05, inertia=inertia, coulomb=0.1)
+    assert abs(1.0 - q[-1]) <= 0.1 + 1e-12
+    assert np.ptp(q[-20:]) < 1e-13
+    q, _ = moved(command=0.09, lag=0.05, inertia=inertia, coulomb=0.1)
+    assert np.ptp(q) == 0.0  # a pull below the friction moves nothing
+
+
+def test_a_joint_hangs_below_its_command_by_compliance_times_load():
+    q, _ = moved(lag=0.05, droop=0.07, load=2.0)
+    assert q[-1] == pytest.approx(1.0 - 0.07 * 2.0, abs=1e-9)
+    q, _ = moved(lag=0.05, droop=0.07, load=2.0, slope=3.0)  # the load grows with the position
+    assert q[-1] == pytest.approx((1.0 - 0.07 * 2.0) / (1.0 + 0.07 * 3.0), abs=1e-9)
+
+
+def test_delay_shifts_the_answer_and_no_more():
+    stamps = np.arange(0.0, 2.0, 0.05)
+    command = stamps, np.sin(3.0 * stamps)
+    q, t = moved(command, lag=0.05)
+    late, _ = moved(command, lag=0.05, delay=0.06)
+    np.testing.assert_allclose(late[3:], q[:-3], atol=1e-3)
+    assert not np.allclose(late, q, atol=1e-2)
+
+
+def test_delay_moves_the_answer_smoothly():
+    stamps = np.arange(0.0, 2.0, 0.05)
+    command = stamps, np.sin(3.0 * stamps)
+    each = np.array([moved(command, lag=0.05, delay=d)[0] for d in np.linspace(0.010, 0.020, 11)])
+    slopes = np.diff(each, axis=0)
+    assert np.abs(np.diff(slopes, axis=0)).max() < 0.1 * np.abs(slopes).max()
+
+
+def test_a_saturated_servo_turns_at_its_limit_over_its_lag():
+    q, t = moved(command=2.0, seconds=0.6, lag=0.1, saturation=1.0 / 0.2)
+    speed = np.diff(q) / STEP
+    np.testing.assert_allclose(speed[:20], 0.2 / 0.1, rtol=1e-6)
+
+
+def test_a_stop_is_never_passed_and_is_left_without_delay():
+    q, t = moved(lag=0.05, high=0.4)
+    assert q.max() == 0.4
+    stamps = np.array([0.0, 1.0])
+    q, t = moved((stamps, [1.0, 0.0]), lag=0.05, high=0.4)
+    assert q[t > 1.05].max() < 0.4
+
+
+def test_dead_zone_leaves_half_its_width_on_either_side():
+    up, _ = moved(command=1.0, lag=0.05, dead_zone=0.03)
+    down, _ = moved(command=-1.0, lag=0.05, dead_zone=0.03)
+    assert up[-1] == pytest.approx(0.97, abs=1e-6)
+    assert down[-1] == pytest.approx(-0.97, abs=1e-6)
+
+
+def test_friction_that_grows_with_load_widens_the_hysteresis():
+    stamps = np.array([0.0, 2.0])
+    width = []
+    for load in (1.0, 2.0):
+        up, _ = moved((stamps, [1.0, 1.0]), seconds=2.0, lag=0.05, droop=0.1, load=load, load_friction=0.5)
+        down, _ = moved((stamps, [1.0, 1.0]), seconds=2.0, lag=0.05, droop=0.1, load=load, load_friction=0.5, start=2.0)
+        width.append(down[-1] - up[-1])
+    np.testing.assert_allclose(width, [2 * 0.5 * 0.1, 2 * 0.5 * 0.2], rtol=1e-3)
+
+
+def test_breakaway_is_above_sliding_friction():
+    held, _ = moved(command=0.05, lag=0.05, coulomb=0.03, stribeck=0.03)
+    free, _ = moved(command=0.05, lag=0.05, coulomb=0.03)
+    assert np.ptp(held) == 0.0
+    assert np.ptp(free) > 0.01
