@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from thermal_robot.fleet.comparison import Comparison
     from thermal_robot.fleet.many import diagnose_many
     from thermal_robot.fleet.wear import wear
+    from thermal_robot.motion import motion_from_table, read_motion
     from thermal_robot.observations import Observations, observe
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
@@ -62,8 +63,10 @@ _HOME = {
     "diagnose": "diagnosis",
     "diagnose_many": "fleet.many",
     "load_robot": "robot",
+    "motion_from_table": "motion",
     "observe": "observations",
     "read_campaign": "campaign",
+    "read_motion": "motion",
     "read_samples": "campaign",
     "simulate": "simulation",
     "write_campaign": "campaign",
@@ -106,8 +109,10 @@ __all__ = [
     "diagnose",
     "diagnose_many",
     "load_robot",
+    "motion_from_table",
     "observe",
     "read_campaign",
+    "read_motion",
     "read_samples",
     "simulate",
     "wear",

@@ -76,6 +76,11 @@ def test_an_interruption_parts_a_motion():
     assert all(motion.position.time[0] < 1.6 for motion in found.motions)
 
 
+def test_a_motion_of_a_second_and_a_half_is_read():
+    state, command = tables(1)
+    assert len(log(state[state.time < 1.5], command[command.time < 1.5]).motions) == 1
+
+
 SPOILT = [
     ('urdf = "builtin:rv_m2"', "", "neither", "urdf or mjcf"),
     ('angle_unit = "rad"', "", "motion.angle_unit", "is missing"),

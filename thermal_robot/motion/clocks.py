@@ -14,6 +14,7 @@ from thermal_robot.motion.settings import CLEAR, FAR, FOLLOWS, OUTLIER, PIECE, R
 
 _COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
 _MOST = 8  # motions that tell a rate roughly
+_SPAN = 120.0  # s of each that are looked at: enough for a rate to 0.001
 _NEAR = 2.0  # s that clocks may differ by at their beginning
 _SIGMA = 1.4826  # standard deviation over median absolute deviation of a normal law
 
@@ -57,7 +58,7 @@ def evened(motion: Motion) -> Motion:
     t = motion.position.time
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(np.diff(t) / np.median(np.diff(t))), 1.0))])
     line = np.polynomial.Polynomial.fit(number, t, 1)
-    return reclocked(motion, lambda stamps: np.interp(stamps, t, line(number)))
+    return reclocked(motion, lambda stamps: stamps + np.interp(stamps, t, line(number) - t))
 
 
 def rate(log: MotionLog) -> tuple[float, float]:
@@ -83,7 +84,7 @@ def _searched(log: MotionLog) -> float:
     longest = sorted(log.motions, key=lambda motion: -float(motion.position.time[-1]))[:_MOST]
     spans = [float(m.position.time[-1] - m.position.time[0]) for m in longest]
     lengths = [float(np.ptp(m.command.time)) / span for m, span in zip(longest, spans, strict=True)]
-    fine = 2.0 * STRIDE / max(spans)
+    fine = 2.0 * STRIDE / min(max(spans), _SPAN)
     grid = np.arange(1.0 - RATES, 1.0 + RATES, fine)
     centre = float(np.median(lengths))
     grid = np.union1d(grid, centre * grid[np.abs(grid - 1.0) < 0.01]) if abs(centre - 1.0) > RATES else grid
@@ -92,7 +93,8 @@ def _searched(log: MotionLog) -> float:
 
 
 def _likeness(motion: Motion, r: float) -> float:
-    moves = Moves.of(reclocked(motion, lambda t: r * t), _COARSE * STRIDE)
+    whole = Moves.of(reclocked(motion, lambda t: r * t), _COARSE * STRIDE)
+    moves = next(whole.parts(-(-len(whole.time) // round(_SPAN / whole.step))))
     return Correlation.of(moves, _NEAR).best()[1] * len(moves.time)
 
 

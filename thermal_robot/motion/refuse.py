@@ -48,7 +48,7 @@ def _foreign(motion: Motion) -> float:
     moves = Moves.of(motion)
     moving = np.abs(moves.commanded).max(axis=1) > STILL_COMMAND
     reach = int(np.ceil(LONGEST_LAG / moves.step))
-    near = np.convolve(moving, np.ones(2 * reach + 1), "same") > 0.5
+    near = np.convolve(moving, np.ones(2 * reach + 1))[reach : reach + len(moving)] > 0.5
     energy = (moves.measured**2).sum(axis=1)
     return float(energy[~near].sum() / max(energy.sum(), 1e-12))
 
