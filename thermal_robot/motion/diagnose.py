@@ -115,7 +115,7 @@ def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -
     for fold in range(folds):
         progress(f"motions held out, part {fold + 1} of {folds}")
         held = np.arange(count) % folds == fold
-        values = fit(model, choice.point.values, choice.active, choice.sizes, ~held, choice.point.rows)
+        values = fit(model, choice.point.values, choice.active, choice.sizes, ~held)
         for joint, left in enumerate(model.each(lambda j, v=values: model.residuals(j, v[None])[0])):
             out = held[choice.point.rows[joint].motion]
             found[joint][out] = left[out]

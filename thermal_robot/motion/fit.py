@@ -29,9 +29,9 @@ class Point:
     noise: Array
 
     @classmethod
-    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None, rows: list[Rows] | None = None) -> Point:
-        """Linearise the model at some values by the parameters ``wanted``, unless the rows are known."""
-        rows = model.all_rows(values, wanted) if rows is None else rows
+    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None) -> Point:
+        """Linearise the model at some values by the parameters ``wanted``."""
+        rows = model.all_rows(values, wanted)
         noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
         return cls(values, rows, noise)
 
@@ -62,22 +62,27 @@ def fit(
     active: Mask,
     sizes: Array,
     motions: Mask | None = None,
-    rows: list[Rows] | None = None,
 ) -> Array:
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
     ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading. ``motions``
-    (M,) are the clusters that are fitted, by default all; ``rows`` the model at the values, where it is known.
+    (M,) are the clusters that are fitted, by default all.
     """
-    own = np.flatnonzero(active)
     values = np.where(active, values, 0.0)
-    lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
-    shared = any(model.parameters[p].joint == SHARED for p in own)
     joint_of = np.array([one.joint for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     used = [motions[model.motion_of(joint)] for joint in model.joints]
+    common = active & (joint_of == SHARED)
+    quiet = 0
     for number in range(settings.ROUNDS):
-        point = Point.at(model, values, active, rows if number == 0 else None)
+        # joints go their own ways first; what they share moves in every second round
+        shared = bool(common.any()) and number % 2 == 1
+        now = active if shared else active & ~common
+        own = np.flatnonzero(now)
+        lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
+        if not len(own):
+            continue
+        point = Point.at(model, values, now)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
         tight = np.diag(sizes[own] ** -2.0)
         before = np.array(
@@ -108,7 +113,8 @@ def fit(
                     best[joint_of == j] = ahead[k][joint_of == j]
                     gained += before[j] - cost[k]
         values = best
-        if gained < settings.SETTLED * before.sum():
+        quiet = quiet + 1 if gained < settings.SETTLED * before.sum() else 0
+        if quiet > common.any():
             break
     return values
 

@@ -17,6 +17,10 @@ from thermal_robot.motion.fit import Point, deflated, fit, ratios
 from thermal_robot.motion.model import JointModel
 
 Mask = NDArray[np.bool_]
+PLAIN = ("zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
+"""Effects from which a fit starts: what every servo has, and little that does the same."""
+ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
+"""Effects that do nothing until they are reached."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +71,11 @@ class Choice:
 def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Array:
     """Maximum a posteriori values of all effects together, loads taken where the joints go, until both agree."""
     sizes = np.array([one.size for one in model.parameters])
-    values = np.where(allowed, model.start(), 0.0)
+    start = np.where(allowed, model.start(), 0.0)
+    plain = allowed & np.array([one.effect in PLAIN for one in model.parameters])
+    values = fit(model, np.where(plain, start, 0.0), plain, sizes) if plain.any() else np.zeros(len(sizes))
+    abrupt = allowed & np.array([one.effect in ABRUPT for one in model.parameters])
+    values = np.where(abrupt, start, values)  # of what does nothing until it is reached a derivative at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)

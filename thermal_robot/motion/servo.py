@@ -65,6 +65,8 @@ def _simulate(numbers, weights, begins, first, step, substeps, times, integral, 
                     mass += weights[s, i] * inertias[i, n]
                 accelerating = 2.0 * (droop * mass + inertia) / h
                 bend = droop * slope[n]
+                # without inertia the midpoint rule would ring about a command that is followed at once
+                drag = max(lag, half) if accelerating < half else lag
                 force = droop * load0
                 if n > begins[m]:
                     for _ in range(substeps):
@@ -92,7 +94,7 @@ def _simulate(numbers, weights, begins, first, step, substeps, times, integral, 
                             pull += most
                         middle = 0.0
                         if abs(at_rest) > most:
-                            damping = accelerating + lag + bend * half
+                            damping = accelerating + drag + bend * half
                             w, piece = 0.0, -1
                             for _ in range(NEWTON_STEPS):
                                 e = u - q - half * w

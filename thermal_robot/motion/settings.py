@@ -73,11 +73,11 @@ DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
 CLUSTERS, BLOCKS = 8, 20
 """Motions from which they count as independent; below, the rows are cut into so many blocks, and ± is said to be weak."""
-ROUNDS = 8
+ROUNDS = 12
 """Gauss-Newton steps at most of one fit."""
 SETTLED = 1e-4
 """Of the sum of squares: a smaller gain ends the fit."""
-DAMPINGS = (0.0, 1e-2, 1.0)
+DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 """Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
 ANGLE_STEP = 1e-4
 """rad: step by which a load's slope is told; a load is linear over it, and rounding stays below 1e-10 of it."""

@@ -1,0 +1,124 @@
+"""The servo model of a log, its fit and its evidence: derivatives, recovery, and what counts as independent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motion import arms
+
+pytest.importorskip("numba", reason="the extra fast is not installed")
+
+from thermal_robot.motion.diagnose import diagnose_motion
+from thermal_robot.motion.fit import Point, deflated, fit, ratios
+from thermal_robot.motion.log import Channel
+from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.select import held_out_loss
+
+COUNT = 2 * np.pi / 4096
+
+
+def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT):
+    """A log whose encoders are what the servo model does with some true values, by effect and joint, and that model."""
+    log = arms.log(*arms.tables(motions, seconds, seed)).with_joints(joints)
+    model = ServoModel(log)
+    values = np.zeros(len(model.parameters))
+    for (effect, joint), value in true.items():
+        values[model.index(effect, joint)] = value
+    for _ in range(3):
+        model.refreshed(values)
+    place = [model.positions(j, values[None])[0] for j in model.joints]
+    parts = []
+    for m, motion in enumerate(log.motions):
+        grid = model.grid[model.begins[m] : model.begins[m + 1]]
+        q = np.stack([np.interp(motion.position.time, grid, p[model.begins[m] : model.begins[m + 1]]) for p in place], 1)
+        parts.append(replace(motion, position=Channel(motion.position.time, noise * np.round(q / noise)), velocity=None))
+    return replace(log, motions=tuple(parts)), values
+
+
+TRUE = {
+    ("lag", 0): 0.06,
+    ("coulomb", 0): 0.006,
+    ("lag", 1): 0.05,
+    ("droop", 1): 4e-4,
+    ("delay", 1): 0.03,
+}
+
+
+@pytest.fixture(scope="module")
+def known():
+    log, values = driven(TRUE)
+    model = ServoModel(log)
+    for _ in range(2):
+        model.refreshed(values)
+    return log, model, values
+
+
+def test_derivatives_are_those_of_a_step_a_tenth_as_long(known, monkeypatch):
+    _, model, values = known
+    coarse = model.rows(1, values)
+    monkeypatch.setattr("thermal_robot.motion.settings.DIFFERENCE", 0.005)
+    fine = model.rows(1, values)
+    for k, p in enumerate(fine.columns):
+        if model.parameters[p].effect in ("zero", "lag", "delay", "droop", "gain"):
+            far = np.linalg.norm(coarse.derivative[:, k] - fine.derivative[:, k])
+            assert far < 0.1 * np.linalg.norm(fine.derivative[:, k]), model.parameters[p]
+
+
+def test_the_fit_returns_to_the_true_values(known):
+    _, model, values = known
+    sizes = np.array([one.size for one in model.parameters])
+    found = fit(model, np.where(values > 0.0, 1.5 * values, 0.0), values != 0.0, sizes)
+    np.testing.assert_allclose(found[values != 0.0], values[values != 0.0], rtol=0.03)
+    left = [np.sqrt(np.mean(model.residuals(j, found[None]) ** 2)) for j in model.joints]
+    assert max(left) < 2.0 * COUNT / np.sqrt(12.0)
+
+
+def test_evidence_is_deflated_and_never_inflated(known):
+    _, model, values = known
+    point = Point.at(model, values)
+    ratio = ratios(point)
+    assert (ratio >= 1.0).all()
+    gram, blocks = deflated(model, point, ratio)
+    white, _ = deflated(model, point, np.ones(len(ratio)))
+    assert np.linalg.eigvalsh(white.matrix - gram.matrix).min() > -1e-6 * np.linalg.eigvalsh(white.matrix).max()
+    assert [effect for effect, joint in blocks if joint == SHARED] == ["payload", "contact"]
+
+
+def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(known):
+    """Rows of one motion that err together count as one: ten times the rows of the same errors change no ratio's part."""
+    _, model, values = known
+    point = Point.at(model, values)
+    draw = np.random.default_rng(1)
+    apart = {}
+    for name in ("white", "together"):
+        rows = []
+        for one in point.rows:
+            each = draw.normal(size=one.motion.max() + 1)[one.motion]
+            rows.append(replace(one, residual=each if name == "together" else draw.normal(size=len(one.residual))))
+        apart[name] = ratios(replace(point, rows=rows, noise=np.ones(2)))
+    seen = [model.index("zero", 0), model.index("gain", 0)]
+    assert apart["white"][seen].max() < 5.0
+    assert apart["together"][seen].min() > 20.0
+
+
+def test_what_is_needed_lowers_the_loss_of_motions_held_out(known):
+    _, model, values = known
+    point, sizes = Point.at(model, values), np.array([one.size for one in model.parameters])
+    whole = held_out_loss(point, values != 0.0, sizes).sum()
+    for effect, joint in TRUE:
+        less = values != 0.0
+        less[model.index(effect, joint)] = False
+        assert held_out_loss(point, less, sizes).sum() > 1.1 * whole, (effect, joint)
+
+
+@pytest.mark.slow
+def test_diagnosis_names_what_was_put_in_and_little_else():
+    log, values = driven(TRUE)
+    found = diagnose_motion(log)
+    named = set(found.values)
+    assert {(effect, log.joints[joint]) for effect, joint in TRUE} <= named
+    assert found.held_out.shrinkage > 0.99
+    table = found.parameters
+    for (effect, joint), value in TRUE.items():
+        row = next(r for name, r in table.loc[effect].iterrows() if log.joints[joint] in name)
+        assert abs(row["value"] - value) < 4.0 * row["std"] + 0.05 * value, (effect, joint)
