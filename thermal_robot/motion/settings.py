@@ -82,3 +82,5 @@ NOISY = 1.5
 """Times the encoder's noise: what remains below it is that noise."""
 STRUCTURE, LEVELS = 0.1, 10
 """Share of what remains that a curve must explain in motions held out to be told; and levels of such a curve."""
+AGREE = 0.1
+"""Share by which the shrinkage of a simulator's own rollout may differ from the one that was told."""

@@ -37,8 +37,8 @@ class World:
     explicit: bool
     count: float
 
-    def model(self, fault: Fault) -> Any:
-        """Return the ``mujoco.MjModel`` of the arm with a fault."""
+    def spec(self, fault: Fault) -> Any:
+        """Return the ``mujoco.MjSpec`` of the arm with a fault."""
         mujoco = mujoco_or_error()
         spec = mujoco.MjSpec.from_string(self.arm.urdf)
         spec.compiler.fusestatic, spec.compiler.boundmass, spec.compiler.boundinertia = False, 1e-9, 1e-12
@@ -51,11 +51,17 @@ class World:
             actuator.set_to_position(kp=servo.kp, kv=servo.kd)
             actuator.forcelimited, actuator.forcerange = True, np.array([-1.0, 1.0]) * (servo.limit or 0.0)
         fault.built(spec, self.arm)
-        return spec.compile()
+        return spec
+
+    def mjcf(self) -> str:
+        """Return the sound arm as MJCF text, with its time step."""
+        spec = self.spec(Fault("nothing"))
+        spec.compile()
+        return str(spec.to_xml())
 
     def simulated(self, fault: Fault) -> Sound:
         """Simulate all motions, each from rest: (M n, J) positions and torques, and heights of the tool."""
-        mujoco, model = mujoco_or_error(), self.model(fault)
+        mujoco, model = mujoco_or_error(), self.spec(fault).compile()
         held = round(1.0 / (self.rate * self.step))
         before = round(sizes.SETTLE * self.rate)
         shape = self.commands.shape
@@ -96,7 +102,7 @@ def draw_world(rng: np.random.Generator, joints: int, motions: int) -> World:
     commands = np.stack([np.stack([MOVES[kind](rng, time) for _ in range(joints)], axis=1) for kind in kinds])
     count = 2.0 * np.pi / 2.0 ** rng.integers(*sizes.BITS, endpoint=True)
     world = World(arm, commands, kinds, rate, float(rng.choice(sizes.STEPS)), False, float(count))
-    model = world.model(Fault("nothing"))
+    model = world.spec(Fault("nothing")).compile()
     mass = np.empty((model.nv, model.nv))
     data = mujoco_or_error().MjData(model)
     mujoco_or_error().mj_forward(model, data)
