@@ -22,7 +22,15 @@ JOINT = 1
 
 def a_world(seed=5, rows=150, motions=2):
     world = draw_world(np.random.default_rng(seed), 3, motions)
-    return replace(world, commands=world.commands[:, :rows], step=1e-3, rate=50.0, count=1e-7, explicit=False)
+    return replace(
+        world, commands=world.commands[:, :rows], step=1e-3, rate=50.0, count=1e-7, explicit=False, sticks=True
+    )
+
+
+def strong(world):
+    """The arm with servos that never saturate."""
+    servos = {name: replace(servo, limit=1e3) for name, servo in world.arm.servos.items()}
+    return replace(world, arm=replace(world.arm, servos=servos))
 
 
 def found_of(log, values):
@@ -75,6 +83,19 @@ def test_a_delay_of_every_joint_is_held_by_the_actuators():
     log = world.log(faulty)
     own = rolled(world, log, {("delay", joint): late for joint in log.joints})
     assert float(np.abs(own - faulty.position).max()) < 1e-4
+
+
+def test_friction_that_is_written_sticks_as_the_servo_models_does():
+    world = strong(a_world(rows=300, motions=5))
+    faulty = world.simulated(Fault("coulomb", JOINT, 0.15))
+    log = world.log(faulty)
+    found = found_of(log, {"coulomb": 0.15 / stiffness(log)})
+    did = rollout(found, motion_mjcf(found, world.mjcf()).text, log)
+    creeping = world.log(replace(world, sticks=False).simulated(Fault("coulomb", JOINT, 0.15)))
+    soft = rollout(found, motion_mjcf(found, world.mjcf()).text, creeping)
+    assert did.agrees
+    assert did.simulated[JOINT] < 0.05 * did.nominal[JOINT]
+    assert soft.simulated[JOINT] > 5.0 * did.simulated[JOINT]
 
 
 def test_an_end_stop_becomes_a_range():
@@ -142,9 +163,7 @@ def test_a_joint_that_the_model_lacks_is_refused():
 
 
 def test_the_rollout_shrinks_the_gap_as_it_was_told():
-    fitted = a_world(5, 200)
-    strong = {name: replace(servo, limit=1e3) for name, servo in fitted.arm.servos.items()}
-    fitted = replace(fitted, arm=replace(fitted.arm, servos=strong))
+    fitted = strong(a_world(5, 200))
     unseen = replace(fitted, commands=0.7 * fitted.commands[:, ::-1].copy())
     fault = Fault("kp", JOINT, -0.4)
     found = found_of(fitted.log(fitted.simulated(fault)), {"kp": -0.4})

@@ -21,6 +21,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error, set_damping
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.urdf import text_of, tree
+from thermal_robot.motion import settings
 from thermal_robot.motion.log import Servo
 from thermal_robot.motion.result import MotionDiagnosis
 
@@ -135,12 +136,20 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
             own = ", ".join(joints) or "no joint"
             raise CampaignError(str(path or "the MJCF"), f"has no joint {cause.name!r}", found=own)
         _into_joint(joints[cause.name], cause, written)
+        if cause.torque("coulomb") is not None:
+            stick(spec, joints[cause.name])
         _into_servo(spec, cause, written)
         _tell_kept(cause, written, _CANNOT)
     _into_masses(spec, found, written)
     spec.compile()
     written.text = spec.to_xml()
     return written
+
+
+def stick(spec: Any, joint: Any) -> None:
+    """Let friction of a ``mujoco.MjsJoint`` hold it at rest, as Coulomb's does; MuJoCo's usual one creeps."""
+    joint.solref_friction = [settings.STIFFEST * float(spec.option.timestep), 1.0]
+    joint.solimp_friction = list(settings.STICKING)
 
 
 def _said(written: Written, cause: Cause, what: str, value: float, unit: str) -> None:

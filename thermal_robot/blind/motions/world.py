@@ -14,6 +14,7 @@ from thermal_robot.blind.motions.arm import TOOL, Arm, draw_arm
 from thermal_robot.blind.motions.fault import Fault, Sound, draw_fault
 from thermal_robot.correction.mujoco_models import mujoco_or_error
 from thermal_robot.motion import Channel, Motion, MotionLog
+from thermal_robot.motion.write import stick
 from thermal_robot.robot import load_robot
 
 
@@ -26,7 +27,7 @@ class World:
     """An arm, the commands (M, n, J) that it gets, rad, and how it is simulated and read.
 
     ``kinds`` (M,) of the motions; ``rate`` Hz; ``step`` s; ``explicit`` whether by Runge-Kutta; ``count`` rad of the
-    encoders.
+    encoders; ``sticks`` whether friction holds a joint at rest, or lets it creep, as MuJoCo's usual one does.
     """
 
     arm: Arm
@@ -36,6 +37,7 @@ class World:
     step: float
     explicit: bool
     count: float
+    sticks: bool = False
 
     def spec(self, fault: Fault) -> Any:
         """Return the ``mujoco.MjSpec`` of the arm with a fault."""
@@ -46,6 +48,8 @@ class World:
         spec.option.integrator = rule.mjINT_RK4 if self.explicit else rule.mjINT_IMPLICITFAST
         spec.option.timestep = self.step
         for name, servo in self.arm.servos.items():
+            if self.sticks:
+                stick(spec, spec.joint(name))
             spec.joint(name).limited, spec.joint(name).actfrclimited = False, False
             actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             actuator.set_to_position(kp=servo.kp, kv=servo.kd)
@@ -108,7 +112,8 @@ def draw_world(rng: np.random.Generator, joints: int, motions: int) -> World:
     mujoco_or_error().mj_forward(model, data)
     mujoco_or_error().mj_fullM(model, data, mass)
     fastest = np.max(np.array([servo.kd for servo in arm.servos.values()]) / np.diag(mass))
-    return replace(world, explicit=bool(rng.random() < 0.5 and fastest * world.step < sizes.STIFF))
+    explicit = bool(rng.random() < 0.5 and fastest * world.step < sizes.STIFF)
+    return replace(world, explicit=explicit, sticks=bool(rng.random() < 0.5))
 
 
 def draw_log(rng: np.random.Generator, world: World, name: str, stated: bool = True) -> tuple[MotionLog, Fault]:
