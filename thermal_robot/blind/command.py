@@ -8,7 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -40,6 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     size.add_argument(
         "--count", metavar="KIND=N", nargs="+", action="extend", help="these only; kinds: " + " ".join(KINDS)
     )
+    motion = "the trial of motions instead: N servo arms of each fault; of use with --seed, --workers and --json"
+    parser.add_argument("--motion", metavar="N", type=int, help=motion)
     parser.add_argument("--robot", metavar="URDF", action="append", default=[], help="your robot; may be repeated")
     parser.add_argument("--tool", metavar="LINK", action="append", default=[], help="link with the target, per --robot")
     several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
@@ -68,6 +70,9 @@ def run(options: argparse.Namespace) -> None:
     if options.workers < 1:
         raise ThermalRobotError("--workers must be at least 1")
     seed = int(time.time()) if options.seed is None else options.seed
+    if options.motion is not None:
+        _motions(options, seed)
+        return
     directory = Path(options.directory or f"blind-{seed}")
     # what is printed instead of the text stands alone on stdout
     notes = sys.stderr if options.markdown or options.printed else sys.stdout
@@ -93,6 +98,25 @@ def run(options: argparse.Namespace) -> None:
         print(f"thermal-robot: stopped; the same command with {again} continues", file=sys.stderr)
         raise SystemExit(1) from None
     _tell(records, options)
+
+
+def _motions(options: argparse.Namespace, seed: int) -> None:
+    """Run the trial of motions, print its score and write its answers."""
+    from thermal_robot.blind.motions.trial import plan, run, text
+
+    others = ("size", "count", "robot", "effect", "fault", "data", "directory", "report", "markdown")
+    given = [f"--{name}" for name in others if getattr(options, name)]
+    if options.motion < 1 or given:
+        found = ", ".join(given) or str(options.motion)
+        raise CampaignError("--motion", "cannot be run so", found=found, expected="a number from 1, and none of these")
+    cases = plan(seed, options.motion)
+    note(f"Seed {seed}: {len(cases)} arms", options.loudness)
+    answers = run(cases, options.workers, lambda one: note(f"{one.case.fault}: {one.verdict}", options.loudness))
+    if not options.printed:
+        print(text(answers))
+    if options.json:
+        written = json.dumps([asdict(one) for one in answers], indent=2)
+        write_one(options.json, lambda path: write_text(path, written + "\n"))
 
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:

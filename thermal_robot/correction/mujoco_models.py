@@ -130,6 +130,11 @@ def known(model: Any, kind: str, name: str) -> int | None:
     return None if number < 0 else int(number)
 
 
+def set_damping(joint: Any, damping: float) -> None:
+    """Set the viscous damping of a ``mujoco.MjsJoint``, N·m·s/rad; newer versions have a polynomial."""
+    joint.damping = damping if np.ndim(joint.damping) == 0 else [damping, 0.0, 0.0]
+
+
 _BESIDE, _ASKEW = 0.02, 0.05
 """m and rad by which the axes of the two nominal robots may differ: more than any two models of one robot do, less than
 those of another robot, or of one whose zeros stand elsewhere."""

@@ -1,0 +1,183 @@
+"""Causes written into robot files: MuJoCo with the written model does what the arm did; what a file lacks is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from thermal_robot.blind.motions.fault import NOTHING, Fault
+from thermal_robot.blind.motions.world import draw_world
+from thermal_robot.diagnosis.values import HeldOut, Unexplained
+from thermal_robot.errors import CampaignError
+from thermal_robot.motion.result import MotionDiagnosis
+from thermal_robot.motion.rollout import Rollout, rollout, simulated
+from thermal_robot.motion.write import causes, motion_mjcf, motion_urdf
+
+pytest.importorskip("mujoco", reason="an MJCF is written by MuJoCo")
+JOINT = 1
+
+
+def a_world(seed=5, rows=150, motions=2):
+    world = draw_world(np.random.default_rng(seed), 3, motions)
+    return replace(
+        world, commands=world.commands[:, :rows], step=1e-3, rate=50.0, count=1e-7, explicit=False, sticks=True
+    )
+
+
+def strong(world):
+    """The arm with servos that never saturate."""
+    servos = {name: replace(servo, limit=1e3) for name, servo in world.arm.servos.items()}
+    return replace(world, arm=replace(world.arm, servos=servos))
+
+
+def found_of(log, values):
+    """A diagnosis that found these values, by effect; of the whole arm where the key is no pair."""
+    own = {(key, log.joints[JOINT]) if isinstance(key, str) else key: value for key, value in values.items()}
+    held = HeldOut("motion", 2, 1.0, 0.1, 0.99, (0.98, 1.0))
+    return MotionDiagnosis(log, {}, held, (), (), 1.0, Unexplained(False, 0.0, 1.0), own, {})
+
+
+def stiffness(log):
+    return log.servos[log.joints[JOINT]].kp
+
+
+def rolled(world, log, values):
+    written = motion_mjcf(found_of(log, values), world.mjcf())
+    assert written.held
+    assert written.kept == []
+    return np.concatenate(simulated(written.text, log))
+
+
+CASES = [
+    ("coulomb", 0.2, lambda k, limit: {"coulomb": 0.2 / k}),
+    ("armature", 0.02, lambda k, limit: {"armature": 0.02 / k}),
+    ("viscous", 0.3, lambda k, limit: {"lag": 0.3 / k}),
+    ("kp", 0.3, lambda k, limit: {"kp": 0.3}),
+    ("zero", 0.02, lambda k, limit: {"zero": 0.02}),
+    ("gain", 0.03, lambda k, limit: {"gain": 0.03}),
+    ("payload", 0.05, lambda k, limit: {("payload", ""): 0.05}),
+    ("torque limit", 1.0, lambda k, limit: {"torque_limit": k * (1.0 - 1.0 / limit)}),
+]
+
+
+@pytest.mark.parametrize(("name", "size", "values"), CASES, ids=[case[0] for case in CASES])
+def test_mujoco_with_what_was_written_does_what_the_faulty_arm_did(name, size, values):
+    world = a_world()
+    sound = world.simulated(Fault(NOTHING))
+    faulty = world.simulated(Fault(name, JOINT, size))
+    log = world.log(faulty)
+    told = values(stiffness(log), log.servos[log.joints[JOINT]].limit)
+    own = rolled(world, log, told)
+    moved = float(np.abs(faulty.position - sound.position).max())
+    assert moved > 1e-3
+    assert float(np.abs(own - faulty.position).max()) < 0.03 * moved + 1e-5
+
+
+def test_a_delay_of_every_joint_is_held_by_the_actuators():
+    world = a_world()
+    late = 0.0305  # between two steps, so that rounding of the clock does not choose one
+    faulty = world.simulated(Fault("delay", size=late))
+    log = world.log(faulty)
+    own = rolled(world, log, {("delay", joint): late for joint in log.joints})
+    assert float(np.abs(own - faulty.position).max()) < 1e-4
+
+
+def test_friction_that_is_written_sticks_as_the_servo_models_does():
+    world = strong(a_world(rows=300, motions=5))
+    faulty = world.simulated(Fault("coulomb", JOINT, 0.15))
+    log = world.log(faulty)
+    found = found_of(log, {"coulomb": 0.15 / stiffness(log)})
+    did = rollout(found, motion_mjcf(found, world.mjcf()).text, log)
+    creeping = world.log(replace(world, sticks=False).simulated(Fault("coulomb", JOINT, 0.15)))
+    soft = rollout(found, motion_mjcf(found, world.mjcf()).text, creeping)
+    assert did.agrees
+    assert did.simulated[JOINT] < 0.05 * did.nominal[JOINT]
+    assert soft.simulated[JOINT] > 5.0 * did.simulated[JOINT]
+
+
+def test_an_end_stop_becomes_a_range():
+    world = a_world()
+    sound = world.simulated(Fault(NOTHING)).position[:, JOINT]
+    stop = float(np.quantile(sound, 0.7))
+    faulty = world.simulated(Fault("end stop", JOINT, stop, 1.0))
+    log = world.log(faulty)
+    value = float(world.commands[..., JOINT].max()) - stop
+    own = rolled(world, log, {"high_stop": value})
+    assert float(np.abs(own - faulty.position).max()) < 2e-3
+    assert causes(found_of(log, {"high_stop": value}))[JOINT].stops == (None, pytest.approx(stop))
+
+
+def test_without_a_stiffness_no_torque_is_written():
+    world = a_world()
+    log = world.log(world.simulated(Fault(NOTHING)), stated=False)
+    loose = found_of(log, {"coulomb": 0.01, "lag": 0.05})
+    for written in (motion_mjcf(loose, world.mjcf()), motion_urdf(loose)):
+        assert written.held == []
+        assert [told.split(":")[0] for told in written.kept] == ["coulomb of joint_2", "lag of joint_2"]
+        assert all("stiffness is not stated" in told for told in written.kept)
+    known = motion_mjcf(found_of(log, {"coulomb": 0.01, "droop": 0.05}), world.mjcf())
+    assert "frictionloss of joint_2: 0.2 N·m" in known.held
+    assert 'frictionloss="0.2"' in known.text
+
+
+def test_what_no_file_holds_is_said():
+    world = a_world()
+    log = world.log(world.simulated(Fault(NOTHING)))
+    found = found_of(
+        log, {"dead_zone": 0.01, "load_friction": 0.1, "stribeck": 0.01, ("contact", ""): 0.1, ("payload", ""): -0.1}
+    )
+    for written in (motion_mjcf(found, world.mjcf()), motion_urdf(found)):
+        assert written.held == []
+        assert {told.split(" of ")[0].split(":")[0] for told in written.kept} == {
+            "dead_zone", "load_friction", "stribeck", "contact", "payload"
+        }  # fmt: skip
+
+
+def test_a_urdf_holds_friction_damping_limits_and_load():
+    world = a_world()
+    log = world.log(world.simulated(Fault(NOTHING)))
+    k = stiffness(log)
+    values = {"coulomb": 0.01, "lag": 0.02, "low_stop": 0.1, "armature": 1e-3, ("payload", ""): 0.2}
+    written = motion_urdf(found_of(log, values))
+    robot = ElementTree.fromstring(written.text.encode())
+    joint = robot.find(f"joint[@name='{log.joints[JOINT]}']")
+    dynamics = joint.find("dynamics")
+    assert float(dynamics.get("friction")) == pytest.approx(0.01 * k)
+    assert float(dynamics.get("damping")) == pytest.approx(0.02 * k)
+    assert float(joint.find("limit").get("lower")) == pytest.approx(world.commands[..., JOINT].min() + 0.1)
+    assert float(joint.find("limit").get("upper")) == 3.2
+    assert robot.find("link[@name='tool_payload']/inertial/mass").get("value") == "0.2"
+    assert written.kept == ["armature of joint_2: a URDF describes no servo"]
+    assert "armature of joint_2" in written.text
+
+
+def test_a_joint_that_the_model_lacks_is_refused():
+    world = a_world()
+    log = world.log(world.simulated(Fault(NOTHING)))
+    other = world.mjcf().replace('"joint_2"', '"elbow"')
+    with pytest.raises(CampaignError, match="has no joint 'joint_2'"):
+        motion_mjcf(found_of(log, {"kp": 0.1}), other)
+
+
+def test_the_rollout_shrinks_the_gap_as_it_was_told():
+    fitted = strong(a_world(5, 200))
+    unseen = replace(fitted, commands=0.7 * fitted.commands[:, ::-1].copy())
+    fault = Fault("kp", JOINT, -0.4)
+    found = found_of(fitted.log(fitted.simulated(fault)), {"kp": -0.4})
+    written = motion_mjcf(found, fitted.mjcf())
+    did = rollout(found, written.text, unseen.log(unseen.simulated(fault)))
+    assert did.shrinkage > 0.9
+    assert did.agrees
+    nominal = rollout(found_of(found.log, {}), fitted.mjcf(), unseen.log(unseen.simulated(fault)))
+    assert nominal.shrinkage == pytest.approx(0.0, abs=0.1)
+    assert nominal.shrinkage_told == pytest.approx(0.0, abs=1e-2)  # loads are taken anew
+
+
+def test_shrinkages_that_differ_by_more_than_a_tenth_do_not_agree():
+    one = Rollout(("a", "b"), (3.0, 4.0), (0.0, 1.0), (3.0, 1.0))
+    assert one.shrinkage_told == pytest.approx(0.96)
+    assert one.shrinkage == pytest.approx(0.6)
+    assert not one.agrees

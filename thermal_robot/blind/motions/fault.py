@@ -1,0 +1,177 @@
+"""What may be wrong with a servo arm: each fault changes the MuJoCo model, the command, or the torques of a step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.blind.motions import sizes
+from thermal_robot.blind.motions.arm import TOOL, Arm
+from thermal_robot.correction.mujoco_models import set_damping
+
+FAULTS: dict[str, tuple[str, ...]] = {
+    "delay": ("delay",),
+    "coulomb": ("coulomb",),
+    "armature": ("armature",),
+    "payload": ("payload",),
+    "viscous": ("lag",),
+    "kp": ("kp",),
+    "zero": ("zero",),
+    "gain": ("gain",),
+    "dead zone": ("dead_zone",),
+    "torque limit": ("torque_limit",),
+    "end stop": ("low_stop", "high_stop"),
+    "table": ("contact",),
+}
+"""Faults, and the effects that are their right names."""
+UNLISTED = ("ripple", "spring", "uneven friction")
+"""Faults that no effect knows: a torque ripple, a spring between two joints, friction that depends on position."""
+NOTHING = "nothing"
+EVERYTHING = (*FAULTS, NOTHING, *UNLISTED)
+_WHOLE = ("delay", "payload", "table")
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """What the arm did without a fault, (n, J): position and torque; (n,) height of the tool."""
+
+    position: Array
+    torque: Array
+    height: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """A fault with its size, SI, and the number of its joint; -1 where it is the whole arm's.
+
+    ``turn`` rad is a phase, or a direction where positive.
+    """
+
+    name: str
+    joint: int = -1
+    size: float = 0.0
+    turn: float = 0.0
+
+    def built(self, spec: Any, arm: Arm) -> None:
+        """Change a ``mujoco.MjSpec`` whose actuators are the arm's servos, in the order of its joints."""
+        change: Callable[[Any, Arm, Fault], None] | None = _BUILT.get(self.name)
+        if change:
+            change(spec, arm, self)
+
+    def commanded(self, command: Array, position: Array) -> Array:
+        """(J,) what the servos take for the command, their joints being at a position."""
+        if self.name not in ("zero", "gain", "dead zone"):
+            return command
+        own, j = command.copy(), self.joint
+        if self.name == "zero":
+            own[j] += self.size
+        elif self.name == "gain":
+            own[j] *= 1.0 + self.size
+        else:
+            error = own[j] - position[j]
+            own[j] = position[j] + np.sign(error) * max(abs(error) - self.size, 0.0)
+        return own
+
+    def acts(self, model: Any, position: Array, torque: Array) -> None:
+        """Add the torques of a step to ``torque`` (J,), or change friction, at a position (J,)."""
+        j = self.joint
+        if self.name == "ripple":
+            torque[j] = self.size * np.sin(round(self.turn) * position[j])
+        elif self.name == "spring":
+            torque[j - 1] = self.size * (position[j] - position[j - 1])
+            torque[j] = -torque[j - 1]
+        elif self.name == "uneven friction":
+            model.dof_frictionloss[j] = self.size * (1.0 + np.sin(3.0 * position[j] + self.turn))
+
+    @property
+    def delay(self) -> float:
+        """Of the command, s."""
+        return self.size if self.name == "delay" else 0.0
+
+
+def _frictionloss(spec: Any, arm: Arm, fault: Fault) -> None:
+    spec.joint(arm.joints[fault.joint]).frictionloss = fault.size
+
+
+def _armature(spec: Any, arm: Arm, fault: Fault) -> None:
+    spec.joint(arm.joints[fault.joint]).armature = fault.size
+
+
+def _damping(spec: Any, arm: Arm, fault: Fault) -> None:
+    set_damping(spec.joint(arm.joints[fault.joint]), fault.size)
+
+
+def _kp(spec: Any, arm: Arm, fault: Fault) -> None:
+    actuator = spec.actuators[fault.joint]
+    actuator.gainprm[0] *= 1.0 + fault.size
+    actuator.biasprm[1] *= 1.0 + fault.size
+
+
+def _limit(spec: Any, arm: Arm, fault: Fault) -> None:
+    spec.actuators[fault.joint].forcerange = [-fault.size, fault.size]
+
+
+def _stop(spec: Any, arm: Arm, fault: Fault) -> None:
+    joint = spec.joint(arm.joints[fault.joint])
+    joint.limited = True
+    joint.range = [-10.0, fault.size] if fault.turn > 0.0 else [fault.size, 10.0]
+
+
+def _payload(spec: Any, arm: Arm, fault: Fault) -> None:
+    load = spec.body(TOOL).add_body(name="load")
+    load.explicitinertial, load.mass, load.inertia = True, fault.size, [1e-9, 1e-9, 1e-9]
+
+
+def _table(spec: Any, arm: Arm, fault: Fault) -> None:
+    import mujoco
+
+    own = {"condim": 3, "friction": [sizes.FRICTION, 0.0, 0.0]}
+    spec.worldbody.add_geom(
+        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 1], pos=[0, 0, fault.size - 1e-3], **own
+    )
+    spec.body(TOOL).add_geom(name="tip", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3, 0, 0], **own)
+
+
+_BUILT = {
+    "coulomb": _frictionloss,
+    "uneven friction": _frictionloss,
+    "armature": _armature,
+    "viscous": _damping,
+    "kp": _kp,
+    "torque limit": _limit,
+    "end stop": _stop,
+    "payload": _payload,
+    "table": _table,
+}
+
+
+def draw_fault(rng: np.random.Generator, name: str, arm: Arm, sound: Sound, larger: float = 1.0) -> Fault:
+    """Draw a fault of a name: its joint, and its size by a lognormal law, or from what the sound arm did."""
+    first = 1 if name == "spring" else 0
+    j = -1 if name in (*_WHOLE, NOTHING) else int(rng.integers(first, len(arm.joints)))
+    factor = larger * float(np.exp(sizes.SPREAD * rng.normal()))
+    sign = float(rng.choice((-1.0, 1.0)))
+    servo = arm.servos[arm.joints[j]]
+    if name in sizes.SHARE:
+        turn = rng.integers(*sizes.RIPPLES) if name == "ripple" else rng.uniform(0.0, 6.28)
+        return Fault(name, j, factor * sizes.SHARE[name] * float(servo.limit or 0.0), float(turn))
+    if name in sizes.USUAL:
+        unit = {"payload": arm.rated, "viscous": servo.kd, "spring": servo.kp}.get(name) or 1.0
+        size = factor * sizes.USUAL[name] * unit
+        if name in ("zero", "gain"):
+            size *= sign
+        elif name == "kp":  # as likely too soft as too stiff
+            size = float((1.0 + size) ** sign - 1.0)
+        return Fault(name, j, size)
+    share = float(rng.uniform(*(sizes.ABOVE if name == "table" else sizes.BEYOND)))
+    if name == "table":
+        return Fault(name, j, float(np.quantile(sound.height, share)))
+    if name == "torque limit":
+        return Fault(name, j, float(np.quantile(np.abs(sound.torque[:, j]), 1.0 - share)))
+    if name == "end stop":
+        return Fault(name, j, float(np.quantile(sound.position[:, j], 1.0 - share if sign > 0.0 else share)), sign)
+    return Fault(name)

@@ -1,0 +1,175 @@
+"""The trial of motions: logs of drawn worlds are diagnosed, and the answers judged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+
+import numpy as np
+
+from thermal_robot.blind.motions import sizes
+from thermal_robot.blind.motions.fault import EVERYTHING, FAULTS, NOTHING, UNLISTED
+from thermal_robot.blind.motions.world import Unseen, draw_log, draw_world
+from thermal_robot.motion.diagnose import diagnose_motion
+
+ALWAYS = frozenset({"lag", "droop"})
+"""Effects of every servo that nobody states."""
+MARKS = ("named", "first", "alone", "placed", "flagged")
+"""Of an answer, as :class:`Answer` tells them."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is asked: a fault by name, the seed of its world, and whether the servos are stated."""
+
+    fault: str
+    seed: int
+    joints: int = 3
+    motions: int = 10
+    stated: bool = True
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was answered of a case.
+
+    ``size`` and ``joint`` of the fault; ``verdict`` effects by share; ``groups`` what each is confounded with;
+    ``places`` the joints of each; ``shares``; ``flagged`` whether something stays unexplained; rms before, after and
+    held out, encoder counts; ``seconds``; ``failure`` what was raised.
+    """
+
+    case: Case
+    size: float = 0.0
+    joint: str = ""
+    verdict: tuple[str, ...] = ()
+    groups: tuple[tuple[str, ...], ...] = ()
+    places: tuple[tuple[str, ...], ...] = ()
+    shares: tuple[float, ...] = ()
+    flagged: bool = False
+    rms: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    seconds: float = 0.0
+    failure: str = ""
+
+    @property
+    def told(self) -> tuple[tuple[str, ...], ...]:
+        """The verdict beyond what every servo has, each effect with its group."""
+        usual = frozenset() if self.case.stated else ALWAYS
+        pairs = zip(self.verdict, self.groups, strict=True)
+        return tuple((name, *group) for name, group in pairs if name not in usual)
+
+    @property
+    def named(self) -> bool:
+        """Whether the right name is told, or stands in the group of one that is; of nothing, that nothing is told."""
+        right = FAULTS.get(self.case.fault, ())
+        return any(set(right) & set(names) for names in self.told) if right else not self.told
+
+    @property
+    def first(self) -> bool:
+        """Whether it is the first by share."""
+        return bool(self.told) and bool(set(FAULTS.get(self.case.fault, ())) & set(self.told[0]))
+
+    @property
+    def alone(self) -> bool:
+        """Whether nothing else is told."""
+        return self.named and len(self.told) <= 1
+
+    @property
+    def placed(self) -> bool:
+        """Whether the right name is told of the right joint; true of what is the whole arm's."""
+        own = zip(self.verdict, self.places, strict=True)
+        return not self.joint or any(n in FAULTS.get(self.case.fault, ()) and self.joint in p for n, p in own)
+
+
+def ask(case: Case) -> Answer:
+    """Draw the world of a case, diagnose its log and return what was answered."""
+    rng = np.random.default_rng([case.seed, EVERYTHING.index(case.fault), case.joints])
+    world = draw_world(rng, case.joints, case.motions)
+    try:
+        log, fault = draw_log(rng, world, case.fault, case.stated)
+    except Unseen:
+        return Answer(case, failure="unseen")
+    began = time.perf_counter()
+    found = diagnose_motion(log)
+    told = [found.finding(name) for name in found.verdict]
+    held = found.held_out.rms_after
+    return Answer(
+        case,
+        fault.size,
+        log.joints[fault.joint] if fault.joint >= 0 else "",
+        found.verdict,
+        tuple(one.confounded_with for one in told),
+        tuple(tuple(place.name for place in one.locations) for one in told),
+        tuple(float(one.shrinkage or 0.0) for one in told),
+        found.unexplained.flagged,
+        (found.rms_before / world.count, found.rms_after / world.count, held / world.count),
+        time.perf_counter() - began,
+    )
+
+
+def plan(
+    seed: int, count: int, faults: Iterable[str] = EVERYTHING, *, joints: int = 0, stated: bool = True
+) -> list[Case]:
+    """Return so many cases of each fault; arms of two to seven joints in turn, unless a number is given."""
+    low, high = sizes.JOINTS
+    return [
+        Case(fault, seed + number, joints or low + (seed + number) % (high - low + 1), stated=stated)
+        for number in range(count)
+        for fault in faults
+    ]
+
+
+def run(cases: Sequence[Case], workers: int = 1, progress: Callable[[Answer], None] = lambda _: None) -> list[Answer]:
+    """Ask every case, several at a time; ``progress`` is called with each answer in the order of the cases."""
+    found = []
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        for answer in pool.map(ask, cases):
+            progress(answer)
+            found.append(answer)
+    return found
+
+
+def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
+    """Score by fault: how many were asked, and shares named, first, alone, in the right joint and flagged."""
+    rows = []
+    for fault in EVERYTHING:
+        own = [one for one in answers if one.case.fault == fault and not one.failure]
+        if own:
+            marks = {mark: float(np.mean([getattr(one, mark) for one in own])) for mark in MARKS}
+            rows.append({"fault": fault, "asked": len(own), **marks})
+    return rows
+
+
+def blamed(answers: Sequence[Answer]) -> float:
+    """Share of unlisted faults for which an effect that is listed is told."""
+    own = [bool(one.told) for one in answers if one.case.fault in UNLISTED and not one.failure]
+    return float(np.mean(own)) if own else 0.0
+
+
+def silent(answers: Sequence[Answer]) -> float:
+    """Share of sound arms of which nothing is told."""
+    own = [not one.told for one in answers if one.case.fault == NOTHING and not one.failure]
+    return float(np.mean(own)) if own else 0.0
+
+
+def text(answers: Sequence[Answer]) -> str:
+    """Say what the trial found: a table of faults, and what was answered wrongly."""
+    lines = [f"{'fault':16} asked  named  first  alone  place  unexplained"]
+    for row in table(answers):
+        shares = "".join(f"{100 * float(str(row[mark])):6.0f}%" for mark in MARKS)
+        lines.append(f"{row['fault']!s:16} {row['asked']!s:>5}{shares}")
+    listed = [one for one in answers if one.case.fault in FAULTS and not one.failure]
+    if listed:
+        named, first = (np.mean([getattr(one, mark) for one in listed]) for mark in ("named", "first"))
+        lines.append(f"of {len(listed)} faults that an effect knows: named {named:.0%}, first {first:.0%}")
+    for name, share, what in ((NOTHING, silent, "silent"), ("unlisted", blamed, "blamed on an effect")):
+        own = UNLISTED if name == "unlisted" else (name,)
+        if any(one.case.fault in own for one in answers if not one.failure):
+            lines.append(f"{name}: {what} {share(answers):.0%}")
+    for one in answers:
+        if one.failure or not one.named:
+            said = one.failure or ", ".join(one.verdict) or "no effect"
+            lines.append(f"  {one.case.fault}, seed {one.case.seed}, {one.case.joints} joints: {said}")
+    return "\n".join(lines)

@@ -1,0 +1,168 @@
+"""Rollout of held-out motions by MuJoCo itself, with the MJCF that was written, from the commands alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.correction.mujoco_models import compiled, known, mujoco_or_error
+from thermal_robot.errors import CampaignError
+from thermal_robot.motion import settings
+from thermal_robot.motion.log import Motion, MotionLog
+from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.result import MotionDiagnosis, rms
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Rms of each joint's gap in motions that were not fitted, rad: nominal, by the model told, and by MuJoCo.
+
+    Attributes
+    ----------
+    nominal
+        The joint follows its command, or its stated servo.
+    told
+        The fitted servo model.
+    simulated
+        MuJoCo with the MJCF that was written.
+    """
+
+    joints: tuple[str, ...]
+    nominal: tuple[float, ...]
+    told: tuple[float, ...]
+    simulated: tuple[float, ...]
+
+    @property
+    def shrinkage_told(self) -> float:
+        """Share of the gap's mean square that goes away by the fitted model."""
+        return _shrinkage(self.nominal, self.told)
+
+    @property
+    def shrinkage(self) -> float:
+        """The same, by MuJoCo."""
+        return _shrinkage(self.nominal, self.simulated)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the two differ by no more than a tenth."""
+        return abs(self.shrinkage - self.shrinkage_told) <= settings.AGREE * abs(self.shrinkage_told)
+
+
+def _shrinkage(before: Sequence[float], after: Sequence[float]) -> float:
+    return 1.0 - float(np.square(after).sum() / max(float(np.square(before).sum()), 1e-300))
+
+
+def rollout(found: MotionDiagnosis, mjcf: str | Path, log: MotionLog) -> Rollout:
+    """Forward simulation of a log's motions by MuJoCo from the commands alone, beside the fitted servo model's.
+
+    Parameters
+    ----------
+    found
+        Diagnosis of other motions of the robot.
+    mjcf
+        What :func:`~thermal_robot.motion.write.motion_mjcf` wrote, as a path or as its text.
+    log
+        Motions that were not fitted, of the same joints.
+
+    Raises
+    ------
+    CampaignError
+        If MuJoCo is not installed or does not take the model, or if the log has other joints, or a joint no servo.
+    """
+    if log.joints != found.log.joints:
+        raise CampaignError(log.name, "has other joints", found=str(log.joints), expected=str(found.log.joints))
+    model = ServoModel(log)
+    values = values_in(found, model)
+    zero = np.zeros_like(values)
+    model.refreshed(zero)
+    nominal = [rms(model.residuals(j, zero[None])[0]) for j in model.joints]
+    for _ in range(settings.REFRESHES):
+        model.refreshed(values)
+    told = [rms(model.residuals(j, values[None])[0]) for j in model.joints]
+    left = [_gap(motion, each) for motion, each in zip(log.motions, simulated(mjcf, log), strict=True)]
+    by_joint = [rms(np.concatenate([one[np.isfinite(one[:, j]), j] for one in left])) for j in model.joints]
+    return Rollout(log.joints, tuple(nominal), tuple(told), tuple(by_joint))
+
+
+def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
+    """(P,) parameters of the diagnosis in a model of another log; ends of ranges are told from that log's commands."""
+    values, first = np.zeros(len(model.parameters)), ServoModel(found.log)
+    for (effect, joint), value in found.values.items():
+        j = SHARED if joint == "" else model.log.joints.index(joint)
+        place = model.index(effect, j)
+        if place is None:
+            continue
+        if effect == "low_stop":
+            value = max(value + first.commanded[:, j].min() - model.commanded[:, j].min(), 0.0)
+        elif effect == "high_stop":
+            value = max(value - first.commanded[:, j].max() + model.commanded[:, j].max(), 0.0)
+        elif effect == "contact":
+            value = max(value + first.lowest - model.lowest, 0.0)
+        values[place] = value
+    return values
+
+
+def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
+    """Simulate every motion by MuJoCo from its first position at rest: (N, J) rad at the encoder's stamps.
+
+    Joints that are not in the log are held at zero.
+    """
+    mujoco = mujoco_or_error()
+    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
+    model = compiled(path or str(mjcf))
+    numbers = [known(model, "joint", name) for name in log.joints]
+    servos = [_servo(model, number) for number in numbers]
+    for name, number, servo in zip(log.joints, numbers, servos, strict=True):
+        if number is None or servo is None:
+            problem = f"has no {'joint' if number is None else 'position actuator of joint'} {name!r}"
+            raise CampaignError(str(path or "the MJCF"), problem)
+    at = np.array([model.jnt_qposadr[number] for number in numbers])
+    own = {int(model.jnt_dofadr[number]) for number in numbers}
+    held = [d for d in range(model.nv) if d not in own]
+    return [_motion(mujoco, model, motion, at, servos, held) for motion in log.motions]
+
+
+def _servo(model: Any, joint: int | None) -> int | None:
+    """Return the number of the position actuator of a joint."""
+    hinge = mujoco_or_error().mjtTrn.mjTRN_JOINT
+    for k in range(model.nu):
+        if model.actuator_trntype[k] == hinge and model.actuator_trnid[k, 0] == joint and model.actuator_biasprm[k, 1]:
+            return k
+    return None
+
+
+def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence[Any], held: list[int]) -> Array:
+    data, step = mujoco.MjData(model), float(model.opt.timestep)
+    q, times = motion.position.values, motion.position.time
+    rest, others = data.qpos.copy(), model.jnt_qposadr[model.dof_jntid[held]]
+    data.qpos[at] = [column[np.isfinite(column)][0] for column in q.T]
+    gears = model.actuator_gear[servos, 0]
+    steps = int(np.ceil((times[-1] - times[0]) / step)) + 1
+    clock = times[0] + step * np.arange(steps)
+    rows = np.clip(np.searchsorted(motion.command.time, clock + 1e-9, side="right") - 1, 0, None)
+    _rest(mujoco, model, data, servos, gears * motion.command.values[rows[0]])
+    path = np.empty((steps, len(at)))
+    for n, row in enumerate(rows):
+        path[n] = data.qpos[at]
+        data.ctrl[servos] = gears * motion.command.values[row]
+        mujoco.mj_step(model, data)
+        data.qpos[others], data.qvel[held] = rest[others], 0.0
+    return np.column_stack([np.interp(times, clock, each) for each in path.T])
+
+
+def _rest(mujoco: Any, model: Any, data: Any, servos: Sequence[Any], command: Array) -> None:
+    """Fill the histories of delayed actuators with the command that they had while the arm was at rest."""
+    if not getattr(model, "nhistory", 0):
+        return
+    for k, value in zip(servos, command, strict=True):
+        if model.actuator_delay[k] > 0.0:
+            mujoco.mj_initCtrlHistory(model, data, k, None, np.full(int(model.actuator_history[k, 0]), value))
+
+
+def _gap(motion: Motion, path: Array) -> Array:
+    return np.asarray(motion.position.values - path)

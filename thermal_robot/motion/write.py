@@ -1,0 +1,334 @@
+"""Parameters of a diagnosis of motions written into the user's simulator: MJCF by MuJoCo's MjSpec, and URDF.
+
+The servo model divides torques by the servo's stiffness K; what a robot file holds is in N·m, and K is the stated one
+with its change, or one over the droop that was found. In MuJoCo a position actuator's force is that of Hooke's law with
+offset and gain, and acts on its joint times its gear:
+
+    f = g₀ u + b₀ + b₁ q + b₂ q̇ ,   g₀ = K (1 + g) ,  b₀ = K z ,  b₁ = −K ,  b₂ = −k_d .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from thermal_robot.arrays import Array
+from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error, set_damping
+from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics.urdf import text_of, tree
+from thermal_robot.motion import settings
+from thermal_robot.motion.log import Servo
+from thermal_robot.motion.result import MotionDiagnosis
+
+_FAR = 1e3
+"""rad: end of a range that nothing limits."""
+_POINT = 1e-9
+"""kg·m²: inertia of a payload of which only the mass is known; MuJoCo wants one."""
+_CANNOT = {
+    "dead_zone": "no joint and no actuator has a dead zone",
+    "load_friction": "its friction does not grow with load",
+    "stribeck": "its friction does not fall with speed",
+    "contact": "it is the surroundings' and not the robot's",
+}
+"""Effects that neither an MJCF nor a URDF holds, and why."""
+_OF_THE_SERVO = dict.fromkeys(("armature", "delay", "gain", "zero", "kp", "droop"), "a URDF describes no servo")
+
+
+@dataclass
+class Written:
+    """A robot file, and in sentences what of the diagnosis it holds, and what it cannot hold with the reason."""
+
+    text: str = ""
+    held: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """What was found of one joint, SI.
+
+    Attributes
+    ----------
+    name
+        Of the joint.
+    servo
+        As it is stated.
+    values
+        Of its effects, by name.
+    reach
+        rad, lowest and highest command.
+    """
+
+    name: str
+    servo: Servo
+    values: dict[str, float]
+    reach: tuple[float, float]
+
+    @property
+    def stiffness(self) -> float | None:
+        """K of the position servo, N·m/rad: the stated one with its change, or one over the droop; ``None`` unknown."""
+        if self.servo.kp:
+            return float(self.servo.kp * (1.0 + self.values.get("kp", 0.0)))
+        droop = self.values.get("droop", 0.0)
+        return 1.0 / droop if droop > 0.0 else None
+
+    @property
+    def limit(self) -> float | None:
+        """Torque limit, N·m, with what was found of it."""
+        if self.stiffness is None or "torque_limit" not in self.values:
+            return self.servo.limit
+        stated = self.stiffness / self.servo.limit if self.servo.limit else 0.0
+        return self.stiffness / (self.values["torque_limit"] + stated)
+
+    @property
+    def stops(self) -> tuple[float | None, float | None]:
+        """End stops that were found, rad."""
+        low, high = (self.values.get(name) for name in ("low_stop", "high_stop"))
+        return None if low is None else self.reach[0] + low, None if high is None else self.reach[1] - high
+
+    def torque(self, name: str) -> float | None:
+        """Return an effect over the stiffness as torque, N·m, N·m·s/rad or kg·m²; ``None`` where it is not found."""
+        return None if self.stiffness is None or name not in self.values else self.stiffness * self.values[name]
+
+
+def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
+    """Return what was found of each joint of the log, in their order."""
+    log = found.log
+    motions = [m for m in log.motions if (m.kind or m.name) not in found.refused]
+    told = []
+    for j, name in enumerate(log.joints):
+        command = np.concatenate([m.command.values[:, j] for m in motions])
+        reach = float(np.nanmin(command)), float(np.nanmax(command))
+        values = {effect: value for (effect, joint), value in found.values.items() if joint == name}
+        told.append(Cause(name, log.servos.get(name, Servo()), values, reach))
+    return tuple(told)
+
+
+def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
+    """Joint friction, damping, armature, servo gains, limits, delay and payload written into an MJCF by MjSpec.
+
+    Parameters
+    ----------
+    found
+        Of :func:`~thermal_robot.motion.diagnose.diagnose_motion`.
+    mjcf
+        The user's model, as a path or as its text, with the log's names of joints. What the diagnosis does not tell
+        stays; ``frictionloss``, ``damping`` and ``armature`` of the model, which the diagnosis does not know, are
+        replaced where it tells them.
+
+    Raises
+    ------
+    CampaignError
+        If MuJoCo is not installed or does not take the model, or if that lacks a joint of the log.
+    """
+    mujoco = mujoco_or_error()
+    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
+    compiled(path or str(mjcf))  # refused in words
+    spec = mujoco.MjSpec.from_file(str(path)) if path else mujoco.MjSpec.from_string(str(mjcf))
+    written, joints = Written(), {joint.name: joint for joint in spec.joints}
+    for cause in causes(found):
+        if cause.name not in joints:
+            own = ", ".join(joints) or "no joint"
+            raise CampaignError(str(path or "the MJCF"), f"has no joint {cause.name!r}", found=own)
+        _into_joint(joints[cause.name], cause, written)
+        if cause.torque("coulomb") is not None:
+            stick(spec, joints[cause.name])
+        _into_servo(spec, cause, written)
+        _tell_kept(cause, written, _CANNOT)
+    _into_masses(spec, found, written)
+    spec.compile()
+    written.text = spec.to_xml()
+    return written
+
+
+def stick(spec: Any, joint: Any) -> None:
+    """Let friction of a ``mujoco.MjsJoint`` hold it at rest, as Coulomb's does; MuJoCo's usual one creeps."""
+    joint.solref_friction = [settings.STIFFEST * float(spec.option.timestep), 1.0]
+    joint.solimp_friction = list(settings.STICKING)
+
+
+def _said(written: Written, cause: Cause, what: str, value: float, unit: str) -> None:
+    written.held.append(f"{what} of {cause.name}: {value:.4g} {unit}".rstrip())
+
+
+def _tell_kept(cause: Cause, written: Written, reasons: dict[str, str]) -> None:
+    for effect in cause.values:
+        if effect in reasons:
+            written.kept.append(f"{effect} of {cause.name}: {reasons[effect]}")
+
+
+def _need_stiffness(cause: Cause, written: Written, *effects: str) -> None:
+    """Say which effects stay over a stiffness that nobody knows."""
+    for effect in effects:
+        if effect in cause.values and cause.stiffness is None:
+            reason = "its stiffness is not stated, and no droop tells it, so that no torque follows"
+            written.kept.append(f"{effect} of {cause.name}: {reason}; state [servo.{cause.name}] kp")
+
+
+def _into_joint(joint: Any, cause: Cause, written: Written) -> None:
+    _need_stiffness(cause, written, "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay")
+    put: dict[str, tuple[str, str, Callable[[float], None]]] = {
+        "coulomb": ("frictionloss", "N·m", lambda value: setattr(joint, "frictionloss", value)),
+        "lag": ("damping", "N·m·s/rad", lambda value: set_damping(joint, value)),
+        "armature": ("armature", "kg·m²", lambda value: setattr(joint, "armature", value)),
+    }
+    for effect, (what, unit, setter) in put.items():
+        value = cause.torque(effect)
+        if value is not None:
+            setter(value)
+            _said(written, cause, what, value, unit)
+    if cause.stops != (None, None):
+        limited = joint.limited != mujoco_or_error().mjtLimited.mjLIMITED_FALSE and joint.range[0] < joint.range[1]
+        low, high = joint.range if limited else (-_FAR, _FAR)
+        low, high = (own if own is not None else now for own, now in zip(cause.stops, (low, high), strict=True))
+        joint.limited, joint.range = mujoco_or_error().mjtLimited.mjLIMITED_TRUE, [low, high]
+        written.held.append(f"range of {cause.name}: {low:.4g} to {high:.4g} rad")
+
+
+def _into_servo(spec: Any, cause: Cause, written: Written) -> None:
+    """Write stiffness, zero, gain, limit and delay into the position actuator of a joint, or into a new one."""
+    stiffness, limit = cause.stiffness, cause.limit
+    told = {"kp", "droop", "zero", "gain", "torque_limit", "delay"} & set(cause.values)
+    if stiffness is None or not told:
+        return
+    actuator = _servo_of(spec, cause, written)
+    gear = float(actuator.gear[0])
+    gain, zero = cause.values.get("gain", 0.0), cause.values.get("zero", 0.0)
+    actuator.gainprm[0] = stiffness * (1.0 + gain) / gear**2
+    actuator.biasprm[0], actuator.biasprm[1] = stiffness * zero / gear, -stiffness / gear**2
+    for name, value, unit in (("kp", stiffness, "N·m/rad"), ("zero", zero, "rad"), ("gain", gain, "")):
+        if name in told or (name == "kp" and "droop" in told):
+            _said(written, cause, name, value, unit)
+    if "torque_limit" in told and limit is not None:
+        actuator.forcelimited = mujoco_or_error().mjtLimited.mjLIMITED_TRUE
+        actuator.forcerange = [-limit / abs(gear), limit / abs(gear)]
+        _said(written, cause, "forcerange", limit, "N·m")
+    if "delay" in told:
+        _delay(actuator, float(spec.option.timestep), cause, written)
+
+
+def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
+    """Return the position actuator of a joint."""
+    mujoco = mujoco_or_error()
+    for actuator in spec.actuators:
+        at_joint = actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT and actuator.target == cause.name
+        if at_joint and actuator.gainprm[0] > 0.0 and np.isclose(actuator.biasprm[1], -actuator.gainprm[0]):
+            return actuator
+    actuator = spec.add_actuator(name=f"{cause.name} servo", target=cause.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    actuator.set_to_position(kp=1.0)
+    written.held.append(f"a position actuator of {cause.name}, which had none")
+    return actuator
+
+
+def _delay(actuator: Any, step: float, cause: Cause, written: Written) -> None:
+    """Give an actuator the delay of its command, with the samples that MuJoCo keeps for it."""
+    delay = cause.values["delay"]
+    if hasattr(actuator, "delay"):
+        actuator.delay, actuator.nsample = delay, int(np.ceil(delay / step)) + 1
+        _said(written, cause, "delay", delay, "s")
+    else:
+        reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
+        written.kept.append(f"delay of {cause.name}: {reason}")
+
+
+def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
+    """Add the payload that was found to the body, or to the body of the site, of the tool frame."""
+    mass, tool = found.values.get(("payload", ""), 0.0), found.log.robot.tool_frame
+    if ("contact", "") in found.values:
+        written.kept.append(f"contact: {_CANNOT['contact']}")
+    if mass <= 0.0:
+        if mass < 0.0:
+            written.kept.append(_less(mass))
+        return
+    bodies, sites = ({one.name: one for one in own} for own in (spec.bodies, spec.sites))
+    if tool not in bodies and tool not in sites:
+        written.kept.append(f"payload: the MJCF has neither body nor site {tool!r}")
+        return
+    at = np.zeros(3) if found.log.payload is None else found.log.payload[1]
+    place = {} if tool in bodies else {"pos": sites[tool].pos, "quat": sites[tool].quat}
+    body = (bodies.get(tool) or sites[tool].parent).add_body(name=f"{tool} payload", **place)
+    body.explicitinertial, body.mass, body.ipos, body.inertia = True, mass, at, [_POINT] * 3
+    written.held.append(f"payload at {tool}: {mass:.4g} kg")
+
+
+def _less(mass: float) -> str:
+    return f"payload: {-mass:.4g} kg less than the masses say; which of them, no log of one load tells"
+
+
+def motion_urdf(found: MotionDiagnosis, urdf: str | None = None) -> Written:
+    """Joint friction, damping, effort and position limits, and the payload written into a URDF (``<dynamics>``).
+
+    Parameters
+    ----------
+    found
+        Of :func:`~thermal_robot.motion.diagnose.diagnose_motion`.
+    urdf
+        Text of the user's URDF; that of the log's robot where left out.
+
+    Raises
+    ------
+    CampaignError
+        If the URDF lacks a joint of the log.
+    """
+    text = found.log.robot.urdf if urdf is None else urdf
+    root, written = tree(text), Written()
+    joints = {joint.get("name"): joint for joint in root.iterfind("joint")}
+    for cause in causes(found):
+        if cause.name not in joints:
+            raise CampaignError("the URDF", f"has no joint {cause.name!r}", found=", ".join(map(str, joints)))
+        _need_stiffness(cause, written, "coulomb", "lag", "torque_limit")
+        for key, effect, unit in (("friction", "coulomb", "N·m"), ("damping", "lag", "N·m·s/rad")):
+            _attribute(joints[cause.name], "dynamics", key, cause.torque(effect), cause, written, unit)
+        limit = cause.limit if "torque_limit" in cause.values and cause.stiffness is not None else None
+        _attribute(joints[cause.name], "limit", "effort", limit, cause, written, "N·m")
+        for key, stop in zip(("lower", "upper"), cause.stops, strict=True):
+            _attribute(joints[cause.name], "limit", key, stop, cause, written, "rad")
+        _tell_kept(cause, written, _CANNOT | _OF_THE_SERVO)
+    _mass_of_link(root, found, written)
+    notes = ["Written by thermal_robot from a diagnosis of motions:", *written.held, "Not written:", *written.kept]
+    written.text = text_of(root, text, notes)
+    return written
+
+
+def _attribute(
+    joint: Any, child: str, key: str, value: float | None, cause: Cause, written: Written, unit: str
+) -> None:
+    if value is None:
+        return
+    element = joint.find(child)
+    if element is None:
+        usual = {"limit": {"effort": "0", "velocity": "0"}, "dynamics": {}}[child]
+        element = etree.SubElement(joint, child, usual)
+    element.set(key, repr(float(value)))
+    _said(written, cause, key, value, unit)
+
+
+def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
+    """Add the payload that was found as a link behind the tool frame."""
+    mass, tool = found.values.get(("payload", ""), 0.0), found.log.robot.tool_frame
+    if ("contact", "") in found.values:
+        written.kept.append(f"contact: {_CANNOT['contact']}")
+    if mass < 0.0:
+        written.kept.append(_less(mass))
+    if mass <= 0.0:
+        return
+    name, at = f"{tool}_payload", np.zeros(3) if found.log.payload is None else found.log.payload[1]
+    link = etree.SubElement(root, "link", name=name)
+    inertial = etree.SubElement(link, "inertial")
+    etree.SubElement(inertial, "origin", xyz=_numbers(at), rpy="0 0 0")
+    etree.SubElement(inertial, "mass", value=repr(float(mass)))
+    across = dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+    etree.SubElement(inertial, "inertia", **dict.fromkeys(("ixx", "iyy", "izz"), repr(_POINT)), **across)
+    joint = etree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
+    etree.SubElement(joint, "parent", link=tool)
+    etree.SubElement(joint, "child", link=name)
+    written.held.append(f"payload at {tool}: {mass:.4g} kg")
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)
