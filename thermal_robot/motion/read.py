@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import check_joints, first_true
+from thermal_robot.campaign.document import FILE_NAME as CAMPAIGN
 from thermal_robot.campaign.document import Document, declared_file, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import name_of, stated_path, stated_robot
@@ -21,6 +23,7 @@ from thermal_robot.campaign.settings import given
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError, RobotError, require
+from thermal_robot.files import is_file, is_folder
 from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, scale_of, sources
 from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo
 from thermal_robot.motion.refuse import refused
@@ -90,6 +93,22 @@ class Declaration:
             (payload["mass"], com) if "mass" in payload else None,
             sections.get("tolerance", {}),
         )
+
+
+def declares_motion(path: Path) -> bool:
+    """Tell whether a file, or that of a folder, is a motion.toml rather than a campaign.toml."""
+    file = path / FILE_NAME if is_folder(path) and not is_file(path / CAMPAIGN) else path
+    return is_file(file) and re.search(rb"^\s*\[motion\]", file.read_bytes(), re.MULTILINE) is not None
+
+
+def files_of(path: str | Path, folder: Path | None = None) -> list[Path]:
+    """Return the files that a log is read from: motion.toml, its tables, and the robot where it is a file."""
+    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
+    document, base = Document(file, KINDS, FILE_NAME), file.parent if folder is None else folder
+    log, said = document.required("motion", "log"), document.sections.get("robot", {})
+    robot = [base / said["mjcf"]] if "mjcf" in said else [robot_reference(said.get("urdf", ""), base)]
+    tables = [base / each for each in ((log,) if isinstance(log, str) else log)]
+    return [file, *tables, *(one for one in robot if isinstance(one, Path))]
 
 
 def read_motion(path: str | Path, *, folder: str | Path | None = None) -> MotionLog:

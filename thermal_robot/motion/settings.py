@@ -82,3 +82,7 @@ NOISY = 1.5
 """Times the encoder's noise: what remains below it is that noise."""
 STRUCTURE, LEVELS = 0.1, 10
 """Share of what remains that a curve must explain in motions held out to be told; and levels of such a curve."""
+VISIBLE = 2.0
+"""Times the encoder's noise: an effect that moves its joint by less is not shown, since nobody could see it go."""
+CHANGED = 3.0
+"""Standard deviations of a difference from which on it counts as a change: one in 400 of equal values lies beyond."""
