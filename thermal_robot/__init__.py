@@ -24,14 +24,16 @@ if TYPE_CHECKING:
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
     from thermal_robot.diagnosis import Diagnosis
+    from thermal_robot.diagnosing import compare, diagnose
     from thermal_robot.diagnosis.calibration import Calibration, calibrate
-    from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
-    from thermal_robot.fleet.compare import compare
     from thermal_robot.fleet.comparison import Comparison
     from thermal_robot.fleet.many import diagnose_many
     from thermal_robot.fleet.wear import wear
+    from thermal_robot.motion import MotionLog, motion_from_table, read_motion
+    from thermal_robot.motion.compare import MotionComparison
+    from thermal_robot.motion.result import MotionDiagnosis
     from thermal_robot.observations import Observations, observe
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
@@ -41,7 +43,7 @@ __version__ = "0.2.0"
 
 _HOME = {
     "Comparison": "fleet.comparison",
-    "compare": "fleet.compare",
+    "compare": "diagnosing",
     "wear": "fleet.wear",
     "Calibration": "diagnosis.calibration",
     "Campaign": "campaign",
@@ -51,6 +53,9 @@ _HOME = {
     "Effect": "effects",
     "EffectError": "errors",
     "EstimationError": "errors",
+    "MotionComparison": "motion.compare",
+    "MotionDiagnosis": "motion.result",
+    "MotionLog": "motion",
     "Observations": "observations",
     "Robot": "robot",
     "RobotError": "errors",
@@ -59,11 +64,13 @@ _HOME = {
     "campaign_from_table": "campaign",
     "demo_campaign": "datasets",
     "describe": "campaign",
-    "diagnose": "diagnosis",
+    "diagnose": "diagnosing",
     "diagnose_many": "fleet.many",
     "load_robot": "robot",
+    "motion_from_table": "motion",
     "observe": "observations",
     "read_campaign": "campaign",
+    "read_motion": "motion",
     "read_samples": "campaign",
     "simulate": "simulation",
     "write_campaign": "campaign",
@@ -94,6 +101,9 @@ __all__ = [
     "Effect",
     "EffectError",
     "EstimationError",
+    "MotionComparison",
+    "MotionDiagnosis",
+    "MotionLog",
     "Observations",
     "Robot",
     "RobotError",
@@ -106,8 +116,10 @@ __all__ = [
     "diagnose",
     "diagnose_many",
     "load_robot",
+    "motion_from_table",
     "observe",
     "read_campaign",
+    "read_motion",
     "read_samples",
     "simulate",
     "wear",
