@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     )
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
-    from thermal_robot.diagnosis import Diagnosis
     from thermal_robot.diagnosing import compare, diagnose
+    from thermal_robot.diagnosis import Diagnosis
     from thermal_robot.diagnosis.calibration import Calibration, calibrate
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
