@@ -12,6 +12,7 @@ from thermal_robot.report.page import render
 from thermal_robot.report.words import STATUS, needs, one_sigma, told_as
 
 if TYPE_CHECKING:
+    from thermal_robot.diagnosis.values import Finding
     from thermal_robot.motion.result import MotionDiagnosis
 
 
@@ -51,6 +52,11 @@ def _shown(d: MotionDiagnosis) -> dict[str, Any]:
     }
 
 
+def _needs(d: MotionDiagnosis, finding: Finding) -> str:
+    told = needs(finding, list(d.joints))
+    return f"needs {told}" if told else words.NO_USE
+
+
 def _numbers(d: MotionDiagnosis) -> list[tuple[str, str, str, list[str]]]:
     """Return the rms gap before and after and the shrinkage held out: kind, heading, value and what stands below it."""
     held, noise = d.held_out, max((one.noise for one in d.joints.values()), default=0.0)
@@ -79,5 +85,5 @@ def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
                 "means": words.MEANS.get(one.name, "") if told else "",
                 "known": words.parameters(d, one.name) if told else [],
                 "moves": words.places(d, one.name) if told else "",
-                "needs": needs(one, list(d.joints)) if status == "not_testable" else "",
+                "needs": _needs(d, one) if status == "not_testable" else "",
             }

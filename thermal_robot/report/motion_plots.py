@@ -73,6 +73,8 @@ def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> No
     above.plot(one["time"], one["measured"], color=INK, linewidth=0.9, label="measured")
     for name, colour, said in (("nominal", BEFORE, "gap before"), ("simulated", AFTER, "gap after")):
         below.plot(one["time"], best.factor * (one["measured"] - one[name]), color=colour, linewidth=1.1, label=said)
+    for line in (*above.lines, *below.lines):
+        line.set_rasterized(len(one) > RASTER_ABOVE)
     title(above, f"{joint}, motion {_label(d, motion)}")
     above.set_ylabel(f"{'torque' if torque else 'position'} ({wide})")
     below.set_ylabel(f"gap ({best.unit})")
@@ -149,7 +151,7 @@ def _draw_against(axes: Axes, along: Array, gaps: list[Array]) -> None:
             "color": colour,
             "markersize": 1.5,
             "alpha": 0.25,
-            "rasterized": len(along) > RASTER_ABOVE,
+            "rasterized": True,
         }
         axes.plot(along[chosen], gap[chosen], linestyle="none", marker=".", **look)
         middles = _middles(along, gap) if fine else (np.zeros(0), np.zeros(0))
@@ -210,7 +212,15 @@ def _draw_loop(axes: Axes, d: MotionDiagnosis, joint: str) -> None:
     pair = [one["nominal" if torque else "command"] - one[name] for name in ("measured", "simulated")]
     best = units.scale(unit, float(np.abs(pair[0]).max()))
     for part, colour, width, said in zip(pair, (INK, AFTER), (0.9, 1.6), ("measured", "simulated after"), strict=True):
-        axes.plot(one["command"], best.factor * part, color=colour, linewidth=width, alpha=0.8, label=said)
+        axes.plot(
+            one["command"],
+            best.factor * part,
+            color=colour,
+            linewidth=width,
+            alpha=0.8,
+            label=said,
+            rasterized=len(one) > RASTER_ABOVE,
+        )
     axes.set_xlabel(f"{'position' if torque else 'command'} ({position})")
     axes.set_ylabel(f"{'model' if torque else 'command'} less reading ({best.unit})")
     axes.set_title(

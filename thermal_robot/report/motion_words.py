@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
     from thermal_robot.motion.result import MotionDiagnosis
 
+NO_USE = "has no meaning for this log"
+"""What is said of an effect that is not testable and that no column would make so."""
 _MOST = 3  # causes that a headline names; the others are counted
 _MAJORITY = 0.5  # of an effect's share: the joint that holds more is named
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed

@@ -84,7 +84,8 @@ def _which(d: MotionDiagnosis) -> Iterator[str]:
 
 def _effect(d: MotionDiagnosis, finding: Finding, status: str, wide: int) -> Iterator[str]:
     if status == "not_testable":
-        yield wrap(f"needs {needed(finding, list(d.joints))}", f"    {finding.name:{wide}}{'':13}   ")
+        needs = needed(finding, list(d.joints))
+        yield wrap(f"needs {needs}" if needs else words.NO_USE, f"    {finding.name:{wide}}{'':13}   ")
         return
     line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}"
     if status not in ("found", "confounded"):
