@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import thermal_robot.diagnosis
+import thermal_robot.diagnosing
 from thermal_robot import cli
 
 
@@ -18,7 +18,7 @@ def diagnosed_files(folder, out, diagnose):
     wanted = [word for kind, path in files.items() for word in (f"--{kind}", str(path))]
     text, complaint = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(text), redirect_stderr(complaint):
-        patch.setattr(thermal_robot.diagnosis, "diagnose", diagnose)
+        patch.setattr(thermal_robot.diagnosing, "diagnose", diagnose)
         status = cli.main(["diagnose", str(folder), *wanted])
     return SimpleNamespace(status=status, text=text.getvalue(), complaint=complaint.getvalue(), **files)
 

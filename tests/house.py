@@ -11,8 +11,8 @@ ROOT = Path(thermal_robot.__file__).parent
 PACKAGE = "thermal_robot"
 ORDER = (
     "arrays errors files percents compiling schema tables kinematics urdf_text robot shapes assembly maps paper "
-    "campaign observations effects inference iso9283 prediction model_file correction motion simulation teller "
-    "diagnosis planning fleet datasets report console streams blind viewer commands cli __main__"
+    "campaign observations effects inference iso9283 prediction model_file correction simulation teller diagnosis "
+    "motion planning fleet diagnosing datasets report console streams blind viewer commands cli __main__"
 ).split()
 """Rooms from the ground up: each may import those before it."""
 FREE = {
@@ -24,6 +24,7 @@ FREE = {
 """Rooms that may import less than what stands before them: one draws what it is given, three need no campaign."""
 TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "values", "calibration")}}
 TYPES["report"] |= {"thermal_robot.fleet.wear_result", "thermal_robot.shapes"}
+TYPES["report"] |= {f"thermal_robot.motion.{n}" for n in ("result", "compare")}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 LONGEST_BODY = 40
 """Lines of a function: a screen."""

@@ -42,7 +42,7 @@ def test_a_light_import_loads_nothing_heavy():
 
 
 def test_what_is_loaded_late_is_found_listed_and_typed():
-    code = "import thermal_robot as t; print(t.kinematics.__name__, t.diagnose is t.diagnosis.diagnose)"
+    code = "import thermal_robot as t; print(t.kinematics.__name__, t.diagnose is t.diagnosing.diagnose)"
     assert printed(code) == f"{house.PACKAGE}.kinematics True"
     assert set(thermal_robot.__all__) <= set(dir(thermal_robot))
     assert not any(house.is_module(f"{house.PACKAGE}.{n}") for n in thermal_robot.__all__)  # it would hide the name

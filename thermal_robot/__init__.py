@@ -23,16 +23,17 @@ if TYPE_CHECKING:
     )
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
+    from thermal_robot.diagnosing import compare, diagnose
     from thermal_robot.diagnosis import Diagnosis
     from thermal_robot.diagnosis.calibration import Calibration, calibrate
-    from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
-    from thermal_robot.fleet.compare import compare
     from thermal_robot.fleet.comparison import Comparison
     from thermal_robot.fleet.many import diagnose_many
     from thermal_robot.fleet.wear import wear
-    from thermal_robot.motion import motion_from_table, read_motion
+    from thermal_robot.motion import MotionLog, motion_from_table, read_motion
+    from thermal_robot.motion.compare import MotionComparison
+    from thermal_robot.motion.result import MotionDiagnosis
     from thermal_robot.observations import Observations, observe
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
@@ -42,7 +43,7 @@ __version__ = "0.2.0"
 
 _HOME = {
     "Comparison": "fleet.comparison",
-    "compare": "fleet.compare",
+    "compare": "diagnosing",
     "wear": "fleet.wear",
     "Calibration": "diagnosis.calibration",
     "Campaign": "campaign",
@@ -52,6 +53,9 @@ _HOME = {
     "Effect": "effects",
     "EffectError": "errors",
     "EstimationError": "errors",
+    "MotionComparison": "motion.compare",
+    "MotionDiagnosis": "motion.result",
+    "MotionLog": "motion",
     "Observations": "observations",
     "Robot": "robot",
     "RobotError": "errors",
@@ -60,7 +64,7 @@ _HOME = {
     "campaign_from_table": "campaign",
     "demo_campaign": "datasets",
     "describe": "campaign",
-    "diagnose": "diagnosis",
+    "diagnose": "diagnosing",
     "diagnose_many": "fleet.many",
     "load_robot": "robot",
     "motion_from_table": "motion",
@@ -97,6 +101,9 @@ __all__ = [
     "Effect",
     "EffectError",
     "EstimationError",
+    "MotionComparison",
+    "MotionDiagnosis",
+    "MotionLog",
     "Observations",
     "Robot",
     "RobotError",

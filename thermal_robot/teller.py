@@ -22,6 +22,12 @@ class Teller(Protocol):
     comparison_text: Callable[[Any], str]
     comparison_fragment: Callable[[Any], str]
     fleet_text: Callable[[Any], str]
+    motion_headline: Callable[[Any], str]
+    motion_advice: Callable[[Any], str]
+    motion_text: Callable[[Any], str]
+    motion_fragment: Callable[[Any], str]
+    motion_comparison_headline: Callable[[Any], str]
+    motion_comparison_text: Callable[[Any], str]
 
 
 _tellers: list[Teller] = []

@@ -9,7 +9,7 @@ import pytest
 from commanded import diagnosed_files
 from simulate import simulate
 
-import thermal_robot.diagnosis
+import thermal_robot.diagnosing
 from thermal_robot import cli
 from thermal_robot.campaign import write_campaign
 from thermal_robot.campaign.write import write_table
@@ -20,7 +20,7 @@ NOISE = 25e-6
 @pytest.fixture(scope="module", autouse=True)
 def one_diagnosis_of_a_campaign(diagnosed_once):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(thermal_robot.diagnosis, "diagnose", diagnosed_once)
+        patch.setattr(thermal_robot.diagnosing, "diagnose", diagnosed_once)
         yield
 
 

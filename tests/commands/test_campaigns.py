@@ -115,7 +115,7 @@ def test_a_failure_of_the_program_is_told_as_its_own(run, folder, monkeypatch):
     assert "Traceback" not in err
     assert "Traceback" in run("check", folder, "-v")[2]
     # a fault of an effect of the program is no bad input; nor is it hidden by an answer of before
-    monkeypatch.setattr("thermal_robot.diagnosis.diagnose", diagnose)
+    monkeypatch.setattr("thermal_robot.diagnosing.diagnose", diagnose)
     monkeypatch.setattr(type(library()["joint_offset"]), "parameters", broken)
     status, _, err = run("diagnose", folder, "--only", "joint_offset")
     assert (status, err.count("\n")) == (1, 1)

@@ -7,7 +7,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot.campaign import describe, write_predictions
 from thermal_robot.commands.shared import as_json, as_page, deliver, read, read_from, tell
@@ -52,19 +52,23 @@ def effects(options: argparse.Namespace) -> None:
         print(f"  {effect.name:{wide}}  {effect.title}{f'; needs {asked}' if asked else ''}")
 
 
-def diagnosed(options: argparse.Namespace) -> Diagnosis:
-    """Diagnose the campaign that was named, telling the stages."""
-    from thermal_robot.diagnosis import diagnose
+def diagnosed(options: argparse.Namespace) -> Diagnosis | Any:
+    """Diagnose the campaign or the log of motion that was named, telling the stages."""
+    from thermal_robot import diagnosing
 
     with stages(options.loudness) as progress:
         progress("reading the campaign")
-        return diagnose(read(options), only=options.only, without=options.without, progress=progress)
+        given = diagnosing.read(options.campaign, folder=Path() if options.piped else None)
+        return diagnosing.diagnose(given, only=options.only, without=options.without, progress=progress)
 
 
 def diagnose(options: argparse.Namespace) -> None:
-    """Diagnose a campaign, print the result and write what is asked for."""
+    """Diagnose a campaign or a log of motion, print the result and write what is asked for."""
+    from thermal_robot.motion.read import declares_motion
     from thermal_robot.report import html
 
+    if declares_motion(Path(options.campaign)):
+        return _diagnose_motion(options)
     files = read_from(options.campaign, Path() if options.piped else None)
     require_free((options.json, options.model, options.report), files)
     found = diagnosed(options)
@@ -76,6 +80,22 @@ def diagnose(options: argparse.Namespace) -> None:
     deliver(options, outputs, str(found), found.summary)
     if not found.usable:
         raise CampaignError(str(options.campaign), found.reason)
+    return None
+
+
+def _diagnose_motion(options: argparse.Namespace) -> None:
+    from thermal_robot.motion.read import files_of
+    from thermal_robot.report import motion_html
+
+    if options.model:
+        raise CampaignError(
+            "diagnose", "no model of poses comes of a log of motion", column="--model", expected="no such option"
+        )
+    files = files_of(options.campaign, Path() if options.piped else None)
+    require_free((options.json, options.report), files)
+    found = diagnosed(options)
+    page = as_page(options.report, motion_html, found, files, lambda file: file.name)
+    deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
 
 
 def demo(options: argparse.Namespace) -> None:

@@ -16,15 +16,24 @@ PAGE, SUMMARY = "fleet.html", "fleet.json"
 
 def compare(options: argparse.Namespace) -> None:
     """Compare campaigns, print the result and write what is asked for."""
-    from thermal_robot.fleet.compare import compare
+    from thermal_robot.diagnosing import compare
     from thermal_robot.fleet.compare_sums import is_model
+    from thermal_robot.motion.read import declares_motion, files_of
 
+    motion = [declares_motion(Path(one)) for one in options.campaigns]
+    if any(motion) and options.report:
+        raise CampaignError("compare", "there is no page of motion compared", column="--report", expected="--json")
+    if all(motion):
+        require_free((options.json,), [file for one in options.campaigns for file in files_of(one)])
+        with stages(options.loudness) as progress:
+            told = compare(*options.campaigns, only=options.only, without=options.without, progress=progress)
+        return deliver(options, [(options.json, told.to_json)], str(told), told.summary)
     files = [file for one in options.campaigns for file in ([Path(one)] if is_model(one) else read_from(one))]
     require_free((options.json, options.report), files)
     with stages(options.loudness) as progress:
         found = compare(*options.campaigns, only=options.only, without=options.without, progress=progress)
     page = as_page(options.report, comparison_html, found.to_dict(), files)
-    deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
+    return deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
 
 
 def wear(options: argparse.Namespace) -> None:

@@ -77,9 +77,7 @@ def diagnose(
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
     require("diagnose(), effects", effects, (list, tuple), "a list of your own effects; names go to only")
     require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
-    if only is not None and not (only := _names("only", only)):
-        raise CampaignError("diagnose(), only", "names no effect", expected="at least one, or only left out for all")
-    only, without = only or (), _names("without", without)
+    only, without = asked_for(only, without)
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
@@ -125,6 +123,13 @@ def solvable(campaign: Campaign) -> Iterator[None]:
             f"{campaign.name}: the equations cannot be solved in floating point ({error}); look for values that are "
             "many orders of magnitude too large or too small"
         ) from error
+
+
+def asked_for(only: Iterable[str] | None, without: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of effects to consider, none for all, and those to leave out; refuse what names nothing."""
+    if only is not None and not (only := _names("only", only)):
+        raise CampaignError("diagnose(), only", "names no effect", expected="at least one, or only left out for all")
+    return tuple(only or ()), _names("without", without)
 
 
 def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:

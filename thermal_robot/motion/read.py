@@ -189,6 +189,16 @@ def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints:
     return max(chains, key=lambda robot: len(set(joints) & set(robot.joint_names)))
 
 
+def files_of(path: str | Path, folder: Path | None = None) -> list[Path]:
+    """Return the files that a log is read from: motion.toml, its tables, and the robot where it is a file."""
+    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
+    document, base = Document(file, KINDS, FILE_NAME), file.parent if folder is None else folder
+    log, said = document.required("motion", "log"), document.sections.get("robot", {})
+    robot = [base / said["mjcf"]] if "mjcf" in said else [robot_reference(said.get("urdf", ""), base)]
+    tables = [base / each for each in ((log,) if isinstance(log, str) else log)]
+    return [file, *tables, *(one for one in robot if isinstance(one, Path))]
+
+
 def motion_from_table(
     robot: Robot,
     table: pd.DataFrame | Sequence[pd.DataFrame],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +12,22 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import SCHEMA, estimate_table
-from thermal_robot.diagnosis.values import Finding, HeldOut, Unexplained, jsonable
+from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
 from thermal_robot.files import write_text
-from thermal_robot.motion.log import MotionLog
+from thermal_robot.motion import settings
+from thermal_robot.motion.effects import EFFECTS
+from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.physical import physical
+from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def told(diagnosis: MotionDiagnosis) -> MotionDiagnosis:
+    """Return the diagnosis with its summary and advice."""
+    teller = registered()
+    return replace(diagnosis, summary=teller.motion_headline(diagnosis), advice=teller.motion_advice(diagnosis))
 
 
 @dataclass(frozen=True)
@@ -58,7 +68,13 @@ class MotionDiagnosis:
     values
         By effect and joint (``""`` for all joints) the value that was fitted, SI.
     curves
-        By joint: time, command, measured and simulated position, before and after, and number of the motion.
+        By joint: time, command, measured and simulated position, before and after, load and number of the motion.
+    shares
+        Of the gap's mean square that goes away, by joint.
+    unit
+        SI unit of the gap of a joint that turns: rad, or N·m where torques were recorded.
+    moves
+        By effect and joint, how far it alone moves what is simulated: see :func:`~thermal_robot.motion.moves.moves`.
 
     Examples
     --------
@@ -84,6 +100,91 @@ class MotionDiagnosis:
     summary: str = ""
     advice: str = ""
     shares: Mapping[str, float] = field(default_factory=dict)
+    unit: str = "rad"
+    moves: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    @property
+    def usable(self) -> bool:
+        """Whether any joint of the log tells anything."""
+        return bool(self.joints)
+
+    @property
+    def few(self) -> bool:
+        """Whether there are fewer motions than count as independent, so that ± is weak."""
+        return len(self.log.motions) < settings.CLUSTERS
+
+    @property
+    def narrowed(self) -> bool:
+        """Whether effects were left out by request."""
+        return bool(self.left_out)
+
+    @property
+    def stated(self) -> bool:
+        """Whether the log states the stiffness of any servo, so that the model is a servo and not the command."""
+        return any(servo.kp for servo in self.log.servos.values())
+
+    def unit_of(self, joint: str) -> str:
+        """Return the SI unit of a joint's gap."""
+        robot = self.log.robot
+        slides = joint in robot.joint_names and robot.joint_types[robot.joint_names.index(joint)] == "prismatic"
+        return {"rad": "m", "N·m": "N"}[self.unit] if slides else self.unit
+
+    def title(self, effect: str, joint: str = "") -> str:
+        """Return an effect's name in plain words; of one joint where one is named."""
+        if joint:
+            single = {one.name: one.singular for one in EFFECTS}.get(effect) or self.title(effect)
+            return f"{single} in {joint}"
+        own = next((one.title for one in self.effects if one.name == effect), "")
+        return own or effect.replace("_", " ")
+
+    def visible(self, effect: str) -> tuple[str, ...]:
+        """Joints that an effect moves by twice the encoder's noise, and by the tolerance that the log states.
+
+        Where nobody computed how far it moves them, all joints in which it acts.
+        """
+        if not self.moves:
+            return tuple(one.name for one in self.finding(effect).locations) or tuple(self.joints)
+        least = {
+            name: max(settings.VISIBLE * one.noise, self.log.tolerance.get(name, 0.0))
+            for name, one in self.joints.items()
+        }
+        return tuple(name for name, size in least.items() if self.moves.get((effect, name), 0.0) >= size)
+
+    @property
+    def shown(self) -> tuple[Finding, ...]:
+        """Findings of the verdict that move any joint by what can be seen, the largest share first."""
+        return tuple(one for one in map(self.finding, self.verdict) if self.visible(one.name))
+
+    @property
+    def separates(self) -> tuple[tuple[str, ...], ...]:
+        """Groups of effects that these data cannot tell apart, each in the order of the findings."""
+        found: list[set[str]] = []
+        for one in self.shown:
+            if one.confounded_with:
+                group = {one.name, *one.confounded_with}
+                joined = [other for other in found if other & group]
+                found = [*(other for other in found if not other & group), group.union(*joined)]
+        order = [one.name for one in self.effects]
+        return tuple(tuple(name for name in order if name in group) for group in found)
+
+    def physical(self, effect: str) -> tuple[Estimate, ...]:
+        """Return the parameters of an effect in the joints where it is visible, as a data sheet gives them, SI.
+
+        Friction and limits in N·m and inertias in kg·m² where the servo's stiffness is known, else over it.
+        """
+        seen, found = self.visible(effect), []
+        for estimate in self.finding(effect).parameters:
+            joint = self.joint_of(estimate)
+            if joint in seen or (seen and not joint):
+                servo = self.log.servos.get(joint) or Servo()
+                commanded = self.curves[joint]["command"] if joint in self.curves else ()
+                found.append(physical(effect, estimate, servo, np.asarray(commanded)))
+        return tuple(found)
+
+    def joint_of(self, estimate: Estimate) -> str:
+        """Return the joint of a parameter; empty where all joints share it."""
+        joint = estimate.name.rpartition(", ")[2]
+        return joint if joint in self.log.joints else ""
 
     @property
     def rms_before(self) -> float:
@@ -115,58 +216,70 @@ class MotionDiagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the format ``thermal-robot/diagnosis/2``, which measures ``motion``."""
+        plain = {
+            "schema": SCHEMA,
+            "campaign": self._campaign(),
+            "gap": self._gap(),
+            "verdict": {
+                "usable": self.usable,
+                "reason": "" if self.usable else self.summary,
+                "effects": self.verdict,
+                "probability": self.probability,
+                "unexplained": self.unexplained.flagged,
+                "left_out": self.left_out,
+                "no_verdict": self.refused,
+                "summary": self.summary,
+            },
+            "effects": [asdict(one) for one in self.effects],
+            "where": {"axes": {}, "joints": self.shares, "links": {}, "covariates": {}},
+            "unexplained": self._left(),
+            "next": {"separates": self.separates, "advice": self.advice, "samples": []},
+        }
+        return dict(jsonable(plain))
+
+    def _campaign(self) -> dict[str, Any]:
+        return {
+            "name": self.log.name,
+            "robot": self.log.robot.name,
+            "tool_frame": self.log.robot.tool_frame,
+            "samples": sum(len(motion.position.time) for motion in self.log.motions),
+            "motions": len(self.log.motions),
+            "measures": "motion",
+            "outliers": [],
+            "faults": self.faults,
+            "warnings": self.warnings,
+        }
+
+    def _gap(self) -> dict[str, Any]:
+        return {
+            "rms_before": self.rms_before,
+            "rms_after": self.rms_after,
+            "noise_floor": _rms([one.noise for one in self.joints.values()]),
+            "noise_source": "scatter",
+            "orientation": None,
+            "held_out": asdict(self.held_out),
+            "joints": {name: asdict(one) for name, one in self.joints.items()},
+        }
+
+    def _left(self) -> dict[str, Any]:
         left = self.unexplained
-        return dict(
-            jsonable(
-                {
-                    "schema": SCHEMA,
-                    "campaign": {
-                        "name": self.log.name,
-                        "robot": self.log.robot.name,
-                        "tool_frame": self.log.robot.tool_frame,
-                        "samples": sum(len(m.position.time) for m in self.log.motions),
-                        "motions": len(self.log.motions),
-                        "measures": "motion",
-                        "outliers": [],
-                        "faults": self.faults,
-                        "warnings": self.warnings,
-                    },
-                    "gap": {
-                        "rms_before": self.rms_before,
-                        "rms_after": self.rms_after,
-                        "noise_floor": _rms([one.noise for one in self.joints.values()]),
-                        "noise_source": "scatter",
-                        "orientation": None,
-                        "held_out": asdict(self.held_out),
-                        "joints": {name: asdict(one) for name, one in self.joints.items()},
-                    },
-                    "verdict": {
-                        "usable": bool(self.joints),
-                        "reason": "" if self.joints else self.summary,
-                        "effects": self.verdict,
-                        "probability": self.probability,
-                        "unexplained": left.flagged,
-                        "left_out": self.left_out,
-                        "no_verdict": self.refused,
-                        "summary": self.summary,
-                    },
-                    "effects": [asdict(one) for one in self.effects],
-                    "where": {"axes": {}, "joints": self.shares, "links": {}, "covariates": {}},
-                    "unexplained": {
-                        "rms": left.rms,
-                        "p_value": left.p_value,
-                        "reasons": left.reasons,
-                        "locations": [{"kind": p.kind, "name": p.name, "probability": p.share} for p in left.locations],
-                        "depends_on": [asdict(one) for one in left.depends_on],
-                    },
-                    "next": {"separates": [], "advice": self.advice, "samples": []},
-                }
-            )
-        )
+        return {
+            "rms": left.rms,
+            "p_value": left.p_value,
+            "reasons": left.reasons,
+            "locations": [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations],
+            "depends_on": [asdict(one) for one in left.depends_on],
+        }
 
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file, which appears whole or not at all."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
+
+    def __str__(self) -> str:
+        return str(registered().motion_text(self))
+
+    def _repr_html_(self) -> str:
+        return str(registered().motion_fragment(self))
 
     def __repr__(self) -> str:
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"

@@ -113,6 +113,10 @@ BOOTSTRAPS, BOOTSTRAP_SEED = 400, 7
 """Draws of motions that tell the interval of a shrinkage; the same log always gets the same answer."""
 SURE = 0.9
 """Probability from which an effect is told for itself, though another could stand in its place."""
+VISIBLE = 2.0
+"""Times the encoder's noise: an effect that moves its joint by less is not shown, since nobody could see it go."""
+CHANGED = 3.0
+"""Standard deviations of a difference from which on it counts as a change: one in 400 of equal values lies beyond."""
 NOISY = 1.5
 """Times the encoder's noise: what remains below it is that noise."""
 STRUCTURE, LEVELS = 0.1, 10

@@ -11,6 +11,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thermal_robot.report.motion_page import motion_fragment, motion_html
+    from thermal_robot.report.motion_words import motion_advice, motion_headline
     from thermal_robot.report.page import comparison_fragment, comparison_html, fleet_html, fragment, html, wear_html
     from thermal_robot.report.plain_text import calibration_text, text
     from thermal_robot.report.plots import (
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
         plot_which,
     )
     from thermal_robot.report.text_campaigns import comparison_headline, comparison_text, fleet_text
+    from thermal_robot.report.text_motions import motion_comparison_headline, motion_comparison_text, motion_text
     from thermal_robot.report.words import advice, headline
 
 __all__ = [
@@ -40,6 +43,14 @@ __all__ = [
     "fragment",
     "headline",
     "html",
+    "motion_advice",
+    "motion_comparison_headline",
+    "motion_comparison_text",
+    "motion_fragment",
+    "motion_headline",
+    "motion_html",
+    "motion_schema",
+    "motion_text",
     "overview",
     "plot_how_far",
     "plot_map",
@@ -52,6 +63,9 @@ __all__ = [
     "wear_html",
 ]
 _HOMES = {
+    "motion_page": ("motion_fragment", "motion_html"),
+    "text_motions": ("motion_comparison_headline", "motion_comparison_text", "motion_text"),
+    "motion_words": ("motion_advice", "motion_headline"),
     "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_html"),
     "plain_text": ("calibration_text", "text"),
     "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
@@ -62,6 +76,11 @@ _HOMES = {
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/2``."""
     return dict(json.loads(files(__name__).joinpath("diagnosis.schema.json").read_text(encoding="utf-8")))
+
+
+def motion_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of ``thermal-robot/diagnosis/2`` that measures ``motion``."""
+    return dict(json.loads(files(__name__).joinpath("motion.schema.json").read_text(encoding="utf-8")))
 
 
 def comparison_schema() -> dict[str, Any]:

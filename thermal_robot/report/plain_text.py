@@ -34,25 +34,25 @@ def text(diagnosis: Diagnosis) -> str:
         far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next. Of a
         table that does not fit the robot what is wrong with it, and nothing of the robot.
     """
-    facts = [_wrap(said, f"{name.lower():11}") for name, said in words.facts(diagnosis).items() if name != "Rows used"]
-    warnings = ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
+    facts = [wrap(said, f"{name.lower():11}") for name, said in words.facts(diagnosis).items() if name != "Rows used"]
+    warnings = ["WARNINGS", *(wrap(w, "  - ") for w in diagnosis.warnings)]
     if diagnosis.usable:
         first = [*words.turned(diagnosis), diagnosis.summary, *words.details(diagnosis)]
         blocks = [
             ["HOW FAR", *_how_far(diagnosis)],
             ["WHICH", *_which(diagnosis)],
             ["WHERE", *_where(diagnosis)],
-            ["UNEXPLAINED", *map(_wrap, words.sentences(diagnosis))],
+            ["UNEXPLAINED", *map(wrap, words.sentences(diagnosis))],
             ["ISO 9283", *_criteria(diagnosis)],
             ["NEXT", *_next(diagnosis)],
         ]
     else:
-        first, blocks = [diagnosis.summary], [["NEXT", _wrap(diagnosis.advice)]]
-    told = [[_wrap(s, "") for s in first], facts, *(block for block in (*blocks, warnings) if len(block) > 1)]
+        first, blocks = [diagnosis.summary], [["NEXT", wrap(diagnosis.advice)]]
+    told = [[wrap(s, "") for s in first], facts, *(block for block in (*blocks, warnings) if len(block) > 1)]
     return "\n\n".join("\n".join(block) for block in told)
 
 
-def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
+def wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
     """Break a sentence into lines, but not between a number and its unit; the first line begins with ``indent``."""
     rest = " " * (len(indent) + hang)
     lines = fill(words.bound(sentence), WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
@@ -74,13 +74,13 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     for name, first, second, note in lines:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
     if told := words.with_aside(diagnosis):
-        yield _wrap(told, f"  {'':{_NAME}}")
+        yield wrap(told, f"  {'':{_NAME}}")
     interval = f"95 % interval {_bounds(held.shrinkage_ci95)}"
     yield f"  {'shrinkage, held out':{_NAME}}{units.percent(held.shrinkage)}   {interval}"
     if told := words.hardest(diagnosis):
-        yield _wrap(told, f"  {'hardest hold-out':{_NAME}}")
-    yield _wrap(words.noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
-    yield _wrap(
+        yield wrap(told, f"  {'hardest hold-out':{_NAME}}")
+    yield wrap(words.noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
+    yield wrap(
         "Shrinkage is the share of the gap's mean square that the correction removes. Figures of rows held out "
         "have the noise of these rows in them."
     )
@@ -102,27 +102,27 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
         for finding in group:
             yield from _effect(finding, status, wide, diagnosis)
     if told := words.one_sigma(diagnosis):
-        yield _wrap(told)
+        yield wrap(told)
 
 
 def _effect(finding: Finding, status: str, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
     if status == "not_testable":
         needs = needed(finding, diagnosis.joint_names)
-        yield _wrap(f"needs {needs}", f"    {finding.name:{wide}}{'':13}   ")
+        yield wrap(f"needs {needs}", f"    {finding.name:{wide}}{'':13}   ")
         return
     bounds = f"  ({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
     line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   "
     line += f"{units.percent(finding.shrinkage):>7}{bounds}"
     if status not in ("found", "confounded", "contained"):
         rivals = ", ".join(finding.confounded_with)
-        yield _wrap(f"; cannot be told apart from {rivals}", line) if rivals else line
+        yield wrap(f"; cannot be told apart from {rivals}", line) if rivals else line
         return
     yield line
     before, shown, after = words.described(finding, diagnosis)
-    yield from (_wrap(told, " " * 6, hang) for told, hang in before)
+    yield from (wrap(told, " " * 6, hang) for told, hang in before)
     column = max([len(name) for name, _ in shown], default=0)
     yield from (f"      {name:{column}}  {value}" for name, value in shown)
-    yield from (_wrap(told, " " * 6, hang) for told, hang in after)
+    yield from (wrap(told, " " * 6, hang) for told, hang in after)
 
 
 def _where(diagnosis: Diagnosis) -> Iterator[str]:
@@ -144,13 +144,17 @@ def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: 
     yield f"  {heading}"
     wide = max([_NAME, *(len(name) for name, _ in shown)])
     for name, share in shown:
-        halves = round(2 * _BAR * min(max(share, 0.0), 1.0)) if share == share else 0
-        bar = "█" * (halves // 2) + "▌" * (halves % 2)
-        yield f"    {name:{wide}}  {bar:{_BAR}}  {units.percent(share):>7}"
+        yield f"    {name:{wide}}  {bar(share):{_BAR}}  {units.percent(share):>7}"
     if not shown:
         yield "    none above 0.5 %"
     elif rest := ordered[len(shown) :]:
         yield f"    {words.more(len(rest), rest[0][1])}"
+
+
+def bar(share: float) -> str:
+    """Draw a share as a bar of characters, full at one."""
+    halves = round(2 * _BAR * min(max(share, 0.0), 1.0)) if share == share else 0
+    return "█" * (halves // 2) + "▌" * (halves % 2)
 
 
 def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
@@ -172,14 +176,14 @@ def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
         said.append("After the arrow: corrected, of poses held out.")
     if found.registered:
         said.append(f"AP and AT are after registration of {' and '.join(found.registered)} to the same rows.")
-    yield _wrap(" ".join(said))
+    yield wrap(" ".join(said))
 
 
 def _next(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.advice:
-        yield _wrap(diagnosis.advice)
+        yield wrap(diagnosis.advice)
     for group in diagnosis.separates:
-        yield _wrap(f"to tell apart: {', '.join(group)}", "  - ")
+        yield wrap(f"to tell apart: {', '.join(group)}", "  - ")
 
 
 def calibration_text(calibration: Calibration) -> str:

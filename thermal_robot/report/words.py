@@ -14,6 +14,7 @@ from thermal_robot.report import units
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
     from thermal_robot.diagnosis.values import AnotherModel, Finding, Misfit, Unexplained, Wanted
+    from thermal_robot.motion.result import MotionDiagnosis
 
 
 MOST_WORDS = 45
@@ -469,7 +470,7 @@ def _left_out(diagnosis: Diagnosis) -> str:
     return f"by request all but {', '.join(kept)} (--only {' '.join(kept)})"
 
 
-def one_sigma(diagnosis: Diagnosis) -> str:
+def one_sigma(diagnosis: Diagnosis | MotionDiagnosis) -> str:
     """Say what ± means; empty where it does not stand anywhere."""
     told = any(f.size or any(p.identified and p.std for p in f.parameters) for f in diagnosis.effects)
     return "± is one standard deviation (1 sigma)." if told else ""

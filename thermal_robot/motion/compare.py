@@ -1,0 +1,180 @@
+"""Wald tests of equal servo parameters in two logs of one robot: what changed between them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import erfc
+
+from thermal_robot.diagnosis.values import Estimate, jsonable
+from thermal_robot.errors import CampaignError
+from thermal_robot.files import write_text
+from thermal_robot.motion import settings
+from thermal_robot.motion.result import MotionDiagnosis
+from thermal_robot.teller import registered
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA = "thermal-robot/motion-comparison/1"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One parameter of one joint in both logs, as a data sheet gives it.
+
+    Attributes
+    ----------
+    effect, title, joint, name, unit
+        What it is; the joint is empty where all share it.
+    values, stds
+        Per log; ``None`` where its diagnosis does not tell the effect there.
+    difference, std, z
+        Second less first, its standard deviation, and the first over the second; ``None`` unless both tell it.
+    p_value
+        Two-sided probability of a difference as large by chance, not corrected for the other parameters.
+    """
+
+    effect: str
+    title: str
+    joint: str
+    name: str
+    unit: str
+    values: tuple[float | None, float | None]
+    stds: tuple[float | None, float | None]
+    difference: float | None = None
+    std: float | None = None
+    z: float | None = None
+    p_value: float | None = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether the difference is beyond three of its standard deviations."""
+        return self.z is not None and abs(self.z) > settings.CHANGED
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionComparison:
+    """What changed between two logs of one robot's motion.
+
+    Attributes
+    ----------
+    logs
+        Names of the two, the earlier one first.
+    parameters
+        Every effect that either tells, joint by joint, the surest change first.
+    robot
+        Which robot.
+    weak
+        Whether either has too few motions for its ± to be relied on.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> found = tr.compare("last_week/motion.toml", "today/motion.toml")  # doctest: +SKIP
+    >>> [(one.effect, one.joint, one.z) for one in found.changes]  # doctest: +SKIP
+    [('coulomb', 'elbow', 6.1)]
+    """
+
+    logs: tuple[str, str]
+    parameters: tuple[Compared, ...]
+    robot: str = ""
+    weak: bool = False
+
+    @property
+    def changes(self) -> tuple[Compared, ...]:
+        """Parameters that changed, the surest first."""
+        return tuple(one for one in self.parameters if one.changed)
+
+    @property
+    def summary(self) -> str:
+        """What changed in one plain sentence."""
+        return str(registered().motion_comparison_headline(self))
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """All parameters as a table, index effect and joint."""
+        import pandas as pd
+
+        rows = [
+            {"effect": one.effect, "joint": one.joint, "parameter": one.name, "unit": one.unit,
+             **{f"{part} of {log}": values[k] for k, log in enumerate(self.logs)
+                for part, values in (("value", one.values), ("std", one.stds))},
+             "difference": one.difference, "std": one.std, "z": one.z, "p_value": one.p_value}
+            for one in self.parameters
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=None if rows else ["effect", "joint"]).set_index(["effect", "joint"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the format ``thermal-robot/motion-comparison/1``."""
+        told = [{**asdict(one), "changed": one.changed} for one in self.parameters]
+        plain = {"schema": SCHEMA, "robot": self.robot, "logs": self.logs, "weak": self.weak, "parameters": told}
+        return dict(jsonable({**plain, "summary": self.summary}))
+
+    def to_json(self, path: str | Path) -> None:
+        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
+
+    def __str__(self) -> str:
+        return str(registered().motion_comparison_text(self))
+
+    def __repr__(self) -> str:
+        changed = ", ".join(dict.fromkeys(one.effect for one in self.changes)) or "nothing"
+        return f"MotionComparison({', '.join(self.logs)}: {changed} changed)"
+
+
+def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequence[str] = ()) -> MotionComparison:
+    """Wald test of every parameter that two diagnoses of one robot's motion tell.
+
+    Parameters
+    ----------
+    first, second
+        The earlier and the later one.
+    names
+        What they are called; by default their logs' names.
+
+    Raises
+    ------
+    CampaignError
+        If the logs have no joint in common.
+    """
+    if not set(first.log.joints) & set(second.log.joints):
+        found = f"{', '.join(first.log.joints)}; {', '.join(second.log.joints)}"
+        raise CampaignError("compare()", "the logs have no joint in common", found=found, expected="one robot")
+    own = (first.log.name or "first", second.log.name or "second")
+    called = tuple(names) or (own if own[0] != own[1] else (f"{own[0]} (1)", f"{own[1]} (2)"))
+    told = [_told(one) for one in (first, second)]
+    keys = dict.fromkeys(key for one in told for key in one)
+    parameters = [_compared(key, [one.get(key) for one in told], (first, second)) for key in keys]
+    parameters.sort(key=lambda one: -abs(one.z or 0.0))
+    return MotionComparison((called[0], called[1]), tuple(parameters), first.log.robot.name, first.few or second.few)
+
+
+def _told(d: MotionDiagnosis) -> dict[tuple[str, str, str, str], Estimate]:
+    """Return what is shown, by effect, name (its joint in it), unit and joint."""
+    return {
+        (finding.name, one.name, one.unit, d.joint_of(one)): one
+        for finding in d.shown
+        for one in d.physical(finding.name)
+    }
+
+
+def _compared(
+    key: tuple[str, str, str, str], pair: list[Estimate | None], both: tuple[MotionDiagnosis, MotionDiagnosis]
+) -> Compared:
+    effect, name, unit, joint = key
+    values = pair[0].value if pair[0] else None, pair[1].value if pair[1] else None
+    stds = pair[0].std if pair[0] else None, pair[1].std if pair[1] else None
+    teller = both[0] if pair[0] else both[1]
+    known = Compared(effect, teller.title(effect, joint), joint, name, unit, values, stds)
+    if values[0] is None or values[1] is None or stds[0] is None or stds[1] is None:
+        return known
+    difference, std = values[1] - values[0], float(np.hypot(stds[0], stds[1]))
+    z = difference / std if std > 0.0 else 0.0
+    chance = float(erfc(abs(z) / np.sqrt(2.0)))
+    return Compared(effect, known.title, joint, name, unit, values, stds, difference, std, z, chance)

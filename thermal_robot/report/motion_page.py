@@ -1,0 +1,89 @@
+"""A diagnosis of motion as an HTML page that needs nothing beside itself, and as a piece for a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from thermal_robot.report import motion_plots as plots
+from thermal_robot.report import motion_words as words
+from thermal_robot.report import units
+from thermal_robot.report.page import render
+from thermal_robot.report.words import STATUS, needs, one_sigma, told_as
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.values import Finding
+    from thermal_robot.motion.result import MotionDiagnosis
+
+
+def motion_html(
+    diagnosis: MotionDiagnosis, generated: str | None = None, files: Mapping[str, str] | None = None
+) -> str:
+    """Write a diagnosis of motion as an HTML page that needs nothing beside itself and prints on A4.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    generated
+        When it was made, for the footer; nothing is said where absent, so that equal diagnoses give equal pages.
+    files
+        Names of the files that the diagnosis was made from, with the SHA-256 of each, for the footer.
+    """
+    title = f"Motion of {diagnosis.log.name or diagnosis.log.robot.name}"
+    return render("motion.html", _shown(diagnosis), title=title, generated=generated, files=files)
+
+
+def motion_fragment(diagnosis: MotionDiagnosis) -> str:
+    """Write a diagnosis of motion as HTML for a notebook: verdict, numbers, gaps, effects."""
+    return render("motion.html", _shown(diagnosis))
+
+
+def _shown(d: MotionDiagnosis) -> dict[str, Any]:
+    heads, rows = words.gaps(d)
+    return {
+        "d": d,
+        "told": words,
+        "drawn": plots,
+        "numbers": _numbers(d),
+        "gaps": {"label": "Rms gap of each joint", "heads": heads, "rows": rows},
+        "effects": list(_effects(d)),
+        "one_sigma": one_sigma(d),
+    }
+
+
+def _needs(d: MotionDiagnosis, finding: Finding) -> str:
+    told = needs(finding, list(d.joints))
+    return f"needs {told}" if told else words.NO_USE
+
+
+def _numbers(d: MotionDiagnosis) -> list[tuple[str, str, str, list[str]]]:
+    """Return the rms gap before and after and the shrinkage held out: kind, heading, value and what stands below it."""
+    held, noise = d.held_out, max((one.noise for one in d.joints.values()), default=0.0)
+    before, after, floor = units.together((d.rms_before, d.rms_after, noise), d.unit)
+    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %".replace(" %", "\N{NO-BREAK SPACE}%")
+    pair = " → ".join(units.together((held.rms_before, held.rms_after), d.unit))
+    return [
+        ("before", "Gap before, rms of all joints", before, []),
+        ("after", "Gap after", after, [f"noise of a reading at most {floor}"]),
+        ("held", "Shrinkage on motions held out", units.percent(held.shrinkage), [bounds, pair]),
+    ]
+
+
+def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
+    """Yield each effect as it stands in the table, what is told first."""
+    shown = {one.name for one in d.shown}
+    for status, heading in STATUS.items():
+        for one in d.effects:
+            told = status in ("found", "confounded")
+            if told_as(one) != status or (told and one.name not in shown):
+                continue
+            yield {
+                "finding": one,
+                "status": heading,
+                "told": told,
+                "means": words.MEANS.get(one.name, "") if told else "",
+                "known": words.parameters(d, one.name) if told else [],
+                "moves": words.places(d, one.name) if told else "",
+                "needs": _needs(d, one) if status == "not_testable" else "",
+            }
