@@ -30,8 +30,12 @@ def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), 
     parts = []
     for m, motion in enumerate(log.motions):
         grid = model.grid[model.begins[m] : model.begins[m + 1]]
-        q = np.stack([np.interp(motion.position.time, grid, p[model.begins[m] : model.begins[m + 1]]) for p in place], 1)
-        parts.append(replace(motion, position=Channel(motion.position.time, noise * np.round(q / noise)), velocity=None))
+        q = np.stack(
+            [np.interp(motion.position.time, grid, p[model.begins[m] : model.begins[m + 1]]) for p in place], 1
+        )
+        parts.append(
+            replace(motion, position=Channel(motion.position.time, noise * np.round(q / noise)), velocity=None)
+        )
     return replace(log, motions=tuple(parts)), values
 
 
@@ -85,7 +89,7 @@ def test_evidence_is_deflated_and_never_inflated(known):
 
 
 def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(known):
-    """Rows of one motion that err together count as one: ten times the rows of the same errors change no ratio's part."""
+    """Rows of one motion that err together count as one."""
     _, model, values = known
     point = Point.at(model, values)
     draw = np.random.default_rng(1)
@@ -113,7 +117,7 @@ def test_what_is_needed_lowers_the_loss_of_motions_held_out(known):
 
 @pytest.mark.slow
 def test_diagnosis_names_what_was_put_in_and_little_else():
-    log, values = driven(TRUE)
+    log, _ = driven(TRUE)
     found = diagnose_motion(log)
     named = set(found.values)
     assert {(effect, log.joints[joint]) for effect, joint in TRUE} <= named

@@ -25,7 +25,9 @@ def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, 
     around = load * flat, slope * flat[0], 0.0 * flat[0], 0.0 * flat
     grid = np.array([0, n]), np.zeros(1)
     ends = np.array([0, len(times)])
-    found = simulate(row[None], np.ones((1, 1)), grid, (times, integral, ends), around, np.array([start]), STEP, substeps)
+    found = simulate(
+        row[None], np.ones((1, 1)), grid, (times, integral, ends), around, np.array([start]), STEP, substeps
+    )
     return found[0], STEP * np.arange(n)
 
 
@@ -63,7 +65,7 @@ def test_a_joint_hangs_below_its_command_by_compliance_times_load():
 def test_delay_shifts_the_answer_and_no_more():
     stamps = np.arange(0.0, 2.0, 0.05)
     command = stamps, np.sin(3.0 * stamps)
-    q, t = moved(command, lag=0.05)
+    q, _ = moved(command, lag=0.05)
     late, _ = moved(command, lag=0.05, delay=0.06)
     np.testing.assert_allclose(late[3:], q[:-3], atol=1e-3)
     assert not np.allclose(late, q, atol=1e-2)
@@ -78,7 +80,7 @@ def test_delay_moves_the_answer_smoothly():
 
 
 def test_a_saturated_servo_turns_at_its_limit_over_its_lag():
-    q, t = moved(command=2.0, seconds=0.6, lag=0.1, saturation=1.0 / 0.2)
+    q, _ = moved(command=2.0, seconds=0.6, lag=0.1, saturation=1.0 / 0.2)
     speed = np.diff(q) / STEP
     np.testing.assert_allclose(speed[:20], 0.2 / 0.1, rtol=1e-6)
 

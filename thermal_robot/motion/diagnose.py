@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import did_you_mean
-from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
+from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Status, Unexplained
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
@@ -77,7 +77,7 @@ def diagnose_motion(
         progress("without the motions that nothing explains")
         motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
         model = kind(replace(log, motions=motions))
-        choice = select(model, allowed, progress)
+        choice = select(model, allowed, progress, choice.point.values)
     left_out = tuple(name for name in ALL if name not in kept)
     found = _answer(model, choice, refused, left_out, progress)
     return replace(found, faults=tuple(fault.told for fault in sound.faults))
@@ -102,8 +102,7 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
 
 
 def _nothing(model: JointModel) -> list[Array]:
-    zero = np.zeros((1, len(model.parameters)))
-    return model.each(lambda joint: model.residuals(joint, zero)[0])
+    return model.all_residuals(np.zeros(len(model.parameters)))
 
 
 def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
@@ -116,7 +115,7 @@ def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -
         progress(f"motions held out, part {fold + 1} of {folds}")
         held = np.arange(count) % folds == fold
         values = fit(model, choice.point.values, choice.active, choice.sizes, ~held)
-        for joint, left in enumerate(model.each(lambda j, v=values: model.residuals(j, v[None])[0])):
+        for joint, left in enumerate(model.all_residuals(values)):
             out = held[choice.point.rows[joint].motion]
             found[joint][out] = left[out]
     return found
@@ -142,7 +141,7 @@ def _answer(
     low, high = np.quantile(ratios, [0.025, 0.975])
     total = [float(np.sqrt(one.sum() / len(before))) for one in square]
     folds = min(settings.FOLDS, model.clusters)
-    held_out = HeldOut("motion", folds, *total, shrinkage, (float(low), float(high)))
+    held_out = HeldOut("motion", folds, total[0], total[1], shrinkage, (float(low), float(high)))
     findings, shares = _findings(model, choice, before, weights)
     verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
     values = {
@@ -151,7 +150,8 @@ def _answer(
         if choice.active[p]
     }
     return MotionDiagnosis(
-        log, joints, held_out, findings, verdict, _probability(model, choice), _unexplained(model, choice, noise), values,
+        log, joints, held_out, findings, verdict, _probability(model, choice),
+        _unexplained(model, choice, noise), values,
         {name: _curves(model, j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
         shares=shares,
     )  # fmt: skip
@@ -225,7 +225,7 @@ def _findings(
             for p in active
             for one in (model.parameters[p],)
         )  # fmt: skip
-        status = "confounded" if rivals and probability < settings.SURE else "found"
+        status: Status = "confounded" if rivals and probability < settings.SURE else "found"
         found.append(
             Finding(
                 name, status, probability, total, None, (), tuple(sorted(rivals)) if status == "confounded" else (),
@@ -265,8 +265,8 @@ def _unexplained(model: JointModel, choice: Choice, noise: list[float]) -> Unexp
     reason = f"{100.0 * worst[0]:.0f} % of what remains in {name} follows {worst[1]}"
     places = tuple(Location("joint", model.log.joints[j], gain) for gain, _, j in flagged[:3])
     follows = tuple(dict.fromkeys(one[1] for one in flagged))
-    left = float(np.sqrt(np.mean([rms(one.residual) ** 2 for one in choice.point.rows])))
-    return Unexplained(True, left, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
+    remains = float(np.sqrt(np.mean([rms(one.residual) ** 2 for one in choice.point.rows])))
+    return Unexplained(True, remains, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
 
 
 def _curve_gain(left: Array, values: Array, motion: NDArray[np.int64]) -> float:

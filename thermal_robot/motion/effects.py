@@ -33,7 +33,8 @@ class ServoEffect:
 EFFECTS = (
     ServoEffect("zero", "zeros of the joints", "the zero", "zero", "zero", "rad", 20e-3, positive=False),
     ServoEffect("gain", "gain of the command", "the command's gain", "gain", "gain", "", 10e-3, positive=False),
-    ServoEffect("delay", "delay of the command", "a delay of the command", "delay", "delay", "s", 10e-3, spread=UNSOURCED),
+    ServoEffect("delay", "delay of the command", "a delay of the command", "delay", "delay", "s", 10e-3,
+                spread=UNSOURCED),
     ServoEffect("lag", "lag of the servos", "the servo's lag", "time constant", "lag", "s", 80e-3),
     ServoEffect("armature", "inertia of the drives", "the drive's inertia", "inertia over stiffness", "inertia", "s²",
                 5e-3, of_limit=True),

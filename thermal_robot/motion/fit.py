@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +99,8 @@ def fit(
             ahead.append(values.copy())
             ahead[-1][own] = step
         best, gained = values.copy(), 0.0
-        sets, noise = np.array(ahead), point.noise
-        costs = np.stack(
-            model.each(lambda j, s=sets, n=noise: (model.residuals(j, s)[:, used[j]] ** 2).sum(axis=1) / n[j] ** 2)
-        )
+        sets = np.array(ahead)
+        costs = _costs(model, sets, used, point.noise)
         if shared:
             k = int(np.argmin(costs.sum(axis=0)))
             gained = float(before.sum() - costs[:, k].sum())
@@ -119,6 +118,11 @@ def fit(
     return values
 
 
+def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:
+    """(J, S) sums of squares of every joint over its noise, of the readings in use, for sets (S, P) of parameters."""
+    return np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
+
+
 def ratios(point: Point) -> Array:
     """(P,) variance of each parameter's score, clustered by motion, over that of white rows; at least one.
 
@@ -129,7 +133,7 @@ def ratios(point: Point) -> Array:
     clustered, white = np.zeros(len(found)), np.zeros(len(found))
     for one, noise in zip(point.rows, point.noise, strict=True):
         ends = np.searchsorted(one.motion, np.arange(count + 1))
-        pieces = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        pieces = [slice(a, b) for a, b in pairwise(ends)]
         score = np.array([one.derivative[p].T @ one.residual[p] for p in pieces]) / noise**2
         bread = np.array([(one.derivative[p] ** 2).sum(axis=0) for p in pieces]) / noise**2
         whole = bread.sum(axis=0)
@@ -144,9 +148,9 @@ def ratios(point: Point) -> Array:
 
 
 def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, list[tuple[str, int]]]:
-    """Normal equations in units of prior sizes in which each parameter's information is that of its motions.
+    """Return normal equations, in units of prior sizes, with the information that motions bring, and the blocks.
 
-    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Returns the blocks' effect and joint.
+    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. A block is an effect of a joint.
     """
     matrix, vector = (one.sum(axis=(0, 1)) for one in point.products[:2])
     sizes = np.array([one.size for one in model.parameters])

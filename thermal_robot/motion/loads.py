@@ -17,9 +17,10 @@ from thermal_robot.motion.log import MotionLog
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Torques (k, n, J) and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
+    """Joint torques and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
 
-    The first of the k is that of the model; then that of 1 kg of payload, and of each link that of its whole mass and of 1 kg·m along each of its axes.
+    The first of the k is that of the model; then that of 1 kg of payload, and of each link that of its
+    whole mass and of 1 kg·m along each of its axes.
     """
 
     torque: Array

@@ -124,9 +124,10 @@ class MotionLog:
             return None if channel is None else Channel(channel.time, channel.values[:, at])
 
         def only(motion: Motion) -> Motion:
-            position = cut(motion.position)
-            command = position if motion.command is motion.position else cut(motion.command)
-            rest = {
+            position = Channel(motion.position.time, motion.position.values[:, at])
+            command = Channel(motion.command.time, motion.command.values[:, at])
+            command = position if motion.command is motion.position else command
+            rest: dict[str, Any] = {
                 name: cut(getattr(motion, name)) for name in ("velocity", "torque", "current", "volts", "temperature")
             }
             return replace(motion, command=command, position=position, **rest)

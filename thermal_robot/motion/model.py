@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ SHARED = -1
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown of the servo model: ``number`` of the kernel that it moves in a joint, or weight of a load that all joints share."""
+    """Unknown of a model: the ``number`` that it moves in a joint, or the weight of a load that all joints share."""
 
     effect: str
     joint: int
@@ -47,7 +48,7 @@ class Rows:
     motion: NDArray[np.int64]
 
 
-class JointModel:
+class JointModel(ABC):
     """What all models of a log's joints share: parameters by name, and work on several joints at a time."""
 
     parameters: tuple[Parameter, ...] = ()
@@ -84,20 +85,52 @@ class JointModel:
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
     def rated(self, torque: Array) -> float:
-        """Expected payload, kg: a share of what the weakest joint can hold, by the torques (n, J) of one kilogram."""
+        """Return the expected payload, kg: a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
         most = np.abs(torque).max(axis=0)
         servos = [self.log.servos.get(name, Servo()) for name in self.log.joints]
         limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in servos])
         return settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
 
+    @abstractmethod
+    def start(self) -> Array:
+        """(P,) values from which all effects are fitted."""
+
+    @abstractmethod
+    def refreshed(self, values: Array) -> None:
+        """Take the loads where the joints go with the parameters (P,)."""
+
+    @abstractmethod
+    def residuals(self, joint: int, values: Array) -> Array:
+        """(S, N) residual of a joint for S sets (S, P) of all parameters."""
+
+    @abstractmethod
     def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def motion_of(self, joint: int) -> NDArray[np.int64]:
+        """(N,) number of the cluster of each reading of a joint."""
+
+    @abstractmethod
+    def noise(self, joint: int) -> float:
+        """One sigma of the readings of a joint."""
+
+    @abstractmethod
+    def quantities(self, joint: int) -> dict[str, Array]:
+        """(N,) what the residual of a joint may follow, by name."""
+
+    @abstractmethod
+    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
+        """(N,) what is drawn of a joint, by name."""
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
         with ThreadPoolExecutor(threads()) as pool:
             return list(pool.map(function, self.joints))
+
+    def all_residuals(self, values: Array) -> list[Array]:
+        """Residual (N,) of every joint at the parameters (P,)."""
+        return self.each(lambda joint: self.residuals(joint, values[None])[0])
 
     def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
         """Residual and derivatives of every joint at the parameters (P,)."""
@@ -151,7 +184,7 @@ class ServoModel(JointModel):
 
     @cached_property
     def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
-        """Of each joint the stamps of all motions, the command's integral there and its slope, and where each begins."""
+        """Of each joint the stamps of all motions, the command's integral there and its slope, and their begins."""
         found = []
         begins = np.concatenate([[0], np.cumsum([len(m.command.time) for m in self.log.motions])]).astype(np.int64)
         for j in range(len(self.log.joints)):
@@ -296,7 +329,7 @@ class ServoModel(JointModel):
         }  # fmt: skip
 
     def refreshed(self, values: Array) -> None:
-        """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled."""
+        """Take the loads where the joints go in place of where they are sent; those of their motion where coupled."""
         about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
         speed = rate = None
         if self.coupled:

@@ -68,14 +68,17 @@ class Choice:
         return found
 
 
-def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Array:
-    """Maximum a posteriori values of all effects together, loads taken where the joints go, until both agree."""
-    sizes = np.array([one.size for one in model.parameters])
-    start = np.where(allowed, model.start(), 0.0)
-    plain = allowed & np.array([one.effect in PLAIN for one in model.parameters])
-    values = fit(model, np.where(plain, start, 0.0), plain, sizes) if plain.any() else np.zeros(len(sizes))
-    abrupt = allowed & np.array([one.effect in ABRUPT for one in model.parameters])
-    values = np.where(abrupt, start, values)  # of what does nothing until it is reached a derivative at zero tells nothing
+def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Array:
+    """Maximum a posteriori values of all effects together, loads taken where the joints go, until both agree.
+
+    From ``start``, by default from a fit of plain servos; effects that are abrupt start where the joints end.
+    """
+    sizes, begun = np.array([one.size for one in model.parameters]), np.where(allowed, model.start(), 0.0)
+    if start is None:
+        plain = allowed & np.array([one.effect in PLAIN for one in model.parameters])
+        start = fit(model, np.where(plain, begun, 0.0), plain, sizes)
+    abrupt = allowed & (start == 0.0) & np.array([one.effect in ABRUPT for one in model.parameters])
+    values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)
@@ -83,10 +86,10 @@ def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]
     return values
 
 
-def select(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Choice:
+def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Choice:
     """Search the effects by evidence at the fit of all, then at the exact fit of the choice, and prune by one rule."""
     sizes = np.array([one.size for one in model.parameters])
-    values = everything(model, allowed, progress)
+    values = everything(model, allowed, start, progress)
     deflation = None
     known: Mask | None = None
     for number in range(1, settings.SELECTIONS + 1):
@@ -103,7 +106,13 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None]) ->
 
 
 def _weighed(
-    model: JointModel, values: Array, allowed: Mask, sizes: Array, deflation: Array | None, start: Mask | None, final: bool = False
+    model: JointModel,
+    values: Array,
+    allowed: Mask,
+    sizes: Array,
+    deflation: Array | None,
+    start: Mask | None,
+    final: bool = False,
 ) -> Choice:
     """Search by evidence at some values; where ``final`` the choice is the start, and the search tells its rivals."""
     point = Point.at(model, values)
@@ -119,7 +128,7 @@ def _weighed(
 
 
 def held_out_loss(point: Point, active: Mask, sizes: Array) -> Array:
-    """Leave-one-motion-out, linearised: squared residual (J, M) over the noise of each joint in each motion held out."""
+    """Leave-one-motion-out, linearised: squared residual (J, M) over the noise, of joints in motions held out."""
     matrix, vector, total = point.products
     own = np.flatnonzero(active)
     if not len(own):

@@ -5,7 +5,8 @@ sticking,
 
     τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q], ±L) − c load(q) ,   |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
-D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of gravity and of the other joints. One step of the
+D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of
+gravity and of the other joints. One step of the
 implicit midpoint rule solves a monotone inclusion for the velocity at its middle (Moreau's time stepping: Acary and
 Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), and a joint that sticks is at rest at its end; a
 command that is held between its stamps is averaged over the step, so that the answer is smooth in the delay.
@@ -14,6 +15,7 @@ command that is held between its stamps is averaged over the step, so that the a
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -42,8 +44,10 @@ NEWTON_STEPS = 12
 """Of the piecewise linear equation of a step: it has five pieces, and each step finds another one."""
 
 
-def _simulate(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
-              inertias, start, out):  # type: ignore[no-untyped-def]  # fmt: skip
+def _simulate(  # type: ignore[no-untyped-def]
+    numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about, inertias,
+    start, out,
+):  # fmt: skip
     """Integrate all motions for each set of numbers; ``out`` (S, n) is q on the grid."""
     h = step / substeps
     half = 0.5 * h
@@ -128,8 +132,8 @@ _compiled = None
 def simulate(
     numbers: Array,
     weights: Array,
-    grid: tuple[Array, ...],
-    command: tuple[Array, ...],
+    grid: tuple[Any, ...],
+    command: tuple[Any, ...],
     around: tuple[Array, ...],
     start: Array,
     step: float,

@@ -72,10 +72,10 @@ COMMON_RATE = 50.0
 DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
 CLUSTERS, BLOCKS = 8, 20
-"""Motions from which they count as independent; below, the rows are cut into so many blocks, and ± is said to be weak."""
+"""Motions from which they count as independent; below, they are cut into so many blocks, and ± is said to be weak."""
 ROUNDS = 12
 """Gauss-Newton steps at most of one fit."""
-SETTLED = 1e-4
+SETTLED = 1e-3
 """Of the sum of squares: a smaller gain ends the fit."""
 DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 """Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
@@ -86,7 +86,7 @@ LOAD_STEP = 0.02
 LEAST_NOISE = 1e-5
 """rad: no encoder of a joint is finer; a simulated log may leave nothing."""
 WIDE = 10.0
-"""Times the expected size: prior of the least-squares values that the deflation keeps; it only bounds what is not seen."""
+"""Times the expected size: prior of the least-squares values that the deflation keeps; it bounds the unseen."""
 SEEN = 1e-5
 """Squared length of a column at its expected size, in units of the noise, below which the data do not see it."""
 PAYLOAD = 0.3
@@ -97,8 +97,8 @@ LEAST_COMPLIANCE = 1e-3
 """rad/(N·m): of a joint whose droop is not known yet, where contact divides a force among joints."""
 FEW = 0.999
 """Quantile of the tracking error from which a saturation is looked for."""
-REFRESHES = 3
-"""Times that loads are taken anew where the joints go, and all effects fitted: the third moves a residual by 1 %."""
+REFRESHES = 2
+"""Times that loads are taken anew where the joints go, and all effects fitted: a third moves a residual by 1 %."""
 SELECTIONS = 2
 """Choices among all effects: at the fit of all, then at the exact fit of what was chosen."""
 ODDS = 9.0
@@ -124,7 +124,7 @@ STRUCTURE, LEVELS = 0.1, 10
 MOST_PAYLOAD = 100.0
 """kg: where no joint feels a payload."""
 SMOOTHED = 0.1
-"""s: window of the local cubics that differentiate positions; shorter than a joint's accelerations, long beside counts."""
+"""s: window of the local cubics that differentiate positions: short beside accelerations, long beside counts."""
 PRANDTL = 4e-3
 """rad over which a joint's friction builds up when it turns back: what public logs of arms show."""
 LINK = 0.3
@@ -132,7 +132,7 @@ LINK = 0.3
 AGREE = 0.1
 """Share by which the shrinkage of a simulator's own rollout may differ from the one that was told."""
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""MuJoCo's impedance of friction that is written: at its usual 0.9 a joint that should stick creeps to its place within a
-second; here a thousand times more slowly."""
+"""MuJoCo's impedance of friction that is written: at its usual 0.9 a joint that should stick creeps to its place within
+a second; here a thousand times more slowly."""
 STIFFEST = 2.0
 """Time steps: shortest time constant that MuJoCo lets a constraint have."""

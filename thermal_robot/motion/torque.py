@@ -42,7 +42,7 @@ class TorqueModel(JointModel):
         lengths = [len(m.position.time) for m in log.motions]
         self._motion = np.repeat(np.arange(len(log.motions)), lengths)
         self._time = np.concatenate([m.position.time - m.position.time[0] for m in log.motions])
-        self._measured = np.concatenate([_at(m.position.time, m.torque) for m in log.motions])  # type: ignore[arg-type]
+        self._measured = np.concatenate([_at(m.position.time, m.torque) for m in log.motions])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
         self.parameters = self._parameters()
 
@@ -72,7 +72,16 @@ class TorqueModel(JointModel):
                 found.append(Parameter("masses", SHARED, f"mass of {name}", "", 0.1, 1.0, False, f"mass {4 * k}"))
                 moment = 0.1 * self._masses[k] * settings.LINK
                 found += [
-                    Parameter("masses", SHARED, f"moment of {name} along {axis}", "kg·m", moment, 1.0, False, f"mass {4 * k + i}")
+                    Parameter(
+                        "masses",
+                        SHARED,
+                        f"moment of {name} along {axis}",
+                        "kg·m",
+                        moment,
+                        1.0,
+                        False,
+                        f"mass {4 * k + i}",
+                    )
                     for i, axis in enumerate("xyz", 1)
                 ]
         return tuple(found)
@@ -180,7 +189,7 @@ def _derivatives(time: Array, q: Array) -> tuple[Array, Array, Array]:
     width = max(2 * round(settings.SMOOTHED / step / 2) + 1, 5)
     if len(q) <= width:
         return q, np.gradient(q, time, axis=0), np.zeros_like(q)
-    return tuple(savgol_filter(q, width, 3, deriv=k, delta=step, axis=0) for k in range(3))  # type: ignore[return-value]
+    return tuple(savgol_filter(q, width, 3, deriv=k, delta=step, axis=0) for k in range(3))
 
 
 def _at(time: Array, channel: object) -> Array:

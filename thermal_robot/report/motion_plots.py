@@ -59,7 +59,8 @@ def plot_motions(diagnosis: MotionDiagnosis) -> Figure:
 
 def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> None:
     curves = d.curves[joint]
-    motion = int((curves["measured"] - curves["nominal"]).pow(2).groupby(curves["motion"]).mean().idxmax())
+    square = (curves["measured"] - curves["nominal"]).pow(2).groupby(curves["motion"]).mean()
+    motion = int(square.index[int(np.argmax(square.to_numpy()))])
     one = _window(curves[curves["motion"] == motion])
     unit, torque = d.unit_of(joint), d.unit == "N·m"
     best = units.scale(unit, float(np.abs(one["measured"] - one["nominal"]).max()))
