@@ -12,11 +12,11 @@ import thermal_robot as tr
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import (
     by_share,
+    confounding,
     estimates,
     findings,
     fitted_values,
     random_findings,
-    rivals,
     separates,
     titled,
     told_inside,
@@ -329,7 +329,7 @@ def weighed(known, odds):
     compared = [Combination(blocks, 0.0, 1.0, {}, nothing, nothing, 0.0) for blocks in sets]
     weight = np.array([1.0, *odds.values()])
     said = replace(known, explanation=replace(e, combinations=compared, probabilities=weight / weight.sum()))
-    return rivals(said, {"joint_offset": e.best.blocks[0]})
+    return confounding(said, {"joint_offset": e.best.blocks[0]})
 
 
 @pytest.mark.parametrize(("chance", "told"), [(0.4, True), (0.02, True), (0.005, False), (1e-5, False)])

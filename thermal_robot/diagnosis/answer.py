@@ -1,4 +1,4 @@
-"""The diagnosis that a final fit is: gap, findings, places, shrinkage, corrected model, next measurement."""
+"""Diagnosis of a final fit: gap, findings, places, held-out shrinkage, corrected model, next measurement."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
 
 
 def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple[Fit, Shrinkage, tuple[Discovery, ...]]:
-    """Name the laws of a fit anew wherever they stand: the largest held-out share first, those not lasting last."""
+    """Renumber the laws of a fit: by held-out share, the largest first; laws outside the fit last."""
     held = {effect.name for effect, _ in fit.effects}
     names = [name for name in dict.fromkeys(fit.families) if name.startswith(PREFIX)]
     names.sort(key=lambda name: (name not in held, -shrinkage.shares.get(name, (0.0,))[0]))
@@ -129,7 +129,7 @@ def answer(
     left_out: Sequence[str],
     notes: Sequence[str],
 ) -> Diagnosis:
-    """Put a diagnosis together of the last explanation and its held-out shrinkage.
+    """Build the diagnosis of the last explanation and its held-out shrinkage.
 
     ``asked`` tells whether the user asked for an effect of this name, systematic or random; ``left_out`` are the names
     that were left out; ``notes`` say what was left out of the campaign, one sentence each.
@@ -173,14 +173,14 @@ def answer(
 
 
 def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:
-    """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
+    """Posterior probability of exactly the effects of the fit, the refused ones not at work."""
     exactly = fit.probability_of_just({effect.name for effect, _ in fit.effects})
     exactly = min([exactly, *(1.0 - out.probability for out in refused.values())])
     return exactly if gap.worse is None else min(exactly, settings.DECIDED)
 
 
 def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
-    """Cap the probabilities of what harms rows held out by session or region, and say why."""
+    """Cap the probability of effects that make held-out sessions or regions worse, and give the reason."""
     if gap.worse is None:
         return found, []
     most = settings.DECIDED
@@ -207,7 +207,7 @@ def _gap(fit: Fit, left: Examined, shrinkage: Shrinkage) -> Gap:
 
 
 def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
-    """Model that predicts as a fit does.
+    """Corrected model of a fit.
 
     ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told
     how far predictions may be off.

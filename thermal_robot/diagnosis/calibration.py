@@ -1,4 +1,4 @@
-"""Calibration: effects are named, not selected; their parameters and what they leave are told."""
+"""Calibration: fit of effects that the user names, without model selection."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Calibrated:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """What named effects are in a robot, and what they leave.
+    """Parameters of named effects of a robot, and the residual beside them.
 
     Attributes
     ----------
@@ -101,12 +101,12 @@ class Calibration:
 
     @property
     def unexplained(self) -> bool:
-        """Whether what is left is larger, or more structured, than noise: something else is at work."""
+        """Whether the residual is larger, or more structured, than noise."""
         return self._examined.unexplained.flagged
 
     @cached_property
     def effects(self) -> tuple[Calibrated, ...]:
-        """The effects with their parameters: what is told inside a larger one before the rest of that.
+        """Effects with their parameters; an effect contained in a larger one comes before the rest of that.
 
         Where what is left is :attr:`unexplained`, deviations hold what that may do to parameters, beside the noise.
         """
@@ -156,7 +156,7 @@ def calibrate(
     *,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
-    """Fit named effects and the unknown frames, whether or not the data speak for them; rows far off are set aside.
+    """Fit named effects and the unknown frames without model selection; outlying rows are set aside.
 
     What is at work, and how sure that is, and faults of the table are asked of :func:`~thermal_robot.diagnose`.
 
@@ -235,7 +235,7 @@ _libraries = cache(ThreadpoolController)
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Return the effects that were asked for, each once."""
+    """Effects that were asked for, without duplicates."""
     where, what = "calibrate(), effects", "names of effects, or effects of your own"
     require(where, effects, (str, Effect, list, tuple), what)
     given = (effects,) if isinstance(effects, (str, Effect)) else tuple(effects)

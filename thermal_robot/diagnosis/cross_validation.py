@@ -43,7 +43,7 @@ Share = tuple[float, tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A linear model whose frames and K parameters can be fitted to any rows by ridge regression.
+    """Ridge regression of frames and K parameters on any subset of the rows.
 
     ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
     none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows on which
@@ -61,7 +61,7 @@ class Model:
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
-        """Return the model of an explanation, not judged by outliers; ``further`` blocks with scales come last."""
+        """Model of an explanation without its outliers; ``further`` blocks with their scales come last."""
         e = explanation
         own = {b: e.held(b) / e.linear.blocks[b].sizes for b in e.best.blocks}
         scales: dict[int, Array | float] = {**own, **(further or {})}
@@ -69,7 +69,7 @@ class Model:
         return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
 
     def partial(self, nominal: Linear, values: Sequence[Array] = ()) -> Model:
-        """Return the model for fits of a part of its effects: linearised at the nominal robot, with a block for each.
+        """Model for fits of subsets of the effects: linearised at the nominal robot, a block for each effect.
 
         Each is held to the size of its ``values`` in the whole model. What such a fit leaves counts as noise: a smooth
         discrepancy is small beside it. At the corrected robot frames that are aliases could seem apart, and stretch.
@@ -105,7 +105,7 @@ class Model:
         return np.asarray(self.whitening.weights > 0)
 
     def products(self, rows: Rows) -> Array:
-        """(G, K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
+        """Gram matrices (G, K + 1, K + 1) Xᵀ V⁻¹ X of columns and gap over some rows with covariance V; cached.
 
         G is two where positions and orientations count apart, else one. Where rows have a smooth discrepancy in common,
         V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
@@ -127,7 +127,7 @@ class Model:
         return self._summed(self._used)
 
     def _white(self, rows: NDArray[np.int64]) -> Array:
-        """(r, m, K + 1) columns and gap of some rows, whitened as if independent."""
+        """Whitened columns and gap (r, m, K + 1) of some rows, as if rows were independent."""
         root = np.sqrt(self.whitening.weights[rows])[:, None] / self.whitening.sigma(rows)
         return np.asarray(self.linear.stack[rows] * root[:, :, None])
 
@@ -143,21 +143,21 @@ class Model:
 
     @cached_property
     def whole(self) -> Array:
-        """(G, K + 1, K + 1) the same over all rows."""
+        """Gram matrices (G, K + 1, K + 1) over all rows."""
         return self.products(np.ones(len(self.block), dtype=bool))
 
     def determines(self, rows: Rows) -> bool:
-        """Tell whether some rows determine as much of the frames as all rows do."""
+        """Whether some rows determine the frames with the same rank as all rows do."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
         return bool(some.shape[1] >= every.shape[1])
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
-        """(k + 1,) numbers of the columns of the frames and of some blocks, and of the gap."""
+        """Numbers (k + 1,) of the columns of the frames, of some blocks and of the gap."""
         gap = np.array([self.whole.shape[1] - 1])
         return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), gap])
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> Array:
-        """(S, k + 1) −θ and 1 by ridge regression on each set of rows; what all rows leave is noise to priors."""
+        """Ridge estimates (S, k + 1), −θ and 1, on each subset of rows; the noise is that of all rows."""
         picked = self.columns(chosen)
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
@@ -181,25 +181,25 @@ def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A model fitted without each fold, and what it leaves there; ``tests`` are (N,) the rows that each holds out."""
+    """Leave-one-fold-out fits and their residuals on the fold; ``tests`` are the rows (N,) of each fold."""
 
     model: Model
     tests: tuple[Rows, ...]
 
     @classmethod
     def over(cls, model: Model, tests: Sequence[Rows]) -> Walk:
-        """Cross-validate over folds but those without rows, and those without which frames are not determined."""
+        """Cross-validate over all folds that have rows and whose other rows determine the frames."""
         kept = [t for t in tests if (t & model.kept).any() and (~t).sum() > 1]
         return cls(model, tuple(t for t in kept if model.determines(~t)))
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """(1 + B,) how many rows are held out, one in two folds counted twice: of all, and without each block."""
+        """Numbers (1 + B,) of held-out rows, one in two folds counted twice: of all, and without each block of rows."""
         held = np.sum(self.tests, axis=0) * self.model.kept
         return np.append(held.sum(), held.sum() - np.bincount(self.model.block, held)).astype(np.int64)
 
     def squares(self, chosen: Sequence[int]) -> Array:
-        """(1 + B,) held-out sums of squared distances with some blocks, m²: in all, and repeated without each block."""
+        """Held-out sums of squares (1 + B,), m², of a model with some blocks: of all rows, and without each block."""
         model, picked, own = self.model, self.model.columns(chosen), each(self.model.block)
         every = np.ones(len(model.block), dtype=bool)
         fits = model.fits([*(~rows for rows in (*self.tests, *own)), every], chosen)
@@ -216,25 +216,25 @@ class Walk:
         return total
 
     def residuals(self, chosen: Sequence[int]) -> Array:
-        """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
+        """Held-out residuals (H, m) of a model with some of the blocks, fold after fold, m and rad."""
         picked, stack = self.model.columns(chosen), self.model.linear.stack
         fits = self.model.fits([~test for test in self.tests], chosen)
         return np.concatenate([stack[test][:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
 
     @property
     def numbers(self) -> NDArray[np.int64]:
-        """(H,) the number of each row held out, fold after fold, outliers too."""
+        """Row numbers (H,) of the held-out residuals, fold after fold, outliers included."""
         return np.concatenate([np.flatnonzero(test) for test in self.tests])
 
 
 def jackknife(values: Array) -> Array:
-    """(K, K) covariance of K figures, or variance of one, from their (G, K) or (G,) values without each group."""
+    """Jackknife covariance (K, K) of K figures, or variance of one, from (G, K) or (G,) leave-one-group-out values."""
     apart = values - values.mean(axis=0)
     return np.asarray((len(values) - 1) / len(values) * (apart.T @ apart))
 
 
 def share(part: Array, whole: Array) -> Share:
-    """Return what part one sum of squares (1 + B,) is of another, 0 of nothing, with a 95 % interval.
+    """Ratio of two sums of squares (1 + B,), 0 where the second is 0, with its 95 % jackknife interval.
 
     The interval is that of Student's law about ln(1 − part/whole), with the jackknife's variance: one minus a share is
     a ratio of mean squares, so that its logarithm is nearly normal. It is not exact for a handful of blocks.
@@ -252,7 +252,7 @@ def share(part: Array, whole: Array) -> Share:
 
 
 def _half(values: Array) -> float:
-    """Half the width of a 95 % interval of a figure from its (B,) values without each block.
+    """Half width of the 95 % jackknife interval of a figure from its (B,) leave-one-block-out values.
 
     Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance told by B values of kurtosis κ has
     2 B/(κ − 1). A normal law's are about B; where a block or two make up most of the variance, few.
@@ -268,7 +268,7 @@ def _half(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Shrinkage:
-    """Held-out shrinkage of the gap, overall and per effect; all with the noise of the held-out rows in it.
+    """Held-out shrinkage of the gap, overall and per effect; the noise of the held-out rows is included.
 
     ``overall``: rms before and after. ``before`` and ``after`` (N,): distance of each row while it was held out, m, NaN
     where set aside. ``shares`` of the gap's mean square, with 95 % intervals: for an effect of the fit the Shapley
@@ -284,7 +284,7 @@ class Shrinkage:
 
 
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
-    """Cross-validate in blocks of consecutive measurements, one block held out at a time.
+    """Leave-one-block-out cross-validation, blocks being consecutive measurements.
 
     Frames and parameters come from the training rows alone. What was chosen stays that of all rows: effects, laws,
     constants, prior scales, the point of linearisation, noise, and outliers. Choosing anew in each fold is further off
@@ -342,7 +342,7 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
 
 
 def _beside(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
-    """Return of each effect outside the model the setting that the evidence likes best beside it, and its scale."""
+    """Most probable setting beside the model, and its scale, of each effect outside the model."""
     best = explanation.best.blocks
     found: dict[int, float] = {}
     for rival in sorted(explanation.combinations, key=lambda c: -c.log_evidence):
@@ -365,7 +365,7 @@ def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
-    """Cross-validate by time, session, temperature, region, reach and range; the largest rms after comes first.
+    """Cross-validate by time, session, temperature, region, reach and range; sorted by rms, the largest first.
 
     Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. A scheme is left out if
     the campaign lacks its column; a fold if its training rows do not determine the frames.
@@ -393,7 +393,7 @@ def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> F
 
 
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
-    """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
+    """Models of the frames alone and of a fit, with the fitted events subtracted from the gap.
 
     Other rows do not tell what stood elsewhere in a whole session or region: it must be known, as by registering anew.
     """
@@ -410,12 +410,12 @@ def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
 
 
 def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
-    """Return the least favourable scheme where it leaves clearly more than the average; ``None`` where it does not."""
+    """Scheme with the largest held-out rms where that clearly exceeds the average; else ``None``."""
     return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
 
 
 def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
-    """Return the scheme, by session or region, that the correction harms; ``None`` where there is none."""
+    """Scheme, by session or region, in which the correction increases the held-out rms; else ``None``."""
     return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 

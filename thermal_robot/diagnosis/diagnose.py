@@ -1,4 +1,4 @@
-"""One verb: a campaign goes in, a diagnosis comes out."""
+"""The diagnosis of a campaign."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def diagnose(
 
 @contextmanager
 def solvable(campaign: Campaign) -> Iterator[None]:
-    """Say in a sentence that equations have no solution in floating point: figures of very different sizes."""
+    """Turn a failure of linear algebra into an :class:`EstimationError` about values of very different sizes."""
     try:
         yield
     except np.linalg.LinAlgError as error:
@@ -140,7 +140,7 @@ def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
 def _concluded(
     campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
+    """Explain the gap, unless robot and table do not match: data faults are tested before faults of the robot."""
     misfit = unfit(campaign, progress)
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
@@ -154,7 +154,7 @@ def _concluded(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Let terms that nobody listed join the known effects, prune by one rule, then ask what is random."""
+    """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
     fit = known
     for number in range(1, settings.SELECTIONS):
         wider = grown(fit, number, progress)
@@ -172,7 +172,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:
-    """Refuse a campaign that states the size of an effect that nobody knows, and say what was probably meant."""
+    """Refuse a campaign that states the prior size of an unknown effect, and suggest the name that was meant."""
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))

@@ -316,12 +316,12 @@ def evidence(
     columns = Columns(gram.matrix[used[:, None], used], gram.vector[used], owner, gram.positive[used])
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
-    variance, alike = max(variance, settings.LEAST_VARIANCE), Alike.of(gram.spreads[list(blocks)])
+    variance, law = max(variance, settings.LEAST_VARIANCE), ScalePrior.of(gram.spreads[list(blocks)])
     known = prior + gram.offset
     most = np.full(len(scale), np.inf) if gram.most is None else gram.most[list(blocks)]
-    peak = _most_probable(gram, columns, np.minimum(scale, most), alike, most, variance, floor - known, settled)
+    peak = _most_probable(gram, columns, np.minimum(scale, most), law, most, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
-    log_evidence = known + _log_joint(gram, columns, found, scale, alike, variance) + _log_volume(peak.bend, alike)
+    log_evidence = known + _log_joint(gram, columns, found, scale, law, variance) + _log_volume(peak.bend, law)
     log_evidence += peak.promised or 0.0
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
@@ -333,14 +333,14 @@ def evidence(
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
+class ScalePrior:
     """Prior N(0, C) of B logarithms of scales that share the factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
 
     tight: Array
     root: Array
 
     @classmethod
-    def of(cls, spread: Array) -> Alike:
+    def of(cls, spread: Array) -> ScalePrior:
         """Return it for scales that have the standard deviations ``spread`` (B,) about κ."""
         covariance = np.diag(spread**2) + settings.COARSENESS**2
         return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
@@ -370,7 +370,7 @@ def _most_probable(
     gram: Gram,
     columns: Columns,
     scale: Array,
-    alike: Alike,
+    law: ScalePrior,
     most: Array,
     variance: float,
     floor: float,
@@ -381,8 +381,8 @@ def _most_probable(
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        bend = found.bend(columns.owner, scale, alike.tight)
-        step, gain = found.step(bend, scale, alike.tight)
+        bend = found.bend(columns.owner, scale, law.tight)
+        step, gain = found.step(bend, scale, law.tight)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, np.minimum(reach * step, np.log(most / scale))
@@ -393,26 +393,26 @@ def _most_probable(
             break
         if np.isfinite(floor):
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
-            reached = _log_joint(gram, columns, found, scale, alike, variance)
+            reached = _log_joint(gram, columns, found, scale, law, variance)
             if reached + settings.CLEARLY * gain < floor:
                 return _Peak(found, bend, scale, variance, gain)
         variance, scale = target, scale * np.exp(step)
     return _Peak(found, bend, scale, variance)
 
 
-def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, alike: Alike, variance: float) -> float:
+def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, law: ScalePrior, variance: float) -> float:
     """Return log p(y, s, λ) of one combination, up to what is common to all."""
     held = gram.noise_dof
     quadratic = gram.total - columns.vector @ found.values
     fit = -0.5 * ((gram.equations + held) * np.log(variance) + (held + quadratic) / variance)
     log = np.log(scale)
-    return float(fit + found.log_volume - 0.5 * log @ alike.tight @ log)
+    return float(fit + found.log_volume - 0.5 * log @ law.tight @ log)
 
 
-def _log_volume(bend: Array, alike: Alike) -> float:
+def _log_volume(bend: Array, law: ScalePrior) -> float:
     """Return −½ log|Rᵀ H R|, C = R Rᵀ: the volume of the peak over all ln λ against that of their prior N(0, C).
 
     H leaves out that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
     """
-    peak = np.linalg.eigvalsh(alike.root.T @ bend @ alike.root)
+    peak = np.linalg.eigvalsh(law.root.T @ bend @ law.root)
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

@@ -154,14 +154,14 @@ def _projected(gap: Array, design: Array, root: Array) -> Target:
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
+class LawStack:
     """C laws of K functions each (C, N, K) with their products (C, N, K, K), computed once for all targets."""
 
     laws: int
     stacks: tuple[tuple[list[int], Array, Array], ...]
 
     @classmethod
-    def of(cls, laws: Sequence[Array]) -> Alike:
+    def of(cls, laws: Sequence[Array]) -> LawStack:
         """Put together laws, each with its (N, K) functions."""
         stacks = []
         for width in {law.shape[1] for law in laws}:
@@ -187,9 +187,9 @@ class Seat:
     total: float
     freedom: int
 
-    def gains(self, laws: Sequence[Array] | Alike) -> Array:
+    def gains(self, laws: Sequence[Array] | LawStack) -> Array:
         """Return the log evidence that laws gain (:attr:`Worth.gain`), each with its (N, K) functions."""
-        alike = laws if isinstance(laws, Alike) else Alike.of(laws)
+        alike = laws if isinstance(laws, LawStack) else LawStack.of(laws)
         found = np.full(alike.laws, -np.inf)
         for which, functions, products in alike.stacks:
             found[which] = self._alike(functions, products)
@@ -680,7 +680,7 @@ class Seats:
         for i, law in enumerate(candidates):
             together.setdefault(self.seen_from(law), []).append(i)
         for seats, which in together.items():
-            functions = Alike.of([self.functions(candidates[i]) for i in which])
+            functions = LawStack.of([self.functions(candidates[i]) for i in which])
             for t, seat in enumerate(seats):
                 found[t, which] = seat.gains(functions)
         return found

@@ -9,7 +9,16 @@ from updating_cases import ALL, OLD, far, in_full, measured
 import thermal_robot as tr
 from thermal_robot.diagnosis import sequential
 from thermal_robot.diagnosis import settings as diagnosis_settings
-from thermal_robot.diagnosis.sequential import Judge, Point, Rows, Sequential, linearised, products, settled, split
+from thermal_robot.diagnosis.sequential import (
+    Judge,
+    Point,
+    Sequential,
+    WeightedRows,
+    linearised,
+    products,
+    settled,
+    split,
+)
 from thermal_robot.diagnosis.updated import fixed_point
 from thermal_robot.inference.columns import unknown_frames
 from thermal_robot.inference.registration import moved
@@ -84,7 +93,7 @@ def with_held_weights(found):
     """The diagnosis as if it had found more than noise: rows keep their weights."""
     e, start = found.fit.explanation, fixed_point(found.fit)
     judge = Judge(start.fitted.point, e.whitening.noise * e.best.noise, found.samples)
-    rows = Rows(found.fit.campaign, e.whitening.weights, e.outliers)
+    rows = WeightedRows(found.fit.campaign, e.whitening.weights, e.outliers)
     return Sequential.of(replace(start.choice, judge=judge), (rows,), start.fitted)
 
 
@@ -93,10 +102,10 @@ def test_where_weights_are_held_batches_do_not_matter_either(found, whole, few, 
     start = with_held_weights(found)
     assert start.sums.counts[0] > 300
     for part in np.array_split(np.arange(OLD, ALL), batches):
-        start = start.plus(Rows.weighed(start.choice, whole.take(part)))
+        start = start.plus(WeightedRows.weighed(start.choice, whole.take(part)))
     monkeypatch.setattr(diagnosis_settings, "KEPT", 10_000)
     once = with_held_weights(found)
-    once = once.plus(Rows.weighed(once.choice, whole.take(np.arange(OLD, ALL)))).fitted
+    once = once.plus(WeightedRows.weighed(once.choice, whole.take(np.arange(OLD, ALL)))).fitted
     assert far(start.fitted, once) < 5.0 * PROMISED
     assert start.fitted.noise == pytest.approx(once.noise, rel=PROMISED)
     assert start.fitted.count == once.count

@@ -11,8 +11,8 @@ from thermal_robot.diagnosis.sequential import (
     Guard,
     Judge,
     Point,
-    Rows,
     Sums,
+    WeightedRows,
     bend,
     carried,
     linearised,
@@ -73,7 +73,7 @@ def test_sums_add_up(rows):
     weights[aside] = 0.0
 
     def some(part):
-        return Sums.of(rows[part], Rows(SimpleNamespace(relative_noise=None), weights[part], aside[part]))
+        return Sums.of(rows[part], WeightedRows(SimpleNamespace(relative_noise=None), weights[part], aside[part]))
 
     one, two = some(slice(None)), some(slice(100)).plus(some(slice(100, None)))
     assert np.allclose(one.products, two.products)
@@ -127,7 +127,7 @@ def test_values_fall_to_their_effects(found, grown):
 
 
 def test_some_rows_of_several_batches(whole):
-    both = Rows.joined(in_full(whole.take(np.arange(10))), in_full(whole.take(np.arange(10, 30))))
+    both = WeightedRows.joined(in_full(whole.take(np.arange(10))), in_full(whole.take(np.arange(10, 30))))
     assert (both.take(np.array([3, 25])).campaign.rows == whole.rows[[3, 25]]).all()
     assert len(both.weights) == len(both.aside) == 30
 
@@ -135,7 +135,7 @@ def test_some_rows_of_several_batches(whole):
 def test_by_the_diagnosis_rows_get_the_weight_of_their_distance(grown):
     rows = measured(200, seed=3, gross=0.1)
     judge = Judge(grown.fitted.point, np.full(3, 2e-5), 300)
-    single = Rows.weighed(replace(grown.choice, judge=judge), rows)
+    single = WeightedRows.weighed(replace(grown.choice, judge=judge), rows)
     assert 10 < single.aside.sum() < 30
     assert (single.weights[single.aside] == 0.0).all()
     assert (single.weights[~single.aside] > 0.5).all()

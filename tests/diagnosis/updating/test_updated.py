@@ -8,7 +8,7 @@ import pytest
 from updating_cases import ALL, EFFECTS, OLD, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, log_odds, rivals
+from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, log_odds, runners_up
 from thermal_robot.errors import CampaignError, EstimationError
 
 
@@ -214,8 +214,8 @@ def test_prior_odds_count(found, grown):
     assert log_odds(grown, likelier)[0] - log_odds(grown, listed)[0] == pytest.approx(2.0)
 
 
-def test_rivals_are_other_combinations_the_most_probable_first(found):
-    e, listed = found.fit.explanation, rivals(found.fit)
+def test_runners_up_are_other_combinations_the_most_probable_first(found):
+    e, listed = found.fit.explanation, runners_up(found.fit)
     chance = {}
     for combination, probability in zip(e.combinations, e.probabilities, strict=True):
         chance[combination.blocks] = max(chance.get(combination.blocks, 0.0), probability)
