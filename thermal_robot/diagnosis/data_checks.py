@@ -230,7 +230,7 @@ def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDA
 
 
 def _votes(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
-    """z scores, by quantity, of the parameters whose sign that quantity decides."""
+    """Z scores, by quantity, of the parameters whose sign that quantity decides."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():
         deviation = np.sqrt(np.maximum(np.diag(covariance), settings.TINY))

@@ -99,7 +99,7 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
 
 
 def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
-    """Finding of every random effect; its shrinkage is 0, since a correction predicts a mean.
+    """Return the finding of every random effect; its shrinkage is 0, since a correction predicts a mean.
 
     Scatter between poses (encoder steps) and scatter between visits (repeatability) are told apart by repeated poses.
     Without repeats, scatter between visits is not testable, and scatter between poses is confounded with it unless the
@@ -185,7 +185,7 @@ def findings(
     laws: Mapping[str, float],
     refused: Mapping[str, Refused],
 ) -> tuple[Finding, ...]:
-    """Findings of all candidates, untestable ones last.
+    """Return the findings of all candidates, untestable ones last.
 
     ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability that what a
     discovered law follows, where, is right.
@@ -242,7 +242,7 @@ def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Findings with their titles: that of the effect, or the name of a discovered law."""
+    """Return the findings with their titles: that of the effect, or the name of a discovered law."""
     known = {effect.name: effect for effect in effects}
     return tuple(
         replace(f, title=known[f.name].title, random=known[f.name].random)
@@ -260,7 +260,7 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """Groups of effects that the data cannot separate; one with an unknown frame only if it is the only group."""
+    """List groups of effects that the data cannot separate; one with an unknown frame only if it is the only one."""
     confounded = [tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded"]
     groups = tuple(dict.fromkeys(confounded))
     return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

@@ -128,7 +128,7 @@ class NextSamples:
         ]
 
     def to_table(self) -> pd.DataFrame:
-        """Data frame in the campaign's units with its file's columns, ``separates`` and ``gain``."""
+        """Return the data frame in the campaign's units with its file's columns, ``separates`` and ``gain``."""
         import pandas as pd
 
         robot, units = self.commands.robot, self.commands.units

@@ -283,7 +283,7 @@ class Diagnosis:
         return bool(self.left_out)
 
     def finding(self, effect: str) -> Finding:
-        """Finding of one effect.
+        """Return the finding of one effect.
 
         Raises
         ------

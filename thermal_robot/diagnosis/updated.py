@@ -275,7 +275,7 @@ def fixed_point(fit: Fit) -> Sequential:
 
 
 def watch(fit: Fit) -> Watch:
-    """Reference for tests of new rows, from a diagnosis."""
+    """Return the reference for tests of new rows, from a diagnosis."""
     e, kept = fit.explanation, ~fit.explanation.outliers
     left = (fit.corrected.gap / (e.whitening.sigma() * e.best.noise))[kept]
     first = [own[0] for own in fit.variants.values() if own]
@@ -315,7 +315,7 @@ _BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = W
 
 
 def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
-    """Initial state of updates to a diagnosis; passes over its rows once.
+    """Return the initial state of updates to a diagnosis; passes over its rows once.
 
     Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
     """
@@ -398,7 +398,7 @@ class Updated:
         return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.estimate.aside].tolist()))
 
     def _compared(self, estimate: Sequential, new: WeightedRows) -> Updated:
-        """Result for all rows, with the tests of the new ones."""
+        """Return the result for all rows, with the tests of the new ones."""
         agreement, rival, lead = self.watch.look(self.estimate, new, self.agreement), self.rival, self.lead
         if self.runners:
             gains = log_odds(estimate, self.runners)

@@ -1,4 +1,4 @@
-"""The contract of an effect: where error enters the chain, and the quantity it grows with.
+"""Contract of an effect: where error enters the chain, and the quantity that it grows with.
 
 An effect is a frozen dataclass. It names its parameters and gives the *unit response* of each: what one unit does in
 the channels, read from the observations. It calls no kinematics, fits nothing and holds no fitted value. Arguments of
@@ -53,7 +53,7 @@ TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Unit response: what one unit of a parameter does in one place of one channel.
+    """Unit response: displacement of one place of one channel per unit of a parameter.
 
     Attributes
     ----------
@@ -170,13 +170,13 @@ class Parameter:
 
     @cached_property
     def bare(self) -> Parameter:
-        """The parameter without its responses, which may be large."""
+        """Copy without the responses, which may be large."""
         return replace(self, responses=())
 
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """Base of all effects; the module's docstring shows how to write one.
+    """Base class of effects; the module's docstring shows how to write one.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ class Effect(ABC):
     """Whether its own part is told where a larger effect that contains it was found: what somebody could set anew."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Give a class with a name of its own, but no title, one; the same for its singular."""
+        """Derive title and singular from the class name where a class gives none."""
         super().__init_subclass__(**options)
         if "name" in vars(cls) and "title" not in vars(cls):
             cls.title = str(cls.name).replace("_", " ")
@@ -234,10 +234,10 @@ class Effect(ABC):
 
     @abstractmethod
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the parameters with their unit responses, for the observations' rows."""
+        """Parameters with their unit responses, for the observations' rows."""
 
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return fewer parameters that do the same, in the order in which they are told; empty where all are told.
+        """Equivalent smaller set of parameters, in the order of reporting; empty where all are reported.
 
         Each is a combination of :meth:`parameters`. Beside those of the effects inside (:attr:`told_inside`), which
         come first, they are no more than needed, but for what the data do not see.
@@ -245,12 +245,12 @@ class Effect(ABC):
         return ()
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what the campaign lacks for this effect to be testable; empty when it can be tested."""
+        """Columns that the campaign lacks for this effect to be testable; empty when it can be tested."""
         return tuple(need for need in self.needs if not observations.varies(need))
 
     @property
     def share(self) -> float | None:
-        """Share of the prior probability of its name; ``None`` where it goes by places and weight.
+        """Share of the prior probability of its name; ``None`` where places and ``weight`` decide it.
 
         Settings of an effect that states its share are not looked for in single places.
         """
@@ -258,20 +258,20 @@ class Effect(ABC):
 
     @property
     def weight(self) -> float:
-        """Prior weight beside other settings of the same places."""
+        """Prior weight against other settings of the same places."""
         return 1.0
 
     @property
     def apart(self) -> int:
-        """Number of constants that stand apart from a common one: each has its price."""
+        """Number of constants that differ from a common one; each costs prior probability."""
         return 0
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the covariates that its responses were read from: whoever predicts must know them, too."""
+        """Covariates on which its responses depend, and which a prediction needs."""
         return tuple(need for need in self.needs if need in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the settings of the nonlinear arguments that inference should compare: the coarse grid.
+        """Return the settings of the nonlinear arguments that inference compares: the coarse grid.
 
         What a setting takes from the campaign (an origin of time, a record) is fixed here, once, so that a saved model
         predicts other samples with it.
@@ -279,14 +279,14 @@ class Effect(ABC):
         return (self,)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return settings near this one, itself among them: the constants that may be refined, and no others.
+        """Return the settings near this one, itself among them, for the refinement of constants.
 
         Estimation moves to the best of them, with factors (above 1) that become smaller.
         """
         return (self,)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return what drives the effect at one place, to draw it against.
+        """Quantity that drives the effect at one place, for plots.
 
         Parameters
         ----------
@@ -305,18 +305,18 @@ class Effect(ABC):
         return None
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return the effect as a model holds it that predicts other rows; it does the same in these."""
+        """Equivalent effect for prediction at other rows."""
         return self
 
     def elsewhere(self, observations: Observations) -> Effect:
-        """Return the effect as it is in another campaign of the robot, with that one's record in place of its own."""
+        """Effect in another campaign of the robot, with that campaign's record."""
         return self
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor's arguments, for saving; ``places`` and ``excluded`` only where they are set."""
+        """Return the constructor arguments for saving; ``places`` and ``excluded`` only where they are set."""
         return {name: value for name, value in asdict(self).items() if name not in ("places", "excluded") or value}
 
 
 def in_words(kind: str, place: str) -> str:
-    """Name a place with its kind, as a link and a joint may share a name; ``elbow_joint`` says it already."""
+    """Name of a place with its kind, unless the name says it."""
     return (place or kind) if not place or kind in place else f"{kind} {place}"

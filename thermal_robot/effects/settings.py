@@ -1,4 +1,4 @@
-"""Every number that was chosen in the effects: its value, its unit, and why that one."""
+"""Chosen numbers of the effects, each with its unit and reason."""
 
 from thermal_robot.campaign.settings import STILL
 

@@ -1,4 +1,4 @@
-"""From effects to columns: the derivative of the gap by each parameter, and by the unknown frames."""
+"""Design matrix: derivatives of the gap by the parameters of effects, and by the unknown frames."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """(N, m, P) derivative of the gap by each parameter, root frame axes; zero where it is but rounding."""
+        """Derivative (N, m, P) of the gap by each parameter, root frame axes; rounding errors are set to 0."""
         if not isinstance(self.source, Observations):
             return self.source
         found = moved_by(self.source, self.parameters)
@@ -47,26 +47,26 @@ class Block:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its P parameters, with their responses unless it holds its columns themselves."""
+        """The P parameters, with their responses unless the block stores its columns."""
         return checked(self.effect, self.source) if isinstance(self.source, Observations) else self.bare
 
     @property
     def positive(self) -> NDArray[np.bool_]:
-        """(P,) which parameters cannot be negative."""
+        """Mask (P,) of the parameters that cannot be negative."""
         return np.array([p.positive for p in self.bare] or [False] * len(self.sizes), dtype=bool)
 
     @property
     def held(self) -> Block:
-        """The block with its columns, for who asks for them again and again."""
+        """Copy of the block with its columns in memory."""
         return replace(self, source=self.columns)
 
     def kept(self, values: Array) -> Array:
-        """(P,) share of each parameter's size to which it is held: next to none where it is zero and kept from less."""
+        """Prior shrinkage factors (P,): next to 0 for parameters that an inequality holds at zero, else 1."""
         return np.where(self.positive & (values <= 0.0), settings.LEAST_HELD, 1.0)
 
 
 def block(observations: Observations, effect: Effect) -> Block:
-    """Columns of an effect at the observations' place; :class:`EffectError` where it breaks the contract."""
+    """Block of an effect at the linearisation point of observations; :class:`EffectError` on a breach of contract."""
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])
@@ -78,7 +78,7 @@ def block(observations: Observations, effect: Effect) -> Block:
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:
-    """(N, m, P) derivative of the gap by each of P parameters, root frame axes."""
+    """Return the derivative (N, m, P) of the gap by each of P parameters, root frame axes."""
     campaign = observations.campaign
     measures = 6 if campaign.measures == "pose" else 3
     columns = np.zeros((campaign.samples, measures, len(parameters)))
@@ -89,7 +89,7 @@ def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Arr
 
 
 def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
-    """(N, m, f) derivative of the gap by the unknown frames, and what each column is.
+    """Return the derivative (N, m, f) of the gap by the unknown frames, and the name of each column.
 
     Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
     measured. Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
@@ -107,7 +107,7 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
 
 
 def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
-    """Return to which frame, ``base`` or ``tool``, each of the columns of the unknown frames belongs."""
+    """Frame, ``base`` or ``tool``, of each column of the unknown frames."""
     base = 0 if campaign.base_known else 6
     fixed = campaign.tool_known or campaign.simulated_position is not None
     return ("base",) * base + ("tool",) * (0 if fixed else 6 if campaign.measures == "pose" else 3)

@@ -1,4 +1,4 @@
-"""Every number that was chosen in the inference and for findings: its value, its unit, and why that one.
+"""Chosen numbers of inference and findings, each with its unit and reason.
 
 What is known of one effect stands in that effect's file.
 """

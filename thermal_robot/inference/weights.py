@@ -1,4 +1,4 @@
-"""Robust noise and weights: one sigma of a residual by its median, gross errors, Huber's weights."""
+"""Robust estimation: noise from the median of a residual, outliers, Huber weights."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from thermal_robot.inference.problem import Linear, Whitening
 
 @dataclass(frozen=True)
 class Noise:
-    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given.
+    """Standard deviation per axis of the instrument, m and rad; ``None`` where it is not stated.
 
     ``relative`` (N, m) is that of each figure of a row over it; ``None`` where all rows are alike.
     """
@@ -27,11 +27,11 @@ class Noise:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Noise:
-        """Return what a campaign states."""
+        """Noise that a campaign states."""
         return cls(campaign.noise_position, campaign.noise_orientation, campaign.relative_noise)
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
-        """Return the noise of positions, and with six components that of orientations; none is less than rounding."""
+        """Noise of positions, and with six components of orientations; at least rounding."""
         stated = (self.position, self.orientation)[: measures // 3]
         return tuple(None if sigma is None else max(sigma, settings.ROUNDING) for sigma in stated)
 
@@ -42,7 +42,7 @@ def distance_limit(measures: int, rows: int) -> float:
 
 
 def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None = None) -> Array:
-    """One sigma per axis of positions and of orientations, from the median squared length of a residual.
+    """Robust standard deviation per axis, of positions and of orientations, from the median squared residual.
 
     The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
     of the figures differs, ``relative`` (N, m) says how.
@@ -54,7 +54,7 @@ def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None
 
 
 def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Noise of each component, as stated or else as measured of the residual; degrees of freedom of its prior."""
+    """Noise of each component, stated or else estimated from the residual, and the degrees of freedom of its prior."""
     stated = noise.parts(measures)
     sigma = np.array([m if g is None else g for g, m in zip(stated, measured, strict=True)])
     return np.repeat(sigma, 3), 0.0 if None in stated else settings.GIVEN_NOISE_DOF
@@ -70,7 +70,7 @@ def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whi
 def reweigh(
     remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
 ) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Huber's weights at the residual's noise, and (N,) the rows set aside as gross errors, at most a quarter.
+    """Huber weights at the residual's noise, and outliers (N,), at most a quarter of the rows.
 
     ``leverage`` is the share of the equations that was fitted.
     """
@@ -86,7 +86,7 @@ def reweigh(
 def judged(
     remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
 ) -> tuple[Array, float, Array]:
-    """Noise and degrees of freedom as :func:`settled_noise`, and (N,) squared distances of rows in its units.
+    """Noise and degrees of freedom as :func:`settled_noise`, and squared distances (N,) of rows in its units.
 
     ``remainder`` (N, m) is that of rows alike; what a median says of its noise is ``measured``, one sigma a part.
     """
@@ -96,11 +96,11 @@ def judged(
 
 
 def far_scale(measured: Array, sigma: Array) -> Array:
-    """(m,) one sigma by which distances count: where more is left than noise, a row is far only if far from others."""
+    """Scale (m,) of outlier distances: the noise, or the residual's median where that is larger."""
     return np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
 
 
 def tail_weight(distance2: Array, measures: int) -> Array:
-    """Huber's weight (1964) of rows at a squared distance in units of the noise: less in the tail."""
+    """Huber weight (1964) of rows at a squared distance in units of the noise."""
     bend = float(chdtri(measures, settings.BEND_LEVEL))
     return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))

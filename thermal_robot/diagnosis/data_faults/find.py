@@ -124,7 +124,7 @@ class Struck:
         return bool(self.count * np.log(fall) < np.log(asked / LEVEL))
 
     def mended(self, fault: Fault) -> Readings:
-        """Readings after the repairs of a fault, one after the other, in these rows."""
+        """Return the readings after the repairs of a fault, one after the other, in these rows."""
         readings = self.readings
         for proposal in fault:
             readings = proposal.repair(readings, self.rows)
@@ -367,7 +367,7 @@ def _extends(readings: Readings) -> bool:
 
 
 def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> DataFault | None:
-    """Data fault whose repair makes robot and table match; ``None`` where they match, or no repair does.
+    """Return the data fault whose repair makes robot and table match; ``None`` where they match, or no repair does.
 
     ``progress`` is called with a few words where candidates are tried.
     """

@@ -337,7 +337,7 @@ def _left(readings: Readings) -> float:
 
 
 def _lengthened(readings: Readings) -> tuple[float, Robot]:
-    """Common length factor that fits best, and the robot with its links scaled by it."""
+    """Return the common length factor that fits best, and the robot with its links scaled by it."""
     robot = readings.robot
     measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
     first = np.log(max(measured, settings.LEAST_GAP) / readings.spread)
