@@ -1,4 +1,4 @@
-"""A campaign: what was commanded, what was measured, and the conditions, in SI units and without gaps."""
+"""A campaign: commands, measurements and conditions, in SI units and without gaps."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ TextArray: TypeAlias = NDArray[np.str_]
 
 
 def _instance(kind: Any, expected: str) -> Kind:
-    """Take an object of a type."""
+    """Require an object of a type."""
 
     def take(value: Any, path: str) -> Any:
         if not isinstance(value, kind):
@@ -47,7 +47,7 @@ def _instance(kind: Any, expected: str) -> Kind:
 
 
 def _sigma(value: Any, path: str) -> float | None:
-    """Take a standard deviation; 0 says the same as ``None``, that none is given."""
+    """Return the standard deviation as given; 0 counts as ``None``, not stated."""
     if value is None or (isinstance(value, (int, float, np.number)) and value == 0):
         return None
     return float(number(least=SMALLEST, expected="a number above 0, or None")(value, path))
@@ -215,7 +215,7 @@ class Campaign:
         self._set(key, checked_array(f"<{self.name}>", key, getattr(self, key), shape, kind))
 
     def _weigh_rows(self, file: str, samples: int) -> None:
-        """Take targets and the noise of each row; where none is given for all, it is their root mean square."""
+        """Set targets and the noise of each row; without one for all, that is their root mean square."""
         if self.targets is not None and len(self.targets.points) != samples:
             raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
         if self.noise_of_rows is None:
@@ -242,7 +242,7 @@ class Campaign:
         return description.html(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
+        """Table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
 
         Returns
         -------
@@ -271,27 +271,27 @@ class Campaign:
 
     @property
     def measures(self) -> str:
-        """``"pose"`` where orientations were measured, otherwise ``"position"``."""
+        """Kind of measurement: ``"pose"`` with orientations, otherwise ``"position"``."""
         return "position" if self.orientation is None else "pose"
 
     @property
     def reach(self) -> float:
-        """Diagonal of the volume that was measured, m."""
+        """Diagonal of the measured volume, m."""
         return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
 
     @cached_property
     def relative_noise(self) -> Array | None:
-        """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
+        """Relative noise (N, m) of each component to that of all rows; see ``campaign.targets.relative_sigmas``."""
         return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
 
     @property
     def clock(self) -> Array | None:
-        """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
+        """Clock (N,): ``time`` in s, or ``order`` where there is no time; ``None`` without either."""
         return clock_of(self.covariates)
 
     @cached_property
     def pose_labels(self) -> TextArray | None:
-        """(N,) which commanded pose a row repeats, ``""`` where it has no label; ``None`` where no row is labelled.
+        """Label (N,) of the commanded pose that a row repeats, ``""`` without one; ``None`` where no row has one.
 
         Labels of poses count within their path: point 3 of one path is not that of another.
         """
@@ -303,7 +303,7 @@ class Campaign:
 
     @cached_property
     def since_turn(self) -> Mapping[str, Array]:
-        """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
+        """Signed distance (N,) from each joint's last turning point, rad or m; empty where rows have no order.
 
         It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
         :func:`~thermal_robot.campaign.turning.since_turns`.
@@ -314,14 +314,14 @@ class Campaign:
 
     @property
     def settings(self) -> Settings:
-        """What is not in the table; the chain's root and gravity as the robot has them."""
+        """Settings that are not in the table; root frame and gravity are the robot's."""
         own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
         return Settings(**{**own, "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
-        """Return the campaign of some of the rows, without validating again.
+        """Subset of the rows, without a new validation.
 
         Parameters
         ----------
@@ -355,7 +355,7 @@ class Campaign:
         return replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:
-        """Return the campaign as if the table had no such column (a covariate or a label).
+        """Copy without a covariate or label column.
 
         Raises
         ------
@@ -379,14 +379,14 @@ class Campaign:
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Freeze an array that nobody else holds, so that the constructor need not copy it."""
+    """Freeze an array, so that the constructor need not copy it."""
     if array.base is None:
         array.flags.writeable = False
     return array
 
 
 def table_columns(campaign: Campaign) -> dict[str, Array]:
-    """Return the numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
+    """Numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
     robot, units, several = campaign.robot, campaign.units, campaign.targets
     scales = [units.joint_scale(kind) for kind in robot.joint_types]
     columns: dict[str, Array] = dict(zip(robot.joint_names, (campaign.q / scales).T, strict=True))
@@ -431,7 +431,7 @@ GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:
-    """Return a campaign that reads a quantity with the other sign.
+    """Copy of a campaign with the sign of one quantity reversed.
 
     Parameters
     ----------
@@ -460,14 +460,14 @@ def turned_round(campaign: Campaign, quantity: str) -> Campaign:
 
 
 def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campaign:
-    """Return a campaign of a robot that reads the same quantities with the other sign as another one does."""
+    """Copy of a campaign with the same sign reversals as another one."""
     for quantity in {*campaign.turned} ^ {*turned}:
         campaign = turned_round(campaign, quantity)
     return campaign if (campaign.robot.gravity == robot.gravity).all() else replace(campaign, robot=robot)
 
 
 def appended(campaigns: Sequence[Campaign]) -> Campaign:
-    """Return the rows of several campaigns of one robot as one campaign, with the declarations of the first.
+    """Concatenate campaigns of one robot, with the declarations of the first.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A campaign in words: what `thermal-robot check` prints, and what a notebook shows."""
+"""Description of a campaign in words: what `thermal-robot check` and notebooks print."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_SESSIONS = 8  # Sessions named in one line; more would not fit beside each
 
 
 def text(campaign: Any) -> str:
-    """Return blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
+    """Blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
     blocks = [
         [f"Campaign {campaign.name}", *_aligned(_facts(campaign))],
         ["Joints", *_aligned(_joints(campaign))],
@@ -32,7 +32,7 @@ def text(campaign: Any) -> str:
 
 
 def html(campaign: Any) -> str:
-    """Return the same as tables of a notebook."""
+    """HTML tables of a notebook with the same content as :func:`text`."""
     head, *joints = _joints(campaign)
     warned = html_table([[warning] for warning in campaign.warnings], heading="Warnings")
     return (
@@ -163,7 +163,7 @@ def _range(low: float, high: float) -> str:
 
 
 def _aligned(rows: Iterator[Sequence[str]]) -> list[str]:
-    """Return the rows as lines, indented, every column as wide as its widest cell."""
+    """Indented lines with aligned columns."""
     table = list(rows)
     columns = max(len(row) for row in table)
     widths = [max(len(row[i]) for row in table if i < len(row)) for i in range(columns)]

@@ -1,4 +1,4 @@
-"""Documents: campaign.toml with its lines, each key of its kind, and what it declares; YAML of other programs."""
+"""Parsers of campaign.toml, with line numbers and a schema, and of other programs' YAML."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Document:
             raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
 
     def row(self, section: str, key: str = "") -> int | None:
-        """Return the line of a section or key, ``None`` where it is written in some unusual way."""
+        """Line number of a section or key, ``None`` where it cannot be located."""
         current = ""
         for number, line in enumerate(self.text.splitlines(), start=1):
             if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
@@ -117,7 +117,7 @@ class Document:
         return None
 
     def _error(self, problem: str, section: str, key: str = "", column: str = "", **told: str) -> CampaignError:
-        """Return an error of a section or of its key, with the line."""
+        """Error at a section or its key, with the line."""
         column = column or (f"{section}.{key}" if key else section)
         return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
 
@@ -136,7 +136,7 @@ class Document:
                 raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
-        """Return the values of a section; what is not of its kind is told with its line."""
+        """Return the validated values of a section; errors name the line."""
         known = self.kinds[section]
         kind = record(known, may_lack=known) if isinstance(known, Mapping) else known
         try:
@@ -149,7 +149,7 @@ class Document:
         return values
 
     def required(self, section: str, key: str) -> Any:
-        """Return a value that must be stated."""
+        """Value of a required key."""
         if key in self.sections.get(section, {}):
             return self.sections[section][key]
         known = self.kinds[section]
@@ -166,7 +166,7 @@ _MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 @dataclass(frozen=True)
 class Declaration:
-    """What campaign.toml says."""
+    """Content of campaign.toml."""
 
     file: Path  # path of the file as the user gave it
     table: Path  # path of the table
@@ -177,7 +177,7 @@ class Declaration:
 
 
 def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
-    """Read campaign.toml, or that of a directory; its paths are resolved against ``folder``, by default its own.
+    """Read campaign.toml, or that of a directory; its paths are relative to ``folder``, by default its own.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
 
 
 def _absent(path: Path) -> CampaignError:
-    """Say that there is no campaign, and which there are beside it: files that have its section, folders its file."""
+    """Error for a missing campaign, with those nearby."""
     problem, folder = f"this folder has no {FILE_NAME}", path
     if not is_folder(path):
         problem, folder = "there is no such file", path.parent
@@ -222,12 +222,12 @@ WITH_YAML = 'pip install "thermal-robot[yaml]"'
 
 
 def is_yaml(file: Path) -> bool:
-    """Return whether a file is YAML by its name."""
+    """Whether a file is YAML by its name."""
     return file.suffix.lower() in (".yaml", ".yml")
 
 
 def read_yaml(file: Path) -> list[Any]:
-    """Return the documents of a YAML file, of plain values alone; the empty ones are left out."""
+    """Non-empty documents of a YAML file, of plain values only."""
     try:
         import yaml
     except ImportError as error:

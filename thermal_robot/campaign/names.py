@@ -1,4 +1,4 @@
-"""The table's column names: which the format defines, what a typing error was probably meant to be."""
+"""Column names of the format, and suggestions for typing errors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ decides only what a message proposes, never what is accepted, so it lies below t
 
 
 def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float = _LIKE) -> list[str]:
-    """Return the candidates most like ``name``, best first; upper and lower case count as equal."""
+    """Known names most similar to ``name``, best first, case-insensitive."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
         by_lower.setdefault(candidate.lower(), candidate)
@@ -38,20 +38,20 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float 
 
 
 def did_you_mean(name: str, candidates: Iterable[str], cutoff: float = _LIKE) -> str:
-    """Return ``"; did you mean 'elbow_joint'?"``, or nothing when no candidate is like ``name``."""
+    """Suggestion ``"; did you mean 'elbow_joint'?"``, or empty without a similar name."""
     close = nearest(name, candidates, count=1, cutoff=cutoff)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def listed(names: Iterable[str], limit: int = 12) -> str:
-    """Return names in quotes, separated by commas, cut off after ``limit``."""
+    """Names in quotes, separated by commas, cut off after ``limit``."""
     quoted = [repr(name) for name in names]
     more = f" and {len(quoted) - limit} more" if len(quoted) > limit else ""
     return ", ".join(quoted[:limit]) + more
 
 
 def tilted(column: str) -> str | None:
-    """Return the link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
+    """Link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
     if column in TILT:
         return ""
     quantity, place = split_name(column)
@@ -60,7 +60,7 @@ def tilted(column: str) -> str | None:
 
 
 def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
-    """Return the columns of conditions that the format defines for a robot, in order: keys of a dict."""
+    """Condition columns of the format for a robot, in order, as keys of a dict."""
     joints, links = tuple(joints), tuple(links)
     per_joint = (f"{quantity}.{joint}" for quantity in PER_JOINT for joint in joints)
     per_link = (f"{quantity}.{link}" for quantity in PER_LINK for link in links)
@@ -68,18 +68,18 @@ def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
 
 
 def target_of(column: str) -> tuple[str, int] | None:
-    """Return axis and number of ``x.1``; ``None`` for other columns."""
+    """Axis and number of ``x.1``; ``None`` for other columns."""
     axis, number = split_name(column)
     plain = axis in POSITION and number.isascii() and number.isdigit() and not number.startswith("0")
     return (axis, int(number)) if plain else None
 
 
 def axes_of(target: int) -> tuple[str, str, str]:
-    """Return the columns of one of several targets."""
+    """Position columns of one of several targets."""
     return f"x.{target}", f"y.{target}", f"z.{target}"
 
 
 def split_name(column: str) -> tuple[str, str]:
-    """Return quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
+    """Quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
     quantity, _, place = column.partition(".")
     return quantity, place

@@ -1,4 +1,4 @@
-"""From files, or from a pandas data frame, to a campaign: every value checked, converted to SI, gaps filled."""
+"""Readers of campaigns, from files or a pandas data frame: validated, converted to SI, gaps filled."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MINIMUM_POSES = 3  # Distinct configurations without which a rigid frame can tur
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
-    """Validate a table and return the campaign; what cannot be used is refused with row and column.
+    """Validate a table and build the campaign; errors name row and column.
 
     Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
     """
@@ -86,7 +86,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
 
 
 def arrived(campaign: Campaign) -> Campaign:
-    """Return the campaign with the directions of approach, where nobody recorded any but the order tells them."""
+    """Campaign with directions of approach derived from the order of rows where none are recorded."""
     recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
     if recorded or campaign.moves != "direct":
         return campaign
@@ -96,7 +96,7 @@ def arrived(campaign: Campaign) -> Campaign:
 
 
 def _commands(table: Table, robot: Robot, units: Units) -> Array:
-    """(N, n) rad or m."""
+    """Joint positions (N, n), rad or m."""
     joints = zip(robot.joint_names, robot.joint_types, strict=True)
     commands = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
     index = first_beyond(commands, LARGEST_COMMAND)
@@ -110,7 +110,7 @@ def _commands(table: Table, robot: Robot, units: Units) -> Array:
 def _covariates(
     table: Table, columns: Columns, robot: Robot, units: Units
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_]], list[str]]:
-    """Return the covariates in SI without gaps, where they had gaps, and how those were filled, in words."""
+    """Covariates in SI with gaps imputed, masks of the gaps, and sentences on the imputation."""
     covariates: dict[str, Array] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
     warnings: list[str] = []
@@ -129,19 +129,19 @@ def _covariates(
 
 
 def _vectors(table: Table, group: Sequence[str], units: Units) -> Array:
-    """(N, 3) m."""
+    """Vectors (N, 3), m."""
     return np.column_stack([table.numbers(column) for column in group]) * units.length_scale
 
 
 def _quaternions(table: Table, group: Sequence[str]) -> Array:
-    """(N, 4) unit quaternions wxyz."""
+    """Return the unit quaternions (N, 4) wxyz."""
     quaternions = np.column_stack([table.numbers(column) for column in group])
     check_quaternions(table.file, group[0], quaternions, table.rows)
     return np.asarray(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
 
 
 def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:
-    """Return what a campaign says of its noise, and its targets: of several, their noise tells that of their pose."""
+    """Stated noise of a campaign and its targets; of several targets, propagated to their pose."""
     place, turn, targets = settings.noise_position, settings.noise_orientation, told.targets if told else None
     if targets is not None:
         place, turn = (None, None) if place is None else told_by(place, targets)
@@ -151,7 +151,7 @@ def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | Non
 
 
 def _noise_of_rows(table: Table, settings: Settings) -> Array:
-    """(N,) m: one sigma of each row; an empty cell is that of all rows, where it is stated."""
+    """Noise (N,) of each row, m; an empty cell takes that of all rows, where stated."""
     cells = table.numbers(names.NOISE, gaps=True)
     sigmas = cells * settings.units.length_scale
     if settings.noise_position is not None:
@@ -167,7 +167,7 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
 
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
-    """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
+    """Warn, or refuse without repeats, where rows cannot determine the unknown frames."""
     equations = 6 if campaign.measures == "pose" else 3
     # of the tool: the target's orientation is fitted where it is measured
     unknowns = {"base": 0 if campaign.base_known else 6, "tool": 0 if campaign.tool_known else equations}
@@ -191,7 +191,7 @@ LOOSE = 2.0  # Times the stated noise from which on targets are said to move aga
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
-    """Return the rows that tell a pose, what they tell, and what is left out or doubtful, in sentences.
+    """Poses of the rows from several targets, with sentences on what is left out or doubtful.
 
     Refused are targets beside a simulator's, a place of which one or two figures lack, targets on a line in all rows,
     and one that is never seen beside the others.
@@ -223,7 +223,7 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
 
 
 def _points(table: Table, number: int) -> Array:
-    """(N, 3) of one target, in the file's unit; NaN where it was not seen."""
+    """Positions (N, 3) of one target, in the file's unit; NaN where it was not seen."""
     axes = names.axes_of(number)
     found = np.column_stack([table.numbers(column, gaps=True) for column in axes])
     gaps = np.isnan(found)
@@ -327,7 +327,7 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
 def read_samples(
     path: str | Path | pd.DataFrame | Table, settings: Settings | Campaign, robot: Robot | None = None
 ) -> Campaign:
-    """Read a table of commands and conditions to predict.
+    """Read a table of commands and conditions to be predicted.
 
     Parameters
     ----------
@@ -396,7 +396,7 @@ def campaign_from_table(
     name: str = "table",
     measured: bool = True,
 ) -> Campaign:
-    """Make a campaign from a pandas data frame, with the columns and the validation of a campaign's file.
+    """Build a campaign from a pandas data frame, with the columns and the validation of a file.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a campaign says once about all its rows: units, frames, noise, payload; no table."""
+"""Settings of a campaign for all its rows: units, frames, noise, payload."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio
 
 
 def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> Any:
-    """Return an argument of a call as its kind wants it; refuse another by the argument's name.
+    """Argument of a call, validated against its schema; errors name the argument.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> A
 
 @dataclass(frozen=True)
 class Settings:
-    """The part of a campaign that is not in the table, in SI units; a model file stores it as a plain dict.
+    """Settings of a campaign that are not in the table, SI; a model file stores them as a plain dict.
 
     Attributes
     ----------
@@ -107,19 +107,19 @@ class Settings:
     turned: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
+        """Plain values, ready for JSON; lengths in m."""
         own = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "turned" or self.turned}
         own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
 
     def of_rows(self) -> dict[str, Any]:
-        """Return the fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
+        """Fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
         frames = ("base_known", "tool_known", "target", "payload_com")
         return {key: getattr(self, key) for key in (*frames, "moves", "reference_temperature", "gears", "units")}
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
-        """Return the settings of values by section and key, as campaign.toml has them, lengths in its unit.
+        """Return the settings by section and key as in campaign.toml, lengths in its unit.
 
         ``sections`` state both units at least; ``ends`` are the robot's reference, the ends of the chain and gravity.
         """
@@ -142,7 +142,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
-        """Build settings from what :meth:`to_dict` returned, possibly after a journey through JSON.
+        """Build settings from the output of :meth:`to_dict`, possibly after a round trip through JSON.
 
         Raises
         ------
@@ -174,7 +174,7 @@ _KEYS: dict[str, Kind] = {
 
 
 def settings_kind(value: Any, path: str) -> Settings:
-    """Kind of the settings in a file (:mod:`thermal_robot.schema`)."""
+    """Return the schema of the settings in a file (:mod:`thermal_robot.schema`)."""
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
     values = record(_KEYS)({"moves": "unknown", "turned": (), **value} if isinstance(value, Mapping) else value, path)
     sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
@@ -182,6 +182,6 @@ def settings_kind(value: Any, path: str) -> Settings:
 
 
 def as_vector(values: Any) -> Vector:
-    """Return three floats; ``ValueError`` for any other number of them."""
+    """Three floats; ``ValueError`` for any other number of them."""
     x, y, z = (float(value) for value in values)
     return x, y, z

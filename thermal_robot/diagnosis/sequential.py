@@ -380,7 +380,7 @@ def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
 
 
 def axis_noise(medians: Array, leverage: float) -> Array:
-    """Return standard deviation per axis (G,) from the median distance of three normal axes, corrected for leverage."""
+    """One sigma per axis (G,), from the median distance of three normal axes, corrected for leverage."""
     return np.asarray(medians / np.sqrt(float(chdtri(3, 0.5)) * (1.0 - leverage)))
 
 

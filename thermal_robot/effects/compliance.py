@@ -114,7 +114,7 @@ class BaseCompliance(_Yielding):
         return () if self._kinds(observations) else (*tilts(BASE), _MASSES)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return settings: springs and measured tilt, as far as the campaign has them, about the origin and below."""
+        """Grid of settings: springs and measured tilt, as far as recorded, about the origin and about a lower point."""
         every = [(tilt, below) for tilt in self._kinds(observations) for below in (False, True)]
         return tuple(replace(self, below=below, tilt=tilt) for tilt, below in every) or (self,)
 

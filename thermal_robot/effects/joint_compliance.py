@@ -113,7 +113,7 @@ class JointCompliance(Effect):
 
 
 def _weighed(robot: Robot, q: Array) -> Array:
-    """Return static regressor (N, n, 4 n): torque of each joint per unit weight in each body, at and about the next joint."""
+    """Regressor of statics (N, n, 4 n): joint torques per unit weight in each body, at and about the next joint."""
     regressor = static_regressor(robot, q) * np.array([1.0, _LEVER, _LEVER, _LEVER])
     return np.asarray(regressor.reshape(len(q), robot.n, -1))
 

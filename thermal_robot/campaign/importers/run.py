@@ -1,4 +1,4 @@
-"""Files of another program in, the folder of a campaign out; the formats that can be imported."""
+"""Import of foreign files as the folder of a campaign, and the list of formats."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ IMPORTED = "Imported by `thermal-robot import"  # What the first line of a campa
 
 
 class Imported(NamedTuple):
-    """A campaign that was imported."""
+    """Result of an import."""
 
     campaign: Campaign  # as it was written
     file: Path  # its campaign.toml
@@ -40,7 +40,7 @@ class Imported(NamedTuple):
 
 
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
-    """Read files of a format and write them as a campaign.
+    """Import files of a format and write them as a campaign.
 
     The directory is made if need be; a campaign in it is replaced where it was imported, too. ``plan`` is what the user
     says beyond the files; it counts for more than what the format says.
