@@ -35,7 +35,7 @@ def first_beyond(values: Array, most: float = LARGEST) -> int | None:
 
 
 def settled(values: Array) -> Array:
-    """Set denormal-sized numbers to 0; the array itself where there are none."""
+    """Set negligibly small numbers to 0; the array itself where there are none."""
     vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
 

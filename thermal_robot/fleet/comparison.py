@@ -1,4 +1,4 @@
-"""Equality tests between campaigns as one frozen value, its JSON, and the port through which it is put into words."""
+"""Result of a comparison of campaigns as one frozen value, and its JSON."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter in every campaign, each told by its own data beside all effects that are at work, SI.
+    """Estimates of one parameter by each campaign alone, given all effects that are at work; SI.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect in every campaign.
+    """Comparison of one effect between campaigns.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Change:
-    """What differs between campaigns by the joint fit.
+    """Difference between campaigns in the joint fit.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Predicted:
-    """What the models of two campaigns predict at the poses and conditions that both measured, frames aligned.
+    """Predictions of two campaigns' models at common poses and conditions, frames aligned.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Predicted:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """What campaigns of one robot share, and what changed between them.
+    """Result of a comparison: what campaigns of one robot share, and what changed between them.
 
     Attributes
     ----------
@@ -203,22 +203,22 @@ class Comparison:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Names of the effects that keep their name."""
+        """Names of the effects that the comparison confirms."""
         return tuple(e.name for e in self.effects if e.status in ("shared", "changed", "not_compared"))
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the effects that some diagnosis names, and that lose their name."""
+        """Names of the effects that a diagnosis names and the comparison contradicts."""
         return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed") and e.named)
 
     @property
     def summary(self) -> str:
-        """What stayed and what changed in one plain sentence."""
+        """Result in one plain sentence."""
         return str(registered().comparison_headline(self._plain()))
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Parameters by effect and name with a column for each campaign and for its deviation, SI."""
+        """Data frame of parameters by effect and name, with value and deviation for each campaign, SI."""
         import pandas as pd
 
         rows = {}
@@ -231,7 +231,7 @@ class Comparison:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["effect", "parameter"])
 
     def effect(self, name: str) -> Effect:
-        """Return what was compared of one effect.
+        """Comparison of one effect.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class Comparison:
         raise KeyError(f"{name!r} was not compared; {', '.join(e.name for e in self.effects) or 'nothing'} was")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/comparison/1``; SI throughout."""
+        """JSON object of the format ``thermal-robot/comparison/1``, SI."""
         plain = self._plain()
         return {**plain, "summary": registered().comparison_headline(plain)}
 
@@ -265,7 +265,7 @@ class Comparison:
         return dict(jsonable(plain))
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        """Write :meth:`to_dict` to a file by an atomic replace."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __repr__(self) -> str:

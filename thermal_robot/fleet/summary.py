@@ -1,4 +1,4 @@
-"""Empirical Bayes summary of a fleet: what is wrong with which robot, and what several share.
+"""Empirical Bayes summary of a fleet: effects by robot, common parameters, outliers.
 
 Each parameter of each effect is a :func:`~thermal_robot.fleet.population.population` of its own, of values that every
 campaign tells whether the effect was found there or not (:mod:`thermal_robot.fleet.rows`). The table is read in pieces,
@@ -30,7 +30,7 @@ _FOUND = ("found", "contained", "confounded")
 
 @dataclass(frozen=True)
 class Count:
-    """How often an effect was found.
+    """Number of robots in which an effect was found.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Count:
 
 @dataclass(frozen=True)
 class Gathered:
-    """An effect that is found in one group more often than elsewhere.
+    """Effect that is over-represented in one group of robots.
 
     ``p_value`` is that of so many by chance (hypergeometric law), times the number of groups and effects that were
     looked at.
@@ -74,7 +74,7 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Case:
-    """An effect that was found in a campaign: with what probability, which share of the gap (m) it has, and where.
+    """Effect found in a campaign: probability, share of the gap (m), and place.
 
     ``confounded_with`` names what the data cannot tell it from. Without a name it is a gap that no effect explains.
     """
@@ -92,7 +92,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Group:
-    """A group of robots and its mean, SI, with one sigma."""
+    """Group of robots: mean of a parameter, SI, with its standard deviation."""
 
     group: str
     robots: int
@@ -102,7 +102,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Shared:
-    """A parameter over the fleet, SI.
+    """Distribution of a parameter over the fleet, SI.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Apart:
-    """A robot that is unlike its group in a parameter, SI: with which probability."""
+    """Robot that is an outlier of its group in a parameter, SI, with the probability."""
 
     robot: str
     effect: str
@@ -156,7 +156,7 @@ SCHEMA = "thermal-robot/fleet/1"
 
 @dataclass(frozen=True)
 class Summary:
-    """A fleet in short. Lists of robots hold the worst of them where there are many; the table holds all.
+    """Summary of a fleet. Long lists hold the most striking robots only; the table holds all.
 
     Attributes
     ----------
@@ -195,14 +195,14 @@ class Summary:
     parameters: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/fleet/1``; SI throughout."""
+        """JSON object of the format ``thermal-robot/fleet/1``, SI."""
         return dict(jsonable({"schema": SCHEMA, **asdict(self)}))
 
 
 def summarise(
     table: Path, labels: Sequence[str] = (), progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> Summary:
-    """Summarise the table of a fleet, as :func:`~thermal_robot.fleet.rows.write_rows` writes it, by its labels.
+    """Summarise the table of a fleet (:func:`~thermal_robot.fleet.rows.write_rows`) by its labels.
 
     ``progress`` is called with a stage, how many effects are compared, and how many there are.
     """
@@ -230,14 +230,14 @@ def summarise(
 
 
 def _frames(table: Path, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
-    """Yield some columns of the table, a few thousand rows at a time."""
+    """Yield some columns of the table in chunks of rows."""
     with needed("pyarrow.parquet").ParquetFile(table) as file:
         for batch in file.iter_batches(settings.ROWS_AT_ONCE, columns=list(dict.fromkeys(columns))):
             yield batch.to_pandas()
 
 
 def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
-    """Return the campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
+    """Campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
     import pandas as pd
 
     columns = [CAMPAIGN, *labels, MODEL, "outcome", "reason"]
@@ -250,7 +250,7 @@ def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
 
 
 def _findings(table: Path, campaigns: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return every effect of every robot: where it can be tested, is at work, is there beyond doubt; and all cases.
+    """Return the findings by effect and robot: testable, at work, certain; and all cases.
 
     A case is an effect that is at work in a campaign, or a campaign whose gap no effect explains.
     """
@@ -301,7 +301,7 @@ def _counts(findings: pd.DataFrame) -> tuple[Count, ...]:
 
 
 def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
-    """Return the largest gaps: what explains each, or that nothing does."""
+    """Campaigns with the largest gaps, and their explanation, if any."""
     found = []
     largest = cases.sort_values("rms_before", ascending=False, kind="stable").head(settings.MOST_LISTED)
     for row in largest.to_dict("records"):
@@ -317,7 +317,7 @@ def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
 
 
 def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, ...]:
-    """Return what was found more often in a group than chance allows, however many groups were looked at."""
+    """Effects over-represented in a group, corrected for the number of groups."""
     from scipy.stats import hypergeom
 
     striking, tests = [], 0
@@ -357,7 +357,7 @@ def _shared(
     effects: Sequence[str],
     progress: Callable[[str, int, int], None],
 ) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
-    """Return what robots share, who stands out, the surest first each, and how many parameters were compared."""
+    """Return the common parameters and outlying robots, most certain first, and the number of parameters compared."""
     import pandas as pd
 
     codes, names = pd.factorize(campaigns[ROBOT])
@@ -392,7 +392,7 @@ def _compared(
     who: Codes,
     labels: dict[str, tuple[Codes, Any]],
 ) -> tuple[Shared, Array, Array]:
-    """Fit the population of a parameter, as one and by each label; what is usual for each robot, how it is unlike."""
+    """Return the population of a parameter, as one and by each label, with outlier probabilities of the robots."""
     whole = population(values, deviations)
     mean, std = float(whole.means[0]), float(whole.deviations[0])
     found = Shared(*what, len(who), mean, std, whole.spread, whole.spread_std, whole.nothing)

@@ -1,4 +1,4 @@
-"""Change points, rates and alarms of one robot over time: frozen values, as text and as JSON."""
+"""Change points, rates and alarms of one robot over time: frozen values and their JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCHEMA = "thermal-robot/wear/1"
 
 @dataclass(frozen=True)
 class Visit:
-    """One campaign of a series.
+    """One campaign in a time series.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Visit:
 
 @dataclass(frozen=True)
 class Jump:
-    """A change at once, between two campaigns.
+    """Step change of a parameter between two campaigns.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Jump:
 
 @dataclass(frozen=True)
 class Rate:
-    """How fast a parameter moves, its unit per day."""
+    """Rate of change of a parameter, its unit per day."""
 
     value: float
     std: float
@@ -74,7 +74,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Crossing:
-    """When a parameter's absolute value reaches a limit.
+    """Time at which a parameter's absolute value reaches a limit.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Crossing:
 
 @dataclass(frozen=True, kw_only=True)
 class Worn:
-    """One parameter over time; SI.
+    """Change of one parameter over time; SI.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class Worn:
 
 @dataclass(frozen=True, repr=False)
 class Wear:
-    """One robot over time.
+    """Change of one robot over time.
 
     Attributes
     ----------
@@ -195,24 +195,24 @@ class Wear:
 
     @property
     def alarms(self) -> tuple[Worn, ...]:
-        """The parameters that ring."""
+        """Parameters with an alarm."""
         return tuple(worn for worn in self.parameters if worn.alarm)
 
     @property
     def summary(self) -> str:
-        """What moved, how and when, in one sentence."""
+        """Result in one sentence: what moved, how and when."""
         span = f"{len(self.campaigns)} campaigns of {self.robot}"
         if not self.alarms:
             return f"Over {span} nothing moves that would not by chance in {_share(self.false_alarm)} of such series."
         return f"Over {span}: {'; '.join(_moves(self, worn) for worn in self.alarms)}."
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
+        """JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
         plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
         return plain
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        """Write :meth:`to_dict` to a file by an atomic replace."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
     def __repr__(self) -> str:
@@ -264,7 +264,7 @@ def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
 
 
 def _moves(wear: Wear, worn: Worn) -> str:
-    """Say how one parameter moves."""
+    """Describe the change of one parameter."""
     name = f"{worn.title}, {worn.parameter}"
     if worn.jump is not None:
         size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"
