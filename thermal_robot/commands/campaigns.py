@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 
 def check(options: argparse.Namespace) -> None:
-    """Read a campaign and describe it."""
+    """Run ``check``: read a campaign and describe it."""
     tell(options, describe(read(options)))
 
 
 def effects(options: argparse.Namespace) -> None:
-    """Print the effects, and what a campaign lacks for each."""
+    """Run ``effects``: list the effects, with the columns that a campaign lacks for each."""
     from thermal_robot.diagnosis import Finding
     from thermal_robot.effects import gate, library
     from thermal_robot.effects.catalogue import random_effects
@@ -45,7 +45,7 @@ def effects(options: argparse.Namespace) -> None:
 
 
 def diagnosed(options: argparse.Namespace) -> Diagnosis:
-    """Diagnose the campaign that was named, telling the stages."""
+    """Diagnose the named campaign with a progress display."""
     from thermal_robot.diagnosis import diagnose
 
     with stages(options.loudness) as progress:
@@ -54,7 +54,7 @@ def diagnosed(options: argparse.Namespace) -> Diagnosis:
 
 
 def diagnose(options: argparse.Namespace) -> None:
-    """Diagnose a campaign, print the result and write what is asked for."""
+    """Run ``diagnose``: print the result and write the requested files."""
     from thermal_robot.report import html
 
     files = read_from(options.campaign, Path() if options.piped else None)
@@ -71,7 +71,7 @@ def diagnose(options: argparse.Namespace) -> None:
 
 
 def demo(options: argparse.Namespace) -> None:
-    """Diagnose the demo's campaign, print it and draw it."""
+    """Run ``demo``: diagnose the demo's campaign, print and draw it."""
     from thermal_robot.report import html
 
     options.campaign = demo_directory()
@@ -83,7 +83,7 @@ def demo(options: argparse.Namespace) -> None:
 
 
 def iso9283(options: argparse.Namespace) -> None:
-    """Compute the criteria, print them and write what is asked for."""
+    """Run ``iso9283``: compute the criteria, print them and write the requested files."""
     from thermal_robot.iso9283 import performance
 
     require_free((options.json, options.csv), read_from(options.campaign, Path() if options.piped else None))
@@ -93,7 +93,7 @@ def iso9283(options: argparse.Namespace) -> None:
 
 
 def view(options: argparse.Namespace) -> None:
-    """Serve the scene until it is interrupted."""
+    """Run ``view``: serve the scene until interrupted."""
     try:
         import viser  # noqa: F401
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""A diagnosis and a calibration as plain text: what the command line prints."""
+"""Plain text of a diagnosis and of a calibration, for the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAME = 26
 
 
 def text(diagnosis: Diagnosis) -> str:
-    """Write a diagnosis for the person who measured.
+    """Plain text of a diagnosis.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
-    """Break a sentence into lines, but not between a number and its unit; the first line begins with ``indent``."""
+    """Wrap a sentence, but not between a number and its unit; the first line begins with ``indent``."""
     rest = " " * (len(indent) + hang)
     lines = fill(words.bound(sentence), WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
     return lines.replace(words.NO_BREAK, " ")
@@ -136,7 +136,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: int = 7) -> Iterator[str]:
-    """Draw shares as bars of characters, full at one; nothing for what is not above zero."""
+    """Bar chart of shares in characters, full at one; nothing for what is not above zero."""
     if not shares:
         return
     ordered = sorted(shares.items(), key=lambda item: -item[1]) if ranked else list(shares.items())
@@ -154,7 +154,7 @@ def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: 
 
 
 def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
-    """Tell the standard's criteria of the worst pose and path; nothing without repeats."""
+    """Yield the ISO 9283 criteria of the worst pose and path; nothing without repeats."""
     found = diagnosis.performance
     if found is None:
         return
@@ -183,7 +183,7 @@ def _next(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """Write a calibration for the person who measured.
+    """Plain text of a calibration.
 
     Parameters
     ----------

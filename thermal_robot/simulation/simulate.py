@@ -1,4 +1,4 @@
-"""One verb: a robot and its effects go in, the campaign that would be measured of it comes out."""
+"""Simulation of a campaign from a robot and its effects."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ CALL = "simulate()"
 def _commanded(
     robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
 ) -> Campaign:
-    """Return the rows that are simulated, with their conditions and nothing measured."""
+    """Rows to simulate, with conditions and without measurements."""
     if isinstance(commands, Campaign):
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
@@ -52,7 +52,7 @@ def _commanded(
 
 
 def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> Campaign:
-    """Return the rows of a campaign, without what was measured."""
+    """Rows of a campaign without its measurements."""
     if rows is not None or repeats != 1:
         expected = "neither rows nor repeats beside a campaign, which has its own"
         raise CampaignError(CALL, "too much is said of the rows", expected=expected)
@@ -67,7 +67,7 @@ def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> C
 
 
 def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
-    """Return (P, n) different poses, and how often each is measured."""
+    """Distinct poses (P, n), and the number of repeats of each."""
     times = fitted(whole(1), repeats, CALL, "repeats")
     if commands is not None:
         if rows is not None:
@@ -86,7 +86,7 @@ def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.
 
 
 def _given(robot: Robot, commands: Any) -> Array:
-    """Return (P, n) positions that a user gave; (n,) counts as one row."""
+    """Positions (P, n) that a user gave; (n,) counts as one row."""
     rows = f"rows of {robot.n} joint positions, or a campaign, which read_samples makes of a table"
     if not isinstance(commands, (list, tuple, np.ndarray)):
         raise CampaignError(CALL, "no positions", column="commands", found=type(commands).__name__, expected=rows)
@@ -100,7 +100,7 @@ def _given(robot: Robot, commands: Any) -> Array:
 
 
 def _under(plan: Campaign, conditions: Any) -> Campaign:
-    """Return the rows under conditions that are given, beside those that they had."""
+    """Rows under given conditions, in addition to their own."""
     given: Mapping[str, Any] = checked_mapping(CALL, "conditions", {} if conditions is None else conditions)
     covariates, labels, extra = dict(plan.covariates), dict(plan.labels), list(plan.extra)
     for name, values in given.items():
@@ -121,7 +121,7 @@ def _under(plan: Campaign, conditions: Any) -> Campaign:
 
 
 def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
-    """Return (N,) values of a condition; one stands for all rows."""
+    """Values (N,) of a condition; one value is broadcast."""
     try:
         found = np.asarray(values, dtype=np.str_ if name in columns.LABELS else np.float64)
         return np.broadcast_to(found, rows).copy()
@@ -131,7 +131,7 @@ def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
 
 
 def _known(name: str, robot: Robot) -> bool:
-    """Tell whether the format defines a column; refuse one that is no condition, and typing errors."""
+    """Whether the format defines a column; other columns than conditions are refused."""
     if name in robot.joint_names or name in (*columns.MEASURED, *columns.SIMULATED):
         what = "is commanded, no condition" if name in robot.joint_names else "is no condition"
         raise CampaignError(CALL, what, column=name, expected="positions in commands; poses are what is simulated")
@@ -197,7 +197,7 @@ def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
 
 
 def _require_conditions(effect: Effect, seen: Observations) -> None:
-    """Refuse an effect that has nothing to follow, by what would be needed."""
+    """Refuse an effect without a quantity to follow, naming the missing columns."""
     # a condition may stand still, as on a robot that has warmed through
     lacks = [column for column in gate.missing(effect, seen) if column not in seen.covariates]
     if not lacks:
@@ -208,7 +208,7 @@ def _require_conditions(effect: Effect, seen: Observations) -> None:
 
 
 def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
-    """Return (P,) the values of an effect's parameters."""
+    """Parameter values (P,) of an effect."""
     pairs: Iterable[tuple[int, Any]]
     names = [place.name for place in places]
     if isinstance(given, Mapping):
@@ -231,7 +231,7 @@ def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
 
 
 def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
-    """Return the index of the one parameter of a name, of a place, or of a label."""
+    """Index of the one parameter of a name, a place, or a label."""
     for candidates in ([p.name for p in places], [p.place for p in places], [p.label for p in places]):
         found = [k for k, candidate in enumerate(candidates) if candidate == name]
         if len(found) == 1:
@@ -245,7 +245,7 @@ def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
 
 
 def _number(effect: Effect, place: Parameter, value: Any) -> float:
-    """Return a value of a parameter, seen to be one."""
+    """Return the validated parameter value."""
     least = 0.0 if place.positive else -LARGEST
     what = f"a number{', not negative,' if place.positive else ''} in {place.unit}"
     kind = number(least=least, expected=what)
@@ -261,7 +261,7 @@ _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 
 
 def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[bool, float, float]:
-    """Return whether orientations are measured, too, and one sigma per axis, m and rad."""
+    """Whether orientations are measured, and one sigma per axis, m and rad."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
@@ -276,7 +276,7 @@ _RIGID = 1e-6
 
 
 def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
-    """Return the rows with what they declare of their frames, and the true ones; see :func:`thermal_robot.simulate`."""
+    """Rows with declared frames, and the true frames; see :func:`thermal_robot.simulate`."""
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
     ground = Frames.declared(plan).base if base is None else _pose("base", base)
@@ -303,7 +303,7 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
 
 
 def _array(given: Any) -> Array:
-    """Return numbers as an array; an empty one of everything else."""
+    """Array of numbers; empty for anything else."""
     try:
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
@@ -311,7 +311,7 @@ def _array(given: Any) -> Array:
 
 
 def _pose(key: str, given: Any) -> Array:
-    """Return a (4, 4) pose, seen to be rigid."""
+    """Rigid pose (4, 4), validated."""
     also, pose = ", or three numbers" if key == "tool" else "", _array(given)
     if pose.shape == (4, 4) and np.isfinite(pose).all():
         turn = pose[:3, :3]
@@ -330,7 +330,7 @@ def _measured(
     joints: np.random.Generator,
     readings: np.random.Generator,
 ) -> Campaign:
-    """Return the campaign that an instrument measures of a robot with effects at work, at its true frames.
+    """Return the simulated measurement of a robot with effects at work, at its true frames.
 
     Each effect has the (P,) values of its parameters; ``noise`` is one sigma per axis, m and rad; ``joints`` and
     ``readings`` are the chance of what scatters, and of the instrument.
@@ -352,7 +352,7 @@ def _measured(
 
 
 def _scatter(plan: Campaign, effects: Sequence[tuple[Effect, Array]], rng: np.random.Generator) -> Array:
-    """(N, n) by how much joints stand elsewhere than they were told to by chance, rad or m."""
+    """Random deviation (N, n) of the joints from their commands, rad or m."""
     away, pose, names = np.zeros_like(plan.q), repeated_poses(plan), plan.robot.joint_names
     for effect, sizes in effects:
         if isinstance(effect, RandomEffect):
@@ -384,7 +384,7 @@ def simulate(
     tool_known: bool | None = None,
     seed: int = 0,
 ) -> Campaign:
-    """Simulate what would be measured of a robot with effects of known size at work.
+    """Simulate the measurement of a robot with effects of known size.
 
     The exact model of the program, not its linear one: joints, links, base and tool are displaced by what the effects
     say, and the kinematics run through all of it, as in :meth:`CorrectedModel.predict
