@@ -149,7 +149,7 @@ def common_limits(
 
 
 def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
-    """Return configuration (nq,) of the whole model: joints at 0 or the limit nearest to 0, mimicking ones following."""
+    """Neutral configuration (nq,) of the whole model: joints at 0 or the limit nearest to it, mimics following."""
     q = np.asarray(pin.neutral(model), dtype=float)
     for joint in list(model.joints)[1:]:
         if joint.nq == 1:
