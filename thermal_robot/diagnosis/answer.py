@@ -40,8 +40,8 @@ _HELD_OUT = "Corrected figures are of rows held out: the model was fitted withou
 def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
     """Criteria of ISO 9283 of a campaign with repeats, in the frames that the gap is told in; ``None`` without repeats.
 
-    AP after the correction is of rows while they were held out: all repeats of a pose are held out together, so that no
-    figure is of a pose that the model was fitted to. Every cycle counts, those set aside, too, as the standard has it.
+    AP after the correction is cross-validated: all repeats of a pose are held out together. Every cycle counts,
+    outliers too, as the standard requires.
     """
     campaign = fit.campaign
     if not repeats(campaign)[0]:
@@ -84,8 +84,8 @@ def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple
 def prior_sensitivity(fit: Fit) -> Sensitivity:
     """Prior sensitivity: probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
-    The scale of each effect is learnt from the data; where the verdict depends on the stated sizes all the same, the
-    data do not decide. The leading combinations alone are compared.
+    The scale of each effect is estimated from the data; a verdict that still depends on the stated sizes is not decided
+    by the data. Only the leading combinations are compared.
     """
     e = fit.explanation
     problem = e.problem
@@ -107,7 +107,7 @@ class Conclusion:
 
     ``unexplained`` is the residual of the known effects alone, with the place and quantity of the laws that explain it;
     ``left`` that of the whole fit; ``chance`` its random part beyond the instrument's noise; ``refused`` effects that
-    were taken out again; ``misfit`` why nothing can be said of the robot.
+    cross-validation removed; ``misfit`` the mismatch of robot and table, if any.
     """
 
     fit: Fit
@@ -131,8 +131,8 @@ def answer(
 ) -> Diagnosis:
     """Build the diagnosis of the last explanation and its held-out shrinkage.
 
-    ``asked`` tells whether the user asked for an effect of this name, systematic or random; ``left_out`` are the names
-    that were left out; ``notes`` say what was left out of the campaign, one sentence each.
+    ``asked`` returns whether the user admits an effect of this name, fixed or random; ``left_out`` are the names that
+    the user excluded; ``notes`` are sentences on the rows and columns left out.
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(fit, last.left, shrinkage)
@@ -209,8 +209,8 @@ def _gap(fit: Fit, left: Examined, shrinkage: Shrinkage) -> Gap:
 def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
     """Corrected model of a fit.
 
-    ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told
-    how far predictions may be off.
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` omits the predictive
+    uncertainty.
     """
     campaign = fit.campaign
     needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))

@@ -7,8 +7,8 @@ there, in units of the noise:
 
     before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
 
-A constant error that the unknown frames take up as well is a matter of convention, and may be a hundred times what the
-error changes by: it is left out, so that the change can be seen.
+A constant error that the unknown frames also explain is a convention and may be a hundred times the variation: it is
+subtracted.
 """
 
 from __future__ import annotations
@@ -213,7 +213,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
 def _driver(observations: Observations, effect: Effect, parameters: list[Parameter], error: Array) -> Driver:
     """Quantity that drives an effect at a place, else the quantity with the largest R² of its error.
 
-    That is the one with the least mean variance of the error among rows with neighbouring values.
+    R² is from the mean variance of the error among rows with neighbouring values.
     """
     if known_driver := driver(effect, observations, parameters, error):
         return known_driver

@@ -108,7 +108,7 @@ class Calibration:
     def effects(self) -> tuple[Calibrated, ...]:
         """Effects with their parameters; an effect contained in a larger one comes before the rest of that.
 
-        Where what is left is :attr:`unexplained`, deviations hold what that may do to parameters, beside the noise.
+        With an :attr:`unexplained` residual, the standard deviations are inflated for it.
         """
         fit = as_remainder_says(self.fit) if self.unexplained else self.fit
         titles = {name: own[0].title for name, own in fit.variants.items()}
@@ -158,7 +158,7 @@ def calibrate(
 ) -> Calibration:
     """Fit named effects and the unknown frames without model selection; outlying rows are set aside.
 
-    What is at work, and how sure that is, and faults of the table are asked of :func:`~thermal_robot.diagnose`.
+    Model selection, probabilities and tests of the table are those of :func:`~thermal_robot.diagnose`.
 
     Parameters
     ----------

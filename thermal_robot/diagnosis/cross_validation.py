@@ -46,9 +46,9 @@ class Model:
     """Ridge regression of frames and K parameters on any subset of the rows.
 
     ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
-    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows on which
-    it is judged; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations count by what
-    is left of each, as where frames are registered, not in the ratio of their noise.
+    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows that count
+    in the score; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations are weighted
+    by their own residuals, as in a registration, and not by their noise.
     """
 
     linear: Linear
@@ -71,8 +71,8 @@ class Model:
     def partial(self, nominal: Linear, values: Sequence[Array] = ()) -> Model:
         """Model for fits of subsets of the effects: linearised at the nominal robot, a block for each effect.
 
-        Each is held to the size of its ``values`` in the whole model. What such a fit leaves counts as noise: a smooth
-        discrepancy is small beside it. At the corrected robot frames that are aliases could seem apart, and stretch.
+        The prior size of each is that of its ``values`` in the whole model. The residual counts as noise, which exceeds
+        a smooth discrepancy. At the corrected robot, frames that are exact aliases would seem separable.
         """
         pairs = list(zip(values, nominal.blocks, strict=True))
         sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in pairs]
@@ -286,12 +286,11 @@ class Shrinkage:
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
     """Leave-one-block-out cross-validation, blocks being consecutive measurements.
 
-    Frames and parameters come from the training rows alone. What was chosen stays that of all rows: effects, laws,
-    constants, prior scales, the point of linearisation, noise, and outliers. Choosing anew in each fold is further off
-    as an estimate for the model that is saved. The price is that an effect chosen by chance from noise alone seems
-    worth a little; :func:`~thermal_robot.diagnosis.prune.earned` asks for more than that. The intervals are of what
-    fresh rows of the same kind would say of the saved model, noise included. Raises :class:`EstimationError` if all
-    rows repeat one pose.
+    Frames and parameters are refitted to the training rows. The selection stays that of all rows: effects, laws,
+    constants, prior scales, linearisation point, noise, outliers. The estimate is then that of the saved model; an
+    effect selected from noise alone seems to gain a little: :func:`~thermal_robot.diagnosis.prune.earned` requires
+    more. The intervals are those of fresh rows of the same kind under the saved model, noise included. Raises
+    :class:`EstimationError` if all rows repeat one pose.
     """
     block = blocks(fit.campaign)
     count = int(block.max()) + 1
@@ -395,7 +394,8 @@ def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> F
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
     """Models of the frames alone and of a fit, with the fitted events subtracted from the gap.
 
-    Other rows do not tell what stood elsewhere in a whole session or region: it must be known, as by registering anew.
+    A displacement throughout a held-out session or region cannot be predicted from other rows; in use it is removed by
+    a new registration.
     """
     e = fit.explanation
     events = [(b, effect) for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True) if is_event(effect)]

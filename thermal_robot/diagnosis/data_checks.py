@@ -1,9 +1,8 @@
 """Checks of the data before the diagnosis: rows to leave out, quantities of the wrong sign, and warnings at its end.
 
 Rows were not executed as written where the pose of another command was measured: a robot that waits at a limit, a
-program that is a line behind, an instrument that repeats its last reading. They say nothing of the robot, and nothing
-that is wrong with a robot looks like them. Where so many are behind that the table was paired wrong, that is a fault of
-the data.
+program that is a line behind, an instrument that repeats its last reading. They carry no information on the robot. If
+very many rows are shifted, the table was paired wrongly, which is a data fault.
 
 An elastic joint yields to its load, lost motion stops short, a warm link grows: such parameters have one sign. They are
 fitted once as if they could have either, beside all known effects. A quantity is read with the other sign where it

@@ -80,7 +80,7 @@ def _estimates(parameters: Iterable[Parameter], values: Array, spread: Array, pr
 def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
     """Covariance matrix of the identified parameters, by (effect, parameter), in products of SI units.
 
-    Deviations are those of :func:`estimates`, widened to what the remainder says of each effect
+    Deviations are those of :func:`estimates`, inflated for the residual
     (:func:`~thermal_robot.diagnosis.uncertainty.as_remainder_says`); correlations those of the ``joint`` (K, K)
     posterior of all frames and parameters, those of the effects last, frames marginalised.
     """
@@ -161,8 +161,8 @@ def within_frames(fit: Fit, block: int) -> bool:
 def confounding(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
     """Confounded effects by posterior probability: for each effect of the fit (with its block) its alternatives.
 
-    That is a known one outside the fit that, fitted anew in its place, is nearly as probable: by more than
-    ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
+    An alternative is a known effect outside the fit. The models with it in place of the effect, and otherwise
+    unchanged, have a posterior probability above ``IN_ITS_PLACE``.
     """
     best, found = frozenset(explained), dict[tuple[str, str], float]()
     for combination, p in zip(fit.explanation.combinations, fit.explanation.probabilities, strict=True):
@@ -187,8 +187,8 @@ def findings(
 ) -> tuple[Finding, ...]:
     """Return the findings of all candidates, untestable ones last.
 
-    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability that what a
-    discovered law follows, where, is right.
+    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability of the place
+    and quantity of each discovered law.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
     apart, inside = confounding(fit, explained), told_inside(fit)

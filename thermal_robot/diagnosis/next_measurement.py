@@ -55,7 +55,7 @@ def most_informative(
     """Greedy D-optimal Bayesian design beside unknown frames (Chaloner and Verdinelli, *Statistical Science* 10, 1995).
 
     Each choice maximises I(y; θ) = I(y; θ, f) − I(y; f | θ), f the frames: half the difference of two log determinants,
-    given those before. Returned are the candidates, and the information gained so far, nats.
+    given those before. Returns the chosen candidates, and the cumulative information, nats.
 
     ``root`` (K, m, p) and ``frames`` (K, m, f): root of the covariance of what is expected of each candidate's m
     components, in units of the noise, and of its part from the frames, were the parameters known. Of candidates with
@@ -370,8 +370,8 @@ def wanted(
 ) -> Wanted | None:
     """Most useful next measurement; ``None`` where the data determine the explanation.
 
-    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: what the whole fit leaves, and what the
-    known effects leave, which laws may explain; ``probability`` of the explanation.
+    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: residuals of the whole fit, and of the
+    known effects alone; ``probability`` of the explanation.
     """
     if groups:
         group = groups[0]
@@ -392,7 +392,7 @@ def wanted(
 def _pose(fit: Fit, group: Effects) -> Wanted | None:
     """Sample that separates explanations best, or another payload where that separates clearly more.
 
-    ``None`` where no sample tells enough, or tells other effects apart than those of the group.
+    ``None`` where no sample gains enough, or only samples that separate effects outside the group.
     """
     plain = loaded = next_samples(fit)
     if fit.campaign.robot.has_masses and not fit.nominal.varies("payload"):

@@ -31,8 +31,8 @@ from thermal_robot.inference.weights import Noise
 def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: add unlisted terms in competition with all known effects; ``None`` if none is selected.
 
-    Terms are generated from what the fit leaves: events, waves of the joints, laws of any quantity at any place. One
-    event or law more joins a fit at a time, as ``discovered.<number>``.
+    Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. One
+    change point or law is added at a time, as ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")
     held = [effect for effect, _ in fit.effects]
@@ -62,7 +62,7 @@ def _ripple(fit: Fit) -> JointRipple | None:
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
     """Residual of the known effects, with the places and quantities of the laws that explain it.
 
-    Where none does, and the discrepancy errs anew at one place in every pose or visit, that is the place.
+    Without laws, the place is that of a per-pose or per-visit discrepancy, if any.
     """
     form = discrepancy.form
     if not found and left.flagged and form is not None and form.anew and form.place[0]:
@@ -92,7 +92,7 @@ def beside_scatter(
 ) -> Conclusion:
     """Repeat the model selection with the joints' scatter (``chance``) in the covariance of the noise.
 
-    Effects and laws that the scatter had imitated are then no longer in the fit.
+    Effects and laws that only fitted the scatter then drop out.
     """
     e = fit.explanation
     scatter, sensitivity = chance.scatter, fit.corrected.joint_sensitivity
@@ -175,13 +175,12 @@ def earned(fit: Fit) -> dict[str, Earned]:
 
     The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
     components in units of the noise (Vehtari, Gelman and Gabry, *Statistics and Computing* 27, 2017, on elpd and its
-    standard error): no few rows decide. The standard error is that of the sums over blocks of consecutive rows, the
-    quantile Student's. Something that acts within one block alone cannot earn its word, as no other rows tell of it.
+    standard error): robust to a few rows. The standard error is that of the sums over blocks of consecutive rows, the
+    quantile Student's. An effect within a single block gains nothing, as other rows do not predict it.
 
     Beside blocks, rows are held out by condition, by region, and at the ends of each joint's range. There, effects that
-    compensate each other over the range measured fall apart: of four series of one robot, gains and periodic errors of
-    ten times the size of the others carried over to no other. An event says nothing of rows held out with all that it
-    did, as a session or the warmest rows, and is asked in blocks of consecutive rows alone.
+    compensate each other only within the measured range fail. Events are tested in blocks of consecutive rows alone,
+    since a whole session held out contains all that an event did.
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
@@ -224,10 +223,10 @@ def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) 
 def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
     """Backward elimination by cross-validation until every remaining term obeys one rule.
 
-    An effect or a law stays where it is nine times as probable as nothing in its place, predicts rows held out no worse
-    (a law, but an event: clearly better), and something of it is determined. All that clearly harm go at once, as they
-    may compensate each other; of the rest that do not obey, one after another, the one goes first that brings rows held
-    out least. Refused, by name: its probability, and its share where rows held out speak against it.
+    The rule: posterior odds of at least nine against nothing in its place, a held-out density that is not lower (of a
+    law, but no event: significantly higher), and at least one determined direction. All significantly harmful terms are
+    removed at once, as they may compensate each other; the others one at a time, the smallest held-out gain first. Also
+    returns the removed effects by name.
     """
     refused: dict[str, Refused] = {}
     exact = True
@@ -266,8 +265,8 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
 def in_place(fit: Fit) -> dict[str, float]:
     """Posterior odds of each effect and law against nothing in its place; of a law also against its alternatives.
 
-    What others could do in its place does not count: two of which one is at work are told as confounded. A law says
-    what it follows, and where: it is no surer than that.
+    Alternatives of an effect do not count here: they are reported as confounded. The odds of a law include those of its
+    place and quantity.
     """
     odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
     told = {d.law.name: d.probability for d in discovered(fit)}
@@ -277,7 +276,7 @@ def in_place(fit: Fit) -> dict[str, float]:
 def determined(fit: Fit) -> set[str]:
     """Effects and laws of a fit of which the data determine at least one direction.
 
-    Along one principal axis of its posterior at least, less than half of the prior's standard deviation is left.
+    Determined means that the posterior standard deviation is below half the prior's along some principal axis.
     """
     e, found = fit.explanation, set()
     for b in e.best.blocks:
@@ -291,7 +290,7 @@ def determined(fit: Fit) -> set[str]:
 def _refused(judged: Earned) -> Refused:
     """Cross-validation result of a removed effect: probability from its prior and held-out densities, and share.
 
-    The probability is at most the prior's: blocks of rows that speak for an effect do not outweigh what refuses it.
+    The probability is at most the prior's, whatever other blocks of rows gain.
     """
     said = judged.hardest if judged.clearly else judged.blocked
     return Refused(float(expit(log_odds() + min(judged.blocked.nats, 0.0))), said.share)

@@ -123,8 +123,8 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
     of recorded quantities, and whether the rows set aside are too many, follow each other, or have something in common.
-    Only the first asks for more than the stated noise by a margin. Rows set aside count in the unexplained rms where
-    they are no gross errors.
+    Only the first has a margin over the stated noise. Outliers count in the unexplained rms unless they are gross
+    errors.
     """
     left, noise = residual(fit), float(fit.explanation.whitening.noise[0])
     again, white = repeats(fit, left), left.white
@@ -277,7 +277,7 @@ def _in_a_row(fit: Fit) -> Outcome:
 def too_many(fit: Fit, left: Residual) -> Outcome:
     """Binomial test of the number of outliers against the rate of gross errors.
 
-    Instruments spoil :data:`~thermal_robot.inference.settings.SPOILT` of the rows at most. Where the tails of the other
+    The rate of gross errors is at most :data:`~thermal_robot.inference.settings.SPOILT`. Where the tails of the other
     rows are heavier than normal, the share that Student's law sets aside is added.
     """
     count, samples = int(fit.explanation.outliers.sum()), len(fit.explanation.outliers)
@@ -304,8 +304,8 @@ def _share_of_tails(left: Residual, samples: int) -> float:
 def alike(fit: Fit) -> Outcome:
     """Scan test whether the outliers cluster in a quantity: beyond a value, or between two.
 
-    Given that the ends of such a range are rows set aside, how many of the others lie within has a hypergeometric law
-    where rows are set aside whatever their quantity. Both the ranges and the quantities are counted (Bonferroni).
+    Given that a range ends at two outliers, the number of other outliers within is hypergeometric under the null
+    hypothesis. Both the ranges and the quantities are counted (Bonferroni).
     """
     aside = fit.explanation.outliers
     count = int(aside.sum())
@@ -350,7 +350,7 @@ def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: i
 def _asked(observations: Observations) -> dict[str, Array]:
     """Quantities over which outliers may cluster, with words for each: all recorded, torques, approach times torque.
 
-    The last tells where a joint is pressed against the side from which it came, and where against the other.
+    The product's sign tells whether gravity presses a joint towards the side from which it came.
     """
     found = quantities(observations)
     torques = () if observations.torque is None else observations.torque.T

@@ -4,14 +4,14 @@ A diagnosis alternates between weights, noise, prior scales and parameters while
 no longer changes. Here nothing is chosen, and the iteration goes on to its fixed point, so that old rows and new ones
 in whatever order, and one batch or many, end at the same place.
 
-Rows enter as sufficient statistics where a trust region allows.
-A row counts in full unless it stands in the tail (Huber 1964), and the noise, where none is stated, is told by the
-median of the residuals. So a row bears on the fit by its products alone as long as it crosses neither the bend of its
-weight nor the median. With J_i the row's columns in units of the noise, and any positive A, a step δ of the parameters
-moves it by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and Schwarz), and where A is that of all N rows, by √(δᵀAδ/N) in
-the root mean square. Rows that might reach the bend at most, or the median by a few root mean squares, are kept one by
-one; the others are summed. One that crosses the median all the same moves the noise by 1/N of itself, and with it
-nothing but the weights in the tail. Where noise is stated, and no more than it remains, the median bears on nothing.
+Rows enter as sufficient statistics where a trust region allows. A row counts in full unless it stands in the tail
+(Huber 1964), and the noise, where none is stated, is told by the median of the residuals. So a row enters the fit by
+its products alone while it crosses neither Huber's threshold nor the median. With J_i the row's columns in units of the
+noise, and any positive A, a step δ of the parameters moves it by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and
+Schwarz), and where A is that of all N rows, by √(δᵀAδ/N) in the root mean square. Rows that could cross the threshold,
+or come within a few root mean squares of the median, are kept one by one; the others are summed. A row that crosses the
+median all the same changes the noise by 1/N, which affects only the weights in the tail. With a stated noise that the
+residual does not exceed, the median has no effect.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ class Judge(NamedTuple):
 class Choice:
     """Model that a diagnosis selected: P parameters of effects with their prior sizes, and the stated noise.
 
-    ``blocks`` are without columns; ``rivals`` are further effects of combinations that were nearly as probable;
-    ``measures`` is m, 3 for positions, 6 for poses. With a ``judge`` rows keep the weight that they had, and new ones
-    get theirs by the model of the diagnosis; without, every row is weighed by its distance from the present model.
+    ``blocks`` are without columns; ``rivals`` are further effects of the alternative combinations; ``measures`` is m, 3
+    for positions, 6 for poses. With a ``judge`` old rows keep their weights, and new rows are weighted by the model of
+    the diagnosis; without, all rows are reweighted by the present model.
     """
 
     blocks: tuple[Block, ...]
@@ -122,7 +122,8 @@ class WeightedRows:
 def linearised(rows: Campaign, point: Point, choice: Choice, *, rivals: bool = False) -> Array:
     """Design matrix (N, m, K + 1) of frames, effects, alternatives if ``rivals``; the residual is the last column.
 
-    In m and rad, and in units of each row's own noise over that of all. Zero for parameters of which no row tells.
+    In m and rad, and in units of each row's own noise over that of all. Zero for parameters that these rows do not
+    determine.
     """
     blocks = choice.listed(rivals)
     if not rows.samples:

@@ -189,7 +189,7 @@ def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
 def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
     """Conformal residual size (3,) per axis: with the parameters' variance, 1.96 of it hold 95 % of the residuals.
 
-    The axes differ as their rms does; rows set aside count in the share, and not in that.
+    The ratio of the axes is that of their rms without outliers; outliers count in the 95 %.
     """
     size = np.log(np.mean(left[kept] ** 2, axis=0) + settings.TINY) / 2.0
     # a rms of K numbers is known to 1/√2K: axes differ by what exceeds that (James and Stein)
@@ -215,7 +215,7 @@ def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | Non
 def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Effect, Array], ...]:
     """Fading effects with the part that the fitted frames absorb where they fade; unchanged if some do not fade.
 
-    The frames take over of a column what they do as they are fitted without it, by the products of all columns.
+    That part is the least-squares projection of each column on the frames.
     """
     fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
     if len(fading) < len(held):

@@ -10,8 +10,7 @@ with C that of the parameters. Each test has its share of one stated chance.
 * Gross errors among them are as frequent as before: negative binomial, with Jeffreys' prior.
 * Order statistics: rows outside of what was measured are as many as chance puts there.
 
-Where the residual is more alike in neighbouring rows than noise is, its mean square scatters more between blocks of
-rows than χ² says; the first two allow as much.
+Autocorrelated residuals make sums of squares of blocks overdispersed; the first two tests are corrected for it.
 """
 
 from __future__ import annotations
@@ -217,8 +216,7 @@ def runners_up(fit: Fit) -> list[tuple[int, ...]]:
 def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
     """Choice of a diagnosis with its effects in their settings, and the alternative combinations.
 
-    Where a discrepancy was found beside them, rows keep the weight that they had: it took part in weighing them, and is
-    told from all rows together.
+    With a discrepancy in the model, rows keep their weights, which depend on it.
     """
     e, near, prior = (
         fit.explanation,
@@ -317,7 +315,7 @@ _BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = W
 def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
     """Return the initial state of updates to a diagnosis; passes over its rows once.
 
-    Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
+    Only alternatives that are less probable than the choice are followed.
     """
     if not independent_rows(fit):
         raise EstimationError(
@@ -447,7 +445,7 @@ class Updated:
     def choice_stands(self) -> bool:
         """Whether all tests accept the effects, settings and places of the diagnosis.
 
-        What new rows said against it stays; that other effects explain all rows better may change with more rows.
+        A failed test is permanent; the comparison with other effects may change with more rows.
         """
         return not self.reason
 

@@ -117,7 +117,8 @@ def is_frame(found: Sequence[Finding], name: str) -> bool:
 class Refused:
     """Effect removed by cross-validation: its probability and its held-out share.
 
-    The share is ``None`` where scatter of joints had feigned it, it stayed in question, or nothing determined it.
+    The share is ``None`` where scatter of joints imitated the effect, it stayed uncertain, or the data did not
+    determine it.
     """
 
     probability: float
@@ -146,7 +147,7 @@ class AnotherModel:
     """Robot that was measured, as far as the table distinguishes it from the URDF's.
 
     Its links are ``factor`` times as long, if all alike; ``joint`` is ``off`` m from its place in the URDF, the
-    farthest. A robot at hand that ``fits``, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
+    farthest. A shipped robot that ``fits``, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
     ``remains``, m.
     """
 
