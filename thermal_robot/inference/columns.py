@@ -23,10 +23,9 @@ from thermal_robot.observations import Observations
 class Block:
     """The P parameters of one effect, in one setting of its nonlinear arguments, as columns (N, m, P).
 
-    ``source`` is the columns, or the observations from which they are computed whenever asked for, as those of all
-    settings would fill the memory. ``bare`` are the parameters without responses, ``sizes`` (P,) their expected sizes
-    with the campaign's ``[priors]``, ``spread`` the standard deviation of the logarithm of their common factor, at most
-    ``largest_scale``.
+    ``source`` is the columns, or the observations from which they are recomputed on demand to save memory. ``bare`` are
+    the parameters without responses, ``sizes`` (P,) their expected sizes with the campaign's ``[priors]``, ``spread``
+    the standard deviation of the logarithm of their common factor, at most ``largest_scale``.
     """
 
     effect: Effect
@@ -92,7 +91,7 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     """Return the derivative (N, m, f) of the gap by the unknown frames, and the name of each column.
 
     Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
-    measured. Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
+    measured. With a simulator's prediction, which includes the tool, the tool is not fitted.
     """
     campaign, names = observations.campaign, unknown_frames(observations.campaign)
     measures = 6 if campaign.measures == "pose" else 3

@@ -11,14 +11,13 @@ the stated noise, and log-normal about the stated sizes, with a factor κ that a
 
     ln λ_b ~ N(ln κ, σ_b²) ,  ln κ ~ N(0, σ_κ²) ,  so that  ln λ ~ N(0, C) ,  C = diag(σ_b²) + σ_κ² 11ᵀ ,
 
-cut off where no robot reaches; ln λ is integrated out by Laplace's method, s held.
+truncated at the largest plausible size; ln λ is integrated out by Laplace's method, s held.
 
-A parameter that is at least zero has half a normal prior, of twice the density. The mode is looked for on that side: a
-column that would be negative is dropped (block principal pivoting, Portugal, Júdice and Vicente, *Mathematics of
-Computation* 63, 1994). What the side is worth is taken column by column, each along its own normal: with mean m and
-deviation σ of a column that stays beside the others that stay, log 2Φ(m/σ); of one that is dropped, with the slope −g
-and the curvature h of the log posterior at zero, log 2/(λ√h) + g²/2h + log Φ(−g/√h). For a single column both are
-exact, and the same.
+A non-negative parameter has a half-normal prior. The mode is constrained: a column that would be negative is dropped
+(block principal pivoting, Portugal, Júdice and Vicente, *Mathematics of Computation* 63, 1994). The factor of each half
+line is approximated column by column: with mean m and deviation σ of a free column, log 2Φ(m/σ); of a dropped one, with
+the slope −g and the curvature h of the log posterior at zero, log 2/(λ√h) + g²/2h + log Φ(−g/√h). For a single column
+both are exact, and the same.
 """
 
 from __future__ import annotations
@@ -67,9 +66,9 @@ class Columns:
 class Posterior:
     """Posterior of the parameters of one combination at given scales and noise: mode, and covariance about it.
 
-    Of a dropped column (``free`` (D,) False) zero, and its mean square. ``log_volume`` is the log of the posterior's
-    volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth; ``effective`` per block, how many of its
-    columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
+    Of a dropped column (``free`` (D,) False) the mode is zero, with its mean square. ``log_volume`` is the log ratio of
+    posterior to prior volume: −½ log|I + Λ G/s²|, and the factors of the half lines; ``effective`` per block, how many
+    of its columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
     """
 
     values: Array
@@ -84,7 +83,7 @@ class Posterior:
     def at(cls, columns: Columns, scale: Array, variance: float, free: Mask | None = None) -> Posterior:
         """Solve (G/s² + Λ⁻¹) θ = b/s² under non-negativity constraints; ``free`` is a first guess of the inactive ones.
 
-        Raises :class:`EstimationError` if rounding hides what the columns bring.
+        Raises :class:`EstimationError` if rounding errors dominate.
         """
         size, count = len(columns.vector), len(scale)
         free = np.ones(size, dtype=bool) if free is None else free
@@ -142,7 +141,7 @@ class Posterior:
     def step(self, bend: Array, scale: Array, tight: Array) -> tuple[Array, float]:
         """Newton step of ln λ, each component at most one, and the gain that a quadratic model predicts.
 
-        Where that is not convex, the step is of each scale for itself.
+        Where the problem is not convex, each scale steps separately.
         """
         slope = self.fitted - self.determined - tight @ np.log(scale)
         _, step, failed = dposv(bend, slope) if len(scale) else (None, slope, 0)
@@ -412,7 +411,7 @@ def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, law
 def _log_volume(bend: Array, law: ScalePrior) -> float:
     """Laplace approximation, −½ log|Rᵀ H R| with C = R Rᵀ: posterior over prior volume of ln λ with prior N(0, C).
 
-    H leaves out that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
+    H neglects the dependence of s on λ and higher orders: both within about 0.1 for well determined blocks.
     """
     peak = np.linalg.eigvalsh(law.root.T @ bend @ law.root)
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

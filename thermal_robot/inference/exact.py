@@ -1,7 +1,7 @@
 """Model selection at the exact fit: choose effects, refine their constants, refit, and choose again.
 
-The exact fit is by Levenberg and Marquardt's steps over frames and parameters, priors held at their scales. Constants
-that are no linear parameters, such as a lag, are moved by coordinate search until the evidence gains nothing more.
+The exact fit is by Levenberg-Marquardt over frames and parameters, at fixed prior scales. Nonlinear constants, such as
+a lag, are refined by coordinate search on the evidence.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def gauss_newton(
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
     """Refit frames and parameters of the nonlinear model by Gauss-Newton, with fixed prior scales.
 
-    It begins at the (P,) values of a linear fit (``held``); where it then ends worse than ``since``, about which the
-    explanation was linearised, it begins there. It ends at a step of ``settled`` standard deviations.
+    Starts at the (P,) values of a linear fit (``held``); if the result is worse than ``since``, the linearisation
+    point, it starts there instead. Ends at a step of ``settled`` standard deviations.
     """
     observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
     if since is not None:
@@ -112,8 +112,7 @@ def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> 
     """Ridge step that minimises |gap − design step|² + |(state + step)/prior|², and its effect in units of noise.
 
     ``products`` are those of the columns of the design and of the gap, the last. The first columns have no prior.
-    Directions that nothing determines are not moved. A step along directions that do nearly the same moves little,
-    however long it is.
+    Undetermined directions are not moved.
     """
     matrix, vector = products[:-1, :-1].copy(), products[:-1, -1].copy()
     flat = len(matrix) - len(prior)
@@ -134,10 +133,9 @@ def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[t
 def refined(explanation: Explanation, observations: Observations, factor: float) -> list[tuple[Effect, Array]]:
     """Maximise the evidence over the constants of the chosen effects by coordinate search.
 
-    Of one effect after another settings nearby are tried. Where none is better by 0.1 nat they move closer, the
-    logarithm of ``factor`` (above 1) halved, until a parabola through them promises no more. Rows set aside are heard
-    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. Returns
-    the effects with their (P,) values.
+    For each effect in turn, neighbouring settings are tried; if none gains 0.1 nat, the logarithm of ``factor`` (above
+    1) is halved, until a parabola through them predicts no gain. Outliers are down-weighted instead of left out, as a
+    wrong constant makes outliers of the very rows that determine it. Returns the effects with their (P,) values.
     """
     kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
@@ -172,7 +170,7 @@ def weighed(kept: Products, blocks: Sequence[Block]) -> float:
 def heard(explanation: Explanation) -> Whitening:
     """Whitening in which outliers are down-weighted instead of left out, unless a smooth discrepancy is in it.
 
-    What is anew in every pose counts for nothing: a constant that is a little off leaves just that.
+    A per-pose discrepancy is left out of it, as it would absorb the residual of a slightly wrong constant.
     """
     whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
     if form is not None and form.anew:
@@ -243,8 +241,8 @@ def settle(
 ) -> Settled:
     """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
 
-    It begins at ``start``, the exact model of effects that are ``held`` with their values, and with the weights that
-    were found there ``before``. The first search starts from each of the ``starts``, by default from what is held.
+    Starts at ``start``, the exact model of the effects ``held`` with their values, and at the weights of the
+    explanation ``before``. The first search starts from each of the ``starts``, by default from the effects held.
     """
     campaign, observations, held = start.campaign, start, list(held)
     begun = list(dict.fromkeys(effect for one in starts for effect in one))
@@ -309,8 +307,8 @@ def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
 def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
     """Yield the alternatives of a setting that compete with it while its constants are refined.
 
-    One place more, less or another, other places alone, and all places; its places, and each of them, in other
-    settings. Of a law, all that were compared with it.
+    These are: one place more, less or exchanged, single places, all places, and other settings of its places. Of a law,
+    all laws compared with it.
     """
     if chosen.share is not None:
         yield from settings_of
@@ -334,7 +332,7 @@ def _listed(
 ) -> Iterator[Block]:
     """Yield the blocks of all settings but those that the data or the unknown frames leave undetermined.
 
-    What is kept stays in any case.
+    Those ``kept`` stay in any case.
     """
     frames, names = frame_columns(observations)[0], observations.robot.joint_names
     basis = orthonormal(equations_of(frames))

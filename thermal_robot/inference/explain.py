@@ -1,6 +1,6 @@
 """Bayesian model selection: effects, outliers, noise and a correlated discrepancy, iterated until they are consistent.
 
-Combinations of effects are searched beside every size and form of a discrepancy, in one memo, and their evidence is
+Combinations of effects are searched for every kernel and amplitude of a discrepancy, in one memo, and their evidence is
 summed over these.
 """
 
@@ -44,7 +44,7 @@ class Ladder:
     """Model search over combinations of blocks and over kernels and amplitudes of a discrepancy.
 
     ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
-    contains the other; of ``among`` forms these are left, and keep their share of the prior.
+    contains the other; ``among`` is the number of kernels that share the prior, of which ``forms`` are left.
     """
 
     linear: Linear
@@ -107,7 +107,7 @@ class Ladder:
     def _consider(self, form: Form, log_prior: float) -> int:
         """Add a kernel, whose prior is divided among its amplitudes; return its number.
 
-        Products with all columns are kept where they are few: not those with what is anew in every pose.
+        Products with all columns are cached, but not for per-pose kernels, which have too many.
         """
         self.forms.append(form)
         w = self.whitening
@@ -150,7 +150,7 @@ class Ladder:
     def run(self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True) -> tuple[Rung, Combination]:
         """Hill climbing over combinations and discrepancies from several starts.
 
-        With ``detours`` what single steps miss is looked for, too.
+        With ``detours`` larger moves are tried, too.
         """
         first = self.beside(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
@@ -171,7 +171,7 @@ class Ladder:
     def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
         """Extend a per-pose discrepancy to several joints, one after another; return an improvement, if any.
 
-        Once beside the best combination and once beside none, so that neither has the sizes that suit the other.
+        Tried with the best combination and with none, since the amplitudes of one need not suit the other.
         """
         if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
             return None
@@ -294,7 +294,7 @@ class Ladder:
     def in_question(self, best: Combination) -> tuple[Form, ...]:
         """Kernels with substantial posterior probability beside the best combination.
 
-        One whose most probable size is the smallest is noise, and one that is far less probable is out of the question.
+        A kernel whose most probable amplitude is the smallest is noise; one that is far less probable is left out.
         """
         peaks: dict[int, tuple[float, float]] = {}
         for ((form, tau), blocks), log in self._quick.items():
@@ -323,8 +323,8 @@ class Ladder:
     def weigh_pairs(self, rung: Rung, best: Combination) -> None:
         """Evaluate pairs of changes of the best combination of which each alone is uncertain.
 
-        Of two effects in doubt that have nothing to do with each other, both may be at work. Left out, each would take
-        from the probability of the other.
+        Two uncertain effects that are independent may both be at work; without such pairs each would lower the
+        probability of the other.
         """
         search = self.beside(rung)
         own = set(best.blocks)
@@ -381,7 +381,7 @@ class Ladder:
     def _masses(self) -> dict[Rung, list[tuple[float, Combination]]]:
         """Log evidence of all combinations for each discrepancy, weighted by the amplitudes that it represents.
 
-        A sum over all sizes by those that were computed: each stands for those that are nearer to it than to another.
+        Sum over all amplitudes by those computed: each represents the amplitudes nearest to it.
         """
         seen = {rung: list(search.seen.values()) for rung, search in self.searches.items()}
         best = max((c for own in seen.values() for c in own), key=lambda c: c.log_evidence)
@@ -483,10 +483,10 @@ def explain(
     """Bayesian model selection of blocks together with outliers, noise and a correlated discrepancy.
 
     Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
-    (N,) bear on nothing. Blocks of one family are settings that exclude each other and share its prior probability.
-    ``starts`` and ``outliers`` are where the search starts. Where a problem like it was explained ``before``, its
-    weights and noise are kept, and of the forms those that it left in question; where the first of the starts comes out
-    again beside the same form, that is the answer. ``log_prior`` is by default that of the blocks' effects.
+    (N,) are ignored. Blocks of one family are settings that exclude each other and share its prior probability.
+    ``starts`` and ``outliers`` are where the search starts. With an explanation of a similar problem ``before``, its
+    weights, noise and plausible kernels are reused; if the first of the starts is found again with the same kernel, the
+    iteration ends. ``log_prior`` is by default that of the blocks' effects.
     """
     samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
@@ -596,8 +596,8 @@ class _Round:
     def told(self, aside: NDArray[np.bool_]) -> Explanation:
         """Explanation of this round.
 
-        Settings and values are those that correct best: beside a smooth discrepancy, which is no part of the
-        correction, the effects are fitted as if there were none, at a noise that holds it.
+        Settings and values are those of the best correction: with a smooth discrepancy, which no correction contains,
+        the effects are refitted without it, at a noise that includes it.
         """
         linear, ladder = self.asked.linear, self.ladder
         rung = self.rung if self.form is None or self.form.anew else PLAIN
@@ -642,9 +642,8 @@ def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
 def log_priors(effects: Sequence[Effect]) -> list[float]:
     """Log prior odds of each setting of an effect: a share of the odds of its name.
 
-    An effect is as likely in all its places as in one of them, in two half as likely, in three half of that; places are
-    alike, and settings of the same places share by their weight. What is listed beside a setting in other places does
-    not change its share.
+    An effect is as probable in all its places as in one, half as probable in two, and so on; places are exchangeable,
+    and settings of the same places share by weight. The share does not depend on settings in other places.
     """
     single: dict[str, set[str]] = {effect.name: set() for effect in effects}
     for effect in effects:

@@ -1,9 +1,8 @@
 """The whole fit: frames, joint model selection of effects, and Gauss-Newton on the exact model.
 
-Effects are selected (:func:`fit`, :func:`refit`, :func:`less`) or named (:func:`fit_named`). In the latter all are at
-work, whatever the data say for each: they are fitted in one linear problem with noise and prior scales at their most
-probable values and rows far off set aside, then by the exact model; from there again, until the same rows are set
-aside.
+Effects are selected (:func:`fit`, :func:`refit`, :func:`less`) or named (:func:`fit_named`). Named effects are all
+kept: fitted in one linear problem with most probable noise and prior scales, then by the exact model, repeatedly until
+the outliers converge.
 """
 
 from __future__ import annotations
@@ -97,7 +96,7 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
 def less(known: Fit, *names: str) -> Fit:
     """Backward elimination: fit without some effects, the others selected anew in the same linear problem.
 
-    Weights and all that was weighed stay; the choice is fitted exactly.
+    Weights and memo are reused; the selection is fitted exactly.
     """
     explanation = known.explanation.without([b for name in names for b in known.blocks_of(name)])
     linear = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
@@ -158,11 +157,11 @@ Held = list[tuple[Effect, Array]]
 def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
     """Fit the unknown frames and all of these effects, without model selection.
 
-    One that lies in another and is told inside it (:attr:`Effect.told_inside`) is not fitted beside it: it stands in
-    the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it. Constants that are no linear
-    parameters start at the most probable setting in all places. Raises :class:`EffectError` where the campaign lacks
-    what an effect needs, or one breaks the contract; :class:`EstimationError` where poses are too few for the frames,
-    or nothing is determined.
+    An effect contained in another one and reported inside it (:attr:`Effect.told_inside`) is not fitted separately: it
+    is among the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it. Constants that are no
+    linear parameters start at the most probable setting in all places. Raises :class:`EffectError` where the campaign
+    lacks what an effect needs, or one breaks the contract; :class:`EstimationError` where poses are too few for the
+    frames, or nothing is determined.
     """
     progress("unknown frames")
     require_enough(campaign)
@@ -232,7 +231,7 @@ def _explained(
 ) -> Explanation:
     """Explanation by all of these effects: noise, scales, values and outliers, iterated to convergence.
 
-    Where they were explained ``before`` nearby, it begins with the weights and scales that were found there.
+    Starts at the weights and scales of a nearby explanation ``before``, if any.
     """
     noise, use = Noise.of(observations.campaign), np.ones(observations.campaign.samples, dtype=bool)
     linear = at_exact_model(observations, [block(observations, effect).held for effect in effects], held)

@@ -2,7 +2,7 @@
 
 Change points: every run of rows in the order of measurement is weighed at every place by a likelihood ratio (Page,
 *Biometrika* 42, 1955, for one change; Siegmund, *Annals of Statistics* 14, 1986, for a run between two), from
-cumulative sums. Rows that were set aside near each other count fully: they are what is to be explained.
+cumulative sums. Clustered outliers count fully, as they may be the event.
 
 Ripple: a matching pursuit (Mallat and Zhang, *Matching pursuits with time-frequency dictionaries*, 1993) over all
 joints and orders at once, all that is known fitted anew beside each wave.
@@ -123,7 +123,7 @@ class _Sums:
     def shared(self, rows: Rows) -> float:
         """Log evidence of a displacement of rows (N,), or if smaller that without the few farthest rows.
 
-        In an event all rows share, in gross errors side by side a few.
+        All rows contribute to an event, but only a few to consecutive gross errors.
         """
         few, far = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE), self.squares * rows
         out = np.argsort(-far)[:few]
@@ -159,8 +159,8 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
 def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
     """Yield residuals, of all rows but single outliers, and the gain that an event in each must exceed.
 
-    Once as these rows stand, once less of what is far off; and without each effect, which may stand in for an event:
-    that has to gain more than the effect does.
+    Twice with all effects, with and without down-weighting of far rows; then without each effect, which may imitate an
+    event: the event must gain more than the effect.
     """
     e = fit.explanation
     single = e.outliers & ~gathered(fit, e.outliers)
@@ -258,11 +258,10 @@ class HeldOut:
 def waves(fit: Fit) -> JointRipple:
     """Ripple of the joints in the residual of a fit, by matching pursuit; without waves where none is significant.
 
-    The chance of the best of so many orders counts: a wave costs the logarithm of the number of independent orders of
-    all joints (Baluev, *MNRAS* 385, 2008), one that another joint has that of the number of such waves. It must gain
-    that in all equations, and in one a row, the part of the remainder that goes with the joint: what else is left is
-    rarely independent in the components of a pose. And rows held out by time must be left with no more than without
-    it, regions held out with hardly more.
+    A wave must gain more log evidence than the logarithm of the number of independent orders of all joints (Baluev,
+    *MNRAS* 385, 2008), or, at the order of another joint's wave, of the number of such waves. It must do so in all
+    equations and in one equation a row, along the joint, since the components of a pose are rarely independent. The
+    held-out residual must not grow by time, and hardly by region.
     """
     thin = Thin.of(fit)
     others = [b for b in fit.explanation.best.blocks if not isinstance(thin.linear.blocks[b].effect, JointRipple)]
@@ -358,7 +357,7 @@ class _Pursuit:
     def _wider(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
         """Add the wave of the largest gain that does not harm held-out rows; ``None`` where none qualifies.
 
-        ``astray`` (S,) is what rows held out are left with by each scheme, times the least that any wave before left.
+        ``astray`` (S,) is the held-out residual of each scheme over the smallest so far.
         """
         along = {joint: _along(target, self._moves(joint)[1][:, :, 0]) for joint in self.grids}
         root, columns = target.root[:, :, None], self._columns(found)
@@ -403,7 +402,7 @@ class _Pursuit:
     def _peaks(self, target: Target, found: Sequence[_Wave], seen: Sequence[_Wave]) -> Iterator[_Wave]:
         """Yield each joint's best new wave, and its best at the orders of other joints.
 
-        Joints of one size have gears of one kind: a wave that another joint has is one of few.
+        Joints often have gears of one kind, so that a wave at another joint's order is one of few.
         """
         for joint, grid in self.grids.items():
             q, moves = self._moves(joint)
@@ -509,8 +508,8 @@ class Discovery:
 def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[Discovered, ...]:
     """Candidate laws by log evidence, best first; possible events before all others.
 
-    Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
-    each effect: known effects may have absorbed an unlisted cause. A law is called ``discovered.<number>``.
+    Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
+    have absorbed an unlisted cause. A law is called ``discovered.<number>``.
     """
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))

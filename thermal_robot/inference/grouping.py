@@ -79,7 +79,7 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
 def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
     """Label (N,), 0..B−1, of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
 
-    A block is what a hold-out holds out at a time, and what its figures' uncertainty is told by.
+    Blocks are the folds of cross-validation, and the groups of the jackknife.
     """
     cluster = near_repeats(campaign)
     rank = np.empty(campaign.samples)

@@ -1,10 +1,9 @@
 """Reparametrisation of a fitted effect by smaller effects that it contains.
 
-A large effect has more parameters than the data determine: many do the same, alone or with the unknown frames. Of a
-list of parameters that are combinations of them, in the order in which a reader wants them, each is kept that the data
-see beside those before it, until together they do all that the effect does; no prior bears on those of an effect
-inside. For the geometry of robots such base parameters were listed by Khalil, Gautier and Enguehard (*Robotica* 9,
-1991).
+A large effect has more parameters than the data determine. From an ordered list of combinations of them, each is kept
+that the data determine in addition to those before it, until together they span the effect; the parameters of a
+contained effect have no prior. For the geometry of robots such base parameters were given by Khalil, Gautier and
+Enguehard (*Robotica* 9, 1991).
 """
 
 from __future__ import annotations
@@ -76,8 +75,8 @@ def _freed(
 ) -> tuple[Array, Array, Array]:
     """Values (k,), covariance (k, k) and prior deviations (k,) in other coordinates, some without their prior.
 
-    Of a posterior N(values, covariance) under the prior N(0, scale²), the likelihood is what the data say. With the
-    columns of ``across`` as new coordinates, the prior of those that are free is wide, that of the others the old one.
+    The likelihood follows from the posterior N(values, covariance) and the prior N(0, scale²). In the new coordinates,
+    the columns of ``across``, free ones have a wide prior, the others the old one.
     """
     tight = np.linalg.inv(covariance)
     data = across.T @ (tight - np.eye(len(tight)) / scale**2) @ across
@@ -95,7 +94,7 @@ def _inside(fit: Fit, effect: Effect) -> list[Effect]:
 def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Directions (P, D) of an effect that the data determine, parameters (D, W) in them, and which lie in their span.
 
-    All in prior sizes. What is no combination of the effect's parameters, as far as the data tell, is not in them.
+    All in prior sizes.
     """
     e, sizes = fit.explanation, np.array([p.size for p in wanted])
     asked = Block(item.effect, tuple(wanted), moved_by(fit.corrected, wanted), sizes)

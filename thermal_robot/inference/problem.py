@@ -132,7 +132,7 @@ def normal_equations(
 def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[int, ...]]:
     """Directions of each block that the data determine, and their number.
 
-    Where a parameter of it cannot be negative, each parameter that the data see is a direction by itself.
+    In a block with non-negative parameters, each determined parameter is its own direction.
     """
     bases, ranks, parameter = [], [], 0
     for item in linear.blocks:
@@ -197,8 +197,8 @@ def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
     """Nested pairs of blocks: the smaller lies, as far as the data can tell, in the span of the larger.
 
-    The two are confounded and never named together. The smaller is preferred where it suffices; otherwise the larger
-    stands for both. One with parameters that cannot be negative does not span what its columns do: it contains none.
+    The two exclude each other; the smaller is preferred where it suffices. A block with non-negative parameters
+    contains none, as it does not span its columns.
     """
     matrix, slices = problem.matrix, problem.slices
     sizes = np.array(problem.ranks, dtype=int)
@@ -274,8 +274,7 @@ def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
 class Products:
     """Memo of Gram matrices for many selections of blocks with the same gap, frames and whitening.
 
-    A block that takes the place of another costs its own columns and their products with the others. What is kept of a
-    block goes with it.
+    A block exchanged for another one costs its own products alone. The memo of a block is freed with it.
     """
 
     def __init__(self, linear: Linear, whitening: Whitening) -> None:

@@ -1,8 +1,7 @@
 """Registration: fit of the unknown base and tool frames, before any effect.
 
-From nothing, the rigid alignment of the base and the place of the target go by turns: each of the two is linear while
-the other is held, and a third of the rows may be grossly wrong. Starts go side by side, each until its own median
-distance settles: what one start finds does not depend on the others.
+The rigid alignment of the base and the linear fit of the target's place alternate, robust to a third of gross errors.
+Starts run side by side, each until its own median distance converges, independently of the others.
 """
 
 from __future__ import annotations

@@ -162,9 +162,8 @@ class Likelihood:
     def log_widths(self, fitted: Fitted) -> float:
         """Log ratio of posterior to prior width, summed over all variances but the instrument's.
 
-        A priori the logarithm of each is anywhere on the grid. Laplace's width where the data determine it to a factor
-        of e; where they but bound it, the mean of the likelihood over the grid, as what is far below the noise is seen
-        by nothing.
+        The prior of each logarithm is uniform on the grid. Laplace's approximation where the data determine it to a
+        factor of e; where they only bound it, the mean of the likelihood over the grid.
         """
         grid, total, at = _GRID[::2], 0.0, self.density(fitted.components)
         for k in range(len(self.stated), len(fitted.logs)):
@@ -346,8 +345,8 @@ def variance_components(
     and u (``pose``) once a commanded pose. Evidence of a component is Laplace's in the logarithm of its standard
     deviation, which beforehand is anything between a tenth and a hundred times the noise, so that the bound at zero is
     infinitely far (Kass and Raftery, *Bayes Factors*, 1995, §4.1). Joints are added one by one while the posterior
-    grows; whatever was compared shares the probability. Without repeats u and v cannot be told apart: only ``pose`` is
-    asked for. Of very many rows, whole poses drawn at random stand for all.
+    grows; probabilities are over all sets compared. Without repeats u and v are confounded, and only ``pose`` is
+    estimated. Very many rows are represented by a random sample of whole poses.
 
     ``residual`` (N, m), m and rad, m = 3 or 6; ``sensitivity`` (N, m or 6, n), Jacobian of the joints at the target, in
     the same axes; ``noise`` (m,), held near that where ``stated``, for all or for every three axes; ``pose`` (N,),
@@ -443,8 +442,8 @@ class _Search:
     def run(self, start: Sequence[Component]) -> _Search:
         """Stepwise search from the empty set, from a start, and, if the noise stays too large, from all joints.
 
-        Of one variance alone, what visits have in common may pass for it; several that scatter alike may pass for a
-        larger noise, beside which none of them alone brings much.
+        The variance common to visits may imitate a single component; several similar ones may imitate a larger noise,
+        with which no single one gains much.
         """
         within = self._candidates()
         for begin in dict.fromkeys(((), tuple(c for c in start if c in within))):
@@ -569,7 +568,8 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
 class Steps:
     """Step of an encoder, rad or m, and the log Bayes factor of quantisation against none.
 
-    Where none is seen the distance is what the errors' size implies, and the factor 0 where it cannot be asked.
+    Without visible steps the distance is that implied by the size of the errors; the factor is 0 where it cannot be
+    computed.
     """
 
     step: float
@@ -654,8 +654,8 @@ def _sums(weights: NDArray[np.complex128], place: Array, lowest: float, width: f
 def stepped(log_factors: Iterable[float]) -> float:
     """Posterior probability that per-pose errors of the joints are quantisation by their encoders.
 
-    From the log Bayes factor of each joint, of which some steps may stay hidden. That later visits of a pose find the
-    same error does not tell steps.
+    From the log Bayes factor of each joint, allowing for steps that stay hidden. Repeatable errors alone are no
+    evidence of steps.
     """
     shown = np.log1p(-settings.STEPS_HIDDEN) + np.array(list(log_factors), dtype=float)
     return float(expit(np.logaddexp(shown, np.log(settings.STEPS_HIDDEN)).sum() - np.log(settings.RIVALS)))
@@ -673,10 +673,10 @@ class Kept:
 class RandomGap:
     """Random part of the gap beyond the instrument, by the variance components of ``scatter``.
 
-    ``kept`` are its components that are scatter. ``explains_size``: no more is left than instrument and scatter allow,
-    by a χ² test (``p_value``); what poses bring counts where it is more probably an encoder's. By joint: ``steps``, the
-    log Bayes factor of steps of the command against errors that follow nothing, and ``laws``, the quantity that its
-    errors follow, so that they are no scatter. ``note`` says what limits the answer.
+    ``kept`` are its components that are scatter. ``explains_size``: the gap is no larger than instrument and scatter
+    allow, by a χ² test (``p_value``); per-pose errors count where they are more probably an encoder's. By joint:
+    ``steps``, the log Bayes factor of steps of the command against errors that follow nothing, and ``laws``, the
+    quantity that its errors follow, so that they are no scatter. ``note`` says what limits the answer.
     """
 
     kept: tuple[Kept, ...]
@@ -744,7 +744,8 @@ def _stands(
 ) -> tuple[Scatter, Rows, list[int]]:
     """Sensitivity of the scatter to its few most influential rows: real scatter is in all rows.
 
-    Returns it, the rows that count, and the joints of which a few rows had told it: it is then that of the other rows.
+    Returns the scatter, the rows that count, and the joints whose scatter only a few rows supported; these rows are
+    then left out.
     """
     if not scatter.components:
         return scatter, used, []
@@ -781,8 +782,8 @@ def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None
 def _even(fit: Fit) -> Array:
     """Divisors (N, m) that give all rows the same noise.
 
-    Of rows that repeat a pose it is their root mean square: what the pose brings then cancels in their contrasts, as it
-    must, and the mean square of a contrast stays that of the noise.
+    For repeats of a pose it is their root mean square, so that per-pose errors cancel in contrasts, whose mean square
+    stays that of the noise.
     """
     relative = fit.campaign.relative_noise
     if relative is None:
@@ -794,8 +795,8 @@ def _even(fit: Fit) -> Array:
 def _refitted(fit: Fit, scatter: Scatter, sensitivity: Array, used: Rows, even: Array) -> Array:
     """Residual (N, m) of generalised least squares, with the scatter in the covariance.
 
-    If the noise were taken for the instrument's alone, a joint that scatters would pull the frames far off, and their
-    error would then count as scatter of the other joints.
+    With the instrument's noise alone, a scattering joint would bias the frames, and their error would count as scatter
+    of other joints.
     """
     e = fit.explanation
     blocks = [e.linear.blocks[b].columns * e.linear.blocks[b].sizes for b in e.best.blocks]
@@ -819,7 +820,7 @@ def _judge(
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
     """Classify components: those that follow a law, and scatter; with the evidence for encoder steps of each joint.
 
-    What was fitted took errors of the poses with it: a share of so many parameters in all that was measured of them.
+    The fitted parameters absorb a share of the per-pose errors: their number over that of the measurements.
     """
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()

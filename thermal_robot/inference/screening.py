@@ -303,10 +303,9 @@ def shapes(
 ) -> list[Discovered]:
     """All shapes of a law that may suffice: its own, smooth, and simpler ones, each once.
 
-    Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
-    positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
-    position also harmonics of the given orders. Of labels also one that is apart from the others. Of two quantities
-    their product alone. Of what a joint remembers elements that slip.
+    Always straight, quadratic, and hinges at quantiles of the quantity; with ``jumps`` (positions, gravity, clock) also
+    steps and bumps; of a velocity its sign; of a joint's own position harmonics of the given orders; of labels one that
+    differs from the others; of two quantities their product alone; of a joint's memory stop operators.
     """
     if law.shape == "constant":
         return [law]
@@ -345,7 +344,8 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
     """Laws of stop operators (hysteresis) of a joint: coarse over the whole range, or neighbours of one.
 
-    Which show, ``values`` (N,) tell, rad or m from the last turning point; one between two is nearly their sum.
+    ``values`` (N,), rad or m from the last turning point, decide which are observable; an element between two is nearly
+    their sum.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)
@@ -388,9 +388,8 @@ def smooth_columns(values: Array) -> Array:
 def orders(q: Array, slides: bool = False) -> Array:
     """Grid (K,) of wave orders of a joint, rad per rad, or rad/m for a prismatic joint.
 
-    They stand a quarter of a peak's width apart, and end where the positions (N,) could no longer tell an order from
-    its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
-    looked at up to :data:`settings.MOST_ORDERS` of them.
+    The spacing is a quarter of a peak's width, the upper end the Nyquist order of the positions (N,): π/d on a lattice
+    of spacing d (Shannon). At most :data:`settings.MOST_ORDERS` of them.
     """
     if not moves(q):
         return np.zeros(0)
@@ -513,8 +512,8 @@ class Thin:
     def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
         """Residual with the frames and some blocks projected out.
 
-        Rows far from the rest weigh little, unless they follow each other, or all but the farthest few are taken for
-        ``sound``: what is large in few rows looks like gross errors until its law is known.
+        Far rows have Cauchy weights, unless they are consecutive, or all but the farthest few are ``sound``: a law that
+        is large in few rows looks like gross errors.
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
@@ -530,7 +529,7 @@ class Thin:
 def conditions(observations: Observations, joint: str = "") -> list[str]:
     """Quantities of the campaign that may act on a place: recorded ones, the clock and the session.
 
-    Of those recorded for each joint, a joint's own; what another joint does is no condition of this one.
+    Of quantities recorded for each joint, only this joint's.
     """
     robot = observations.robot
     others = tuple(f".{name}" for name in robot.joint_names if name != joint)
@@ -541,9 +540,8 @@ def conditions(observations: Observations, joint: str = "") -> list[str]:
 def modulated(observations: Observations, effects: Iterable[Effect] | None = None) -> list[Discovered]:
     """Laws of known effects whose size in one joint is modulated by a condition or position.
 
-    Left out: effects whose response is the same in all rows, as times a law they are a plain law of that joint; what
-    drives the effect itself, as lost motion times the direction of approach is a zero that is off; an effect that is
-    not installed, as a saved law could not be read.
+    Left out are effects with a constant response, which modulated are plain laws of that joint; the driver of the
+    effect itself, as backlash times the direction of approach is a zero error; and effects that are not installed.
     """
     installed = library()
     offered = installed.values() if effects is None else effects
@@ -691,11 +689,10 @@ def scan(
 ) -> tuple[list[list[Scanned]], int]:
     """Scan of all candidate laws: for every target sorted by :attr:`Scanned.worth`, and the number tried.
 
-    Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
-    joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
-    quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
-    there. Left out are laws that are no better than what they contain: an effect that changes than the effect itself in
-    that joint, a product than one of its quantities.
+    Candidates are a smooth and a straight law of each quantity at each place; waves of any order and memory of each
+    joint; known effects modulated in one joint; products of two quantities. At segments, whose laws have six
+    components, only the best quantities are tried. Dropped are laws no better than what they contain: a modulated
+    effect than the effect itself, a product than one of its quantities.
     """
     seats = Seats(observations, targets)
     kinds = _candidates(seats, effects)
@@ -790,8 +787,8 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
 def _timed(best: Scanned, seats: Seats) -> Scanned:
     """Move a step to the best of the gaps between neighbouring values.
 
-    A mark may lie anywhere in the range, so that each gap has its share of the prior: a break between two sessions has
-    more than the seconds between two rows.
+    The prior of the mark is uniform over the range, so that a long break between sessions has a larger share than a gap
+    between two rows.
     """
     law, followed = best.law, best.law.values(seats.observations)
     values = np.unique(followed if followed is not None else np.zeros(1))

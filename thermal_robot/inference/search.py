@@ -1,18 +1,17 @@
 """Hill climbing over combinations of blocks: neighbours are screened to first order, near ones evaluated exactly.
 
-A search climbs from a combination by adding, dropping and exchanging blocks. What a climb by single steps misses is
-looked for on purpose: two exchanges of which each alone brings nothing, one block that contains several smaller ones,
-and another setting of one block in place of two blocks.
+A search climbs from a combination by adding, dropping and exchanging blocks. Larger moves find what single steps miss:
+two exchanges of which neither gains alone, one block that contains several smaller ones, and another setting of one
+block in place of two blocks.
 
-What one block more would bring a combination is told for all blocks at once and to first order: the others stay. In
-the eigenvectors of a block's own information beside the others, w, with the vector c there, and with the noise s'² that
-it leaves,
+The gain of one more block is found for all blocks at once, to first order: the parameters of the others stay. In the
+eigenvectors of a block's information given the others, with eigenvalues w, the vector c, and the remaining noise s'²,
 
     (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
     gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
 
-Q = y'y − b'θ, and s₀ the same without the block. A column that cannot be negative has half a normal prior. Where it
-would be negative it stays at zero and explains nothing; then, and where it would not, it counts by itself for
+Q = y'y − b'θ, and s₀ the same without the block. A non-negative column has a half-normal prior. Where it would be
+negative it stays at zero; in both cases its own factor is
 
     log 2 Φ(z) ,  and at zero beside that  ½ z² − ½ log(1 + λ² w/s'²) ,    z = c λ/(s' (s'² + λ² w)^½) .
 
@@ -107,8 +106,8 @@ def _beside(
 def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) -> tuple[NDArray[np.bool_], _Sides]:
     """Mask of the columns not held at zero at their expected sizes, and single-column statistics of constrained ones.
 
-    A free one with its mean and variance beside all the others that are free, one that is held at zero with the pull
-    and the information that these leave it.
+    Of a free column its mean and variance given the other free ones; of one held at zero its gradient and information
+    given these.
     """
     free = ~sided | (pull > 0.0)
     for last in [*(False,) * settings.NOISE_ROUNDS, True]:
@@ -234,7 +233,7 @@ class Search:
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Hill climbing with larger moves, until no move improves.
 
-        Every neighbour of the best combination is weighed, so that its probability is against all of them.
+        All neighbours of the best combination are evaluated, so that its probability is relative to all of them.
         """
         best = self.climb(start)
         detours = (self._simpler, self._smaller, self._two_at_once, self._missed)
@@ -261,7 +260,7 @@ class Search:
     def _two_at_once(self, best: Combination) -> Combination | None:
         """Add two blocks, or exchange one for two; return an improvement, if any.
 
-        Of blocks that resemble each other one alone may bring nothing, and with a second one all.
+        Of similar blocks one alone may gain nothing, and two a lot.
         """
         for base in self._bases(best):
             first = sorted(self._with_one_more(base, best), key=lambda c: -c.log_evidence)[: settings.LOOKED_BEYOND]
@@ -277,7 +276,7 @@ class Search:
     def _beside_a_tie(self, best: Combination) -> Combination | None:
         """Evaluate the neighbours of near ties; return an improvement, if any.
 
-        Two effects that stand in for two others are told only so: with one of them exchanged there is little to choose.
+        This finds two effects that replace two others: with only one exchanged the evidence is nearly the same.
         """
         for tie in self.ties(best)[1:]:
             if tie.blocks in self._expanded:
@@ -303,7 +302,7 @@ class Search:
     def _simpler(self, best: Combination) -> Combination | None:
         """Replace one block by another setting that makes further blocks needless; return an improvement, if any.
 
-        A setting that does more, such as in one joint more, is worth its price only once what it replaces is gone.
+        A more general setting, such as one more joint, pays only once the blocks that it replaces are removed.
         """
         for b in best.blocks:
             for setting in self._apart.get(b, set()) - self.out:
@@ -359,8 +358,8 @@ class Search:
     def _promising(self, best: Combination, barred: frozenset[int] = frozenset()) -> list[Combination]:
         """Neighbours with one block more, less or exchanged that may improve the evidence, best first.
 
-        Those with a new block are known to first order, which tells too little where the others are stretched to do
-        what the new one would do: the best one in place of each block is among them, however little it promises.
+        Additions are scored to first order, which underestimates a block whose effect the others imitate: so the best
+        exchange for each block is always included.
         """
         bases = self._bases(best)
         found = {c.blocks: c for c in bases[1:] if self._near(c, best)}

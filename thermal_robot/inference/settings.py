@@ -1,6 +1,6 @@
 """Chosen numbers of inference and findings, each with its unit and reason.
 
-What is known of one effect stands in that effect's file.
+Numbers of a single effect are in its own file.
 """
 
 import numpy as np

@@ -44,8 +44,8 @@ def distance_limit(measures: int, rows: int) -> float:
 def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None = None) -> Array:
     """Robust standard deviation per axis, of positions and of orientations, from the median squared residual.
 
-    The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
-    of the figures differs, ``relative`` (N, m) says how.
+    Corrected for the ``leverage``, the share of the equations that was fitted. ``relative`` (N, m) is the relative
+    noise of each component, if it differs.
     """
     remainder = remainder if relative is None else remainder / relative
     parts = remainder.reshape(len(remainder), -1, 3)
@@ -88,7 +88,8 @@ def judged(
 ) -> tuple[Array, float, Array]:
     """Noise and degrees of freedom as :func:`settled_noise`, and squared distances (N,) of rows in its units.
 
-    ``remainder`` (N, m) is that of rows alike; what a median says of its noise is ``measured``, one sigma a part.
+    ``remainder`` (N, m) is scaled to equal noise; ``measured`` is its robust noise, one sigma for positions and one for
+    orientations.
     """
     sigma, held = settled_noise(measured, noise, measures)
     distance2 = ((remainder / far_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
