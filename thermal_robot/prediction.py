@@ -118,7 +118,7 @@ class Spread:
     def outside(self, samples: Campaign, effects: Sequence[tuple[Effect, Array]] = ()) -> tuple[tuple[str, ...], ...]:
         """Joints, columns and labels in which each row leaves the measured range (extrapolation).
 
-        Rows without a label stand at no level of it: that counts where one of the effects follows it.
+        A row without a label counts as outside if one of the effects follows that label.
         """
         followed = {effect.quantity for effect, _ in effects if isinstance(effect, Discovered) and effect.labels}
         joints = samples.robot.joint_names

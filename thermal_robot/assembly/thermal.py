@@ -487,7 +487,7 @@ def measured(words: Sequence[str]) -> NDArray[np.bool_]:
 def pseudo_inverse(system: Array) -> tuple[Array, int, NDArray[np.bool_]]:
     """Pseudo-inverse (S, m) of a system (m, S), its rank, and the mask (S,) of identified unknowns.
 
-    An unknown is determined alone where no combination that the system cannot see holds it.
+    An unknown is identified if it has no component in the null space.
     """
     left, singular, right = np.linalg.svd(system, full_matrices=True)
     rank = int(np.sum(singular > _RANK * np.max(singular, initial=0.0)))
@@ -595,7 +595,7 @@ def _pool(robot: Robot, candidates: ArrayLike | int, seed: int) -> Array:
 def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: str) -> list[int]:
     """Greedy choice followed by exchanges of one pose at a time.
 
-    Poses are added by determinant, which alone tells half-determined systems apart.
+    Poses are added by determinant, the one criterion that ranks underdetermined systems.
     """
     chosen: list[int] = []
     for slot in range(len(words)):

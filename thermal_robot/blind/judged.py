@@ -149,7 +149,7 @@ def is_right_law(record: Record, law: Plain) -> bool:
 def answer(record: Record) -> tuple[tuple[str, str] | None, str | None]:
     """Place and quantity of the unknown cause: of a discovered law, else of the unexplained residual.
 
-    Where something is called unexplained and follows nothing, that is ``none``.
+    The quantity is ``none`` where an unexplained residual follows nothing.
     """
     left = said(record)["unexplained"]
     laws = [e for e in said(record)["effects"] if e["name"].startswith(LAW)][:1]

@@ -193,8 +193,8 @@ LOOSE = 2.0  # Times the stated noise from which on targets are said to move aga
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
     """Poses of the rows from several targets, with sentences on what is left out or doubtful.
 
-    Refused are targets beside a simulator's, a place of which one or two figures lack, targets on a line in all rows,
-    and one that is never seen beside the others.
+    Errors: a simulator's prediction, incomplete coordinates, collinear targets in all rows, a target never seen with
+    the others.
     """
     several = columns.targets
     if names.SIMULATED_POSITION in columns.groups:

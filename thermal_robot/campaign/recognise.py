@@ -241,7 +241,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
     """Numbers of several targets, with warnings on those left out; empty where there is one.
 
-    Refused are an axis that lacks, too few targets, and one without a number beside them.
+    Errors: a missing axis, too few targets, a target without a number among numbered ones.
     """
     named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
     numbers = sorted({target[1] for target in named if target})

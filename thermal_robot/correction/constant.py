@@ -1,8 +1,8 @@
 """Constant part of a corrected model, which a robot file can hold.
 
-No effect is asked for by name: each parameter's unit responses are read in rows that differ in everything, and are
-constant where they are one number, or one twist, in all. Others are so at one temperature that has lasted: they are
-read again in rows of that one, and must change with it.
+No effect is known by name: the unit responses of each parameter are evaluated in rows in which everything varies, and
+are constant where they are equal in all. Others are constant at a steady temperature: they are evaluated again in rows
+at that temperature, and must depend on it.
 
 **Undetermined** constants can be taken out: each is set to zero as a piece of knowledge. What the posterior of frames
 and parameters, N(m, C), says of the others once θ_k = 0 is their conditional mean m − C_k m_k / C_kk and covariance
@@ -76,9 +76,9 @@ class Told:
 class Constant:
     """Part of a model that is the same in all configurations, at one temperature.
 
-    Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): what one unit of
-    each does in the joints, the segments, the base and the tool; zero where it is not constant. At ``temperature``, °C
-    of the robot, lengths hold; ``grows`` where any of it follows that.
+    Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): unit response of
+    each in the joints, the segments, the base and the tool; zero where it is not constant. ``temperature``, °C of the
+    robot, is that of the lengths; ``grows`` if any of it depends on that.
     """
 
     temperature: float
@@ -99,9 +99,8 @@ class Constant:
 def constant(model: CorrectedModel, temperature: float | None = None) -> Constant:
     """Constant part of a model: an effect at one place is constant as a whole, or not at all.
 
-    ``temperature``, °C, is that of all links, for long enough that they have it; by default that at which the URDF's
-    lengths hold. What a model takes for settled in all rows to come (a law of the session, or of the row's number)
-    counts as it was at the end of the campaign.
+    ``temperature``, °C, is the steady temperature of all links; by default that of the URDF's lengths. Laws of the
+    session or of the row's number count as at the end of the campaign.
     """
     degrees = float(model.settings.reference_temperature if temperature is None else temperature)
     if not ABSOLUTE_ZERO <= degrees < np.inf:
@@ -131,7 +130,7 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
 def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, rows: int = ROWS) -> Observations:
     """Test rows in which everything varies but, where given, a steady temperature.
 
-    Joints and conditions are drawn where the model was measured; within the joints' limits where it does not say.
+    Joints and conditions are drawn from the measured range, or within the joints' limits where it is unknown.
     """
     robot, rng = model.robot, np.random.default_rng(0)
     ranges = {} if model.spread is None else model.spread.ranges
@@ -336,7 +335,7 @@ def zero_offsets(
 def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64], change: Array) -> tuple[Array, Array]:
     """Posterior standard deviation (n,) of each joint's zero, NaN where unknown, and the prior one.
 
-    A model of an older program does not say how large its parameters were expected to be: the effects do.
+    For models without prior deviations, the effects' expected sizes are used.
     """
     spread, count = model.spread, len(known.parameters)
     if spread is None or len(spread.covariance) < count:

@@ -96,7 +96,7 @@ class Commands:
 def _nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
     """Nominal inverse kinematics: joint positions (N, n), rad or m, for target poses (N, 4, 4), root frame.
 
-    One that is out of reach is refused by its row among them, which count from 1.
+    A pose out of reach is an error with its row, counted from 1.
     """
     expected = "an array (N, 4, 4) of poses, m"
     try:
@@ -471,7 +471,8 @@ class CorrectedModel:
     def counts_anew(self, samples: Campaign) -> bool:
         """Whether the ``order`` of the samples merely numbers the rows of their own file.
 
-        It does if it starts where the campaign's did, has no gaps, and ends earlier. False if the model needs none.
+        It does if it starts at the campaign's first value, has no gaps, and ends earlier. False if the model does not
+        use it.
 
         Examples
         --------

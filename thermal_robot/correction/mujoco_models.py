@@ -1,7 +1,7 @@
 """Simulation models in MuJoCo: MJCF compiled, posed, and written with all digits.
 
-A campaign is compared with what the user's own model predicts; the calibrated robot is written back to it, or as an
-MJCF of its own, translated from its URDF.
+A campaign is compared with the predictions of the user's own model; the calibrated robot is written into that model, or
+converted from its URDF.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ _HELD_OUT = "Corrected figures are of rows held out: the model was fitted withou
 
 
 def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
-    """Criteria of ISO 9283 of a campaign with repeats, in the frames that the gap is told in; ``None`` without repeats.
+    """ISO 9283 criteria of a campaign with repeats, in the frames of the gap; ``None`` without repeats.
 
     AP after the correction is cross-validated: all repeats of a pose are held out together. Every cycle counts,
     outliers too, as the standard requires.

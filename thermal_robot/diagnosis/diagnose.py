@@ -37,7 +37,7 @@ def diagnose(
     effects: Sequence[Effect] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """Say where the gap between a robot and its model lies, which effects cause it, and how far it shrinks.
+    """Diagnose a campaign: where the gap between robot and model lies, which effects cause it, how far it shrinks.
 
     Parameters
     ----------

@@ -75,7 +75,8 @@ def displacement(
     """Displacement of the chain's four channels by fitted values (P,) of effects, and of the measured point (N, 3), m.
 
     The latter stands in the measurement frame, ``None`` where no effect acts on the instrument. Raises
-    :class:`EffectError` if parameters break the contract, or are not as many as values: rows lack what is read.
+    :class:`EffectError` if parameters break the contract, or their number differs from that of the values because
+    columns are missing.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint, segment = np.zeros((samples, robot.n)), np.zeros((samples, len(robot.segments), 6))
@@ -102,8 +103,8 @@ def displacement(
 def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
     """Columns of :func:`gate.reads` on which the displacement by a fitted effect depends.
 
-    A column counts where the effect's own parameters change as it is left out, or takes other values: one that equals
-    another column here need not do so elsewhere. Raises :class:`EffectError` if the effect breaks the contract.
+    A column counts if the effect's parameters change when it is removed or takes other values. Raises
+    :class:`EffectError` if the effect breaks the contract.
     """
     campaign, own = observations.campaign, gate.checked(effect, observations)
     read = gate.reads(effect, observations)

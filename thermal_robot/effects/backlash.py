@@ -110,8 +110,8 @@ class Backlash(Effect):
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Neighbours of a setting: odds of the shares multiplied and divided by a factor, jointly and one by one.
 
-        Besides, teeth that change sides over more or less of friction, one joint that never hangs, or alone does, and
-        where shares differ, that of one for all.
+        Also softer and sharper changes of side, a share of zero or of its own for one joint, and, where shares differ,
+        one of them for all.
         """
         shares = self._shares
         able = [j for j, joint in enumerate(self.chain) if self._may_hang(j) and joint in (self.places or self.chain)]

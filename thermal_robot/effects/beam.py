@@ -40,8 +40,8 @@ def shafts(robot: Robot) -> tuple[int, ...]:
 def cross_axes(robot: Robot, s: int) -> Array:
     """Two unit vectors (2, 3) across a segment, in its own frame.
 
-    They are right angled to the segment in the frame of its parent link, the first also to that axis of the frame which
-    lies most across the segment: the sections of links are drawn along the frames of links.
+    In the frame of the parent link both are perpendicular to the segment, the first also to the frame axis most nearly
+    across it, as link sections are usually aligned with link frames.
     """
     segment = robot.segments[s]
     rotation = robot.chain.rotations[segment.index]

@@ -239,8 +239,8 @@ class Effect(ABC):
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
         """Equivalent smaller set of parameters, in the order of reporting; empty where all are reported.
 
-        Each is a combination of :meth:`parameters`. Beside those of the effects inside (:attr:`told_inside`), which
-        come first, they are no more than needed, but for what the data do not see.
+        Each is a combination of :meth:`parameters`. Together with those of the contained effects (:attr:`told_inside`),
+        which come first, they are a minimal set.
         """
         return ()
 
@@ -252,7 +252,7 @@ class Effect(ABC):
     def share(self) -> float | None:
         """Share of the prior probability of its name; ``None`` where places and ``weight`` decide it.
 
-        Settings of an effect that states its share are not looked for in single places.
+        Effects with a share are not searched in single places.
         """
         return None
 
@@ -281,7 +281,7 @@ class Effect(ABC):
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Return the settings near this one, itself among them, for the refinement of constants.
 
-        Estimation moves to the best of them, with factors (above 1) that become smaller.
+        A coordinate search moves to the best of them, with decreasing factors (above 1).
         """
         return (self,)
 

@@ -27,8 +27,8 @@ class Fading(Effect):
     """Effect with the range of its driver in which it was ``found``; empty where it does not fade.
 
     It ``fades`` beyond, or keeps the value of the edge. ``means``: of each of its functions over the rows where it was
-    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that frames take over of a unit of
-    each parameter.
+    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that the fitted frames absorb per
+    unit of each parameter.
     """
 
     found: tuple[float, ...] = field(default=(), kw_only=True)

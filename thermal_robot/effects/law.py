@@ -107,7 +107,7 @@ class Discovered(Fading):
         return None if known is None or known.share is not None else gate.placed(known, (self.place,))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Columns that the campaign lacks for the law and for the effect that it modulates."""
+        """Columns that the campaign lacks for the law, or for the effect that it modulates."""
         lacking: tuple[str, ...] = () if self.values(observations) is not None else (self.quantity,)
         if self.by and quantity(observations, self.by) is None:
             lacking += (self.by,)
@@ -161,8 +161,8 @@ class Discovered(Fading):
     def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
         """Time (N,) since the row's session began, and the number of that session.
 
-        A session that was not there began with the first of its rows, and has the number −1; a row of none belongs to
-        the last that had begun.
+        A session unknown to the law begins with its first row and has the number −1; a row without a session belongs to
+        the last one begun.
         """
         starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
         run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
@@ -192,7 +192,7 @@ class Discovered(Fading):
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Basis functions (N, K) at the rows, and a name for each; ``None`` where the campaign lacks them.
 
-        At a label that was not there they are the mean of those at the others.
+        At an unknown label they are the mean over the known ones.
         """
         values, two = self._followed(observations), bool(self.by) and self.shape != "product"
         second = quantity(observations, self.by) if two else None

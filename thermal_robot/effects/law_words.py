@@ -74,8 +74,8 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
 def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
     """Peak-to-peak value of the waves in each joint, over the measured rows.
 
-    Single waves of a joint that moves over part of a turn do the same in part; what they do together is better known.
-    Values (K,) and covariance are SI; largest first, none of a place that does not err in its joint alone.
+    Waves of a joint with a limited range are correlated; their sum is better determined. Values (K,) and covariance are
+    SI; largest first, none of a place that does not err in its joint alone.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):
@@ -202,8 +202,7 @@ def is_event(law: object) -> bool:
 def event(law: Discovered, observations: Observations, sizes: Sequence[Size]) -> tuple[str, str]:
     """Describe an event by its rows: in a few words, and in a sentence without a full stop.
 
-    Both empty for what is no event, for levels of more than one session, and where its rows do not follow each other in
-    the file: no row then tells when it was.
+    Both are empty for other laws, for levels of several sessions, and where the rows are not consecutive in the file.
     """
     rows = law.at_rows(observations) if is_event(law) and law.shape != "levels" else None
     there = np.zeros(0, dtype=bool) if rows is None else rows[0][:, 1] > 0.0

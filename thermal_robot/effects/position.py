@@ -31,8 +31,7 @@ _NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part
 class OfPosition(Fading):
     """Errors as functions of the joint's own position, which fade together beyond its measured range.
 
-    What has seen a whole turn is known everywhere, if it comes back after a turn or is a gain; so is the gain of a
-    joint that slides.
+    After a whole turn, gains and waves of integer order are known everywhere; so is the gain of a prismatic joint.
     """
 
     def _ended(self, observations: Observations, joint: int, order: float) -> tuple[Array, Array]:

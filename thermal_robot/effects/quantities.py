@@ -23,9 +23,8 @@ _ROUNDING = 1e-9  # relative: how far sums of floats are off
 def resolution(values: Array, unit: str) -> float:
     """Resolution of a quantity, in its unit.
 
-    It is the smallest step between two of its values (N,), as far as that is what an instrument of this kind reads to:
-    digits beyond that say nothing, and two values that are further apart were meant. 0 for what is no reading, such as
-    a payload, a label or a direction of approach.
+    The smallest step between two of its values (N,), within the resolutions of instruments for this unit. 0 for
+    quantities that are no readings, such as payload, label or direction of approach.
     """
     if unit not in settings.READS_TO:
         return 0.0
@@ -42,7 +41,7 @@ def varies(values: Array, least: float = 0.0) -> bool:
 def without_twins(readings: Mapping[str, Array], joints: tuple[str, ...]) -> dict[str, Array]:
     """Remove redundant quantities: of two that agree the finer one is left out.
 
-    An encoder's reading goes where it says what was commanded, the temperature of a link where it is that of the robot.
+    An encoder reading that agrees with the command is removed, and a link temperature that agrees with the robot's.
     """
     found = {}
     for name, values in readings.items():

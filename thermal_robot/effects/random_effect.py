@@ -22,8 +22,8 @@ _SAME = 1e-6  # rad or m: commands nearer than this repeat each other
 class RandomEffect(Effect):
     """Variance component: its parameter is a standard deviation, which no correction removes.
 
-    It is told from the covariance of what remains, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j moves
-    the target and one σ_j (rad or m) a joint and component.
+    It is estimated from the covariance of the residual, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j
+    moves the target and one σ_j (rad or m) a joint and component.
     """
 
     random: ClassVar[bool] = True

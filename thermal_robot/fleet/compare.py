@@ -1,7 +1,7 @@
 """Tests of equality between campaigns of one robot.
 
-Names. A wrong name fits one campaign, and takes another size in the next. So an effect keeps its name if two campaigns
-agree on most of it: the same size within half of the larger, which wear and re-adjustment leave alike.
+An effect that was wrongly named has another size in the next campaign. So an effect is confirmed if two campaigns agree
+on most of it: sizes within half of the larger, which allows for wear and re-adjustment.
 
 Parameters. A campaign alone says θ = G⁺b with covariance G⁺ of all effects that are at work in any campaign together.
 Of one effect with the others free, it says I θ = s, where I and s are what is left of G and b once the others are

@@ -58,7 +58,7 @@ class Part:
     def excludes(self, other: Part) -> bool:
         """Whether two parts exclude each other: settings of one effect that share parameters and campaigns.
 
-        One parameter may differ in a set of campaigns and in another, but not both alone and with its place in one.
+        One parameter may differ in two sets of campaigns, but not both alone and with its place in the same campaign.
         """
         if (self.effect, self.shared) != (other.effect, other.shared):
             return False
@@ -70,7 +70,7 @@ class Part:
 class Problem:
     """Joint normal equations of all parts, from those of each campaign.
 
-    ``total`` and ``equations`` are y'y along what the campaigns see, and how many directions that are, of all together.
+    ``total`` is y'y in the range of the columns, ``equations`` its dimension, summed over the campaigns.
     """
 
     parts: tuple[Part, ...]

@@ -194,7 +194,7 @@ def candidates(
 def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
     """Yield each effect once, in all its places and in the setting of the most certain fit.
 
-    A setting that reads more, such as a clock, goes before one that a campaign without it had to do with.
+    A setting that reads more columns, such as a clock, takes precedence.
     """
     known: dict[str, tuple[tuple[int, float], Effect]] = {}
     for fit in fits:
@@ -291,8 +291,8 @@ def _columns(at: Observations, item: Candidate, number: int) -> Array:
 def _projected(full: Array, flat: int) -> tuple[Array, Array]:
     """Products (P, P) and (P,) with the first columns projected out, rounding errors of their aliases set to zero.
 
-    Rounding leaves something, and so does a base that rocks: a shift of the first link is then no more exactly one of
-    the base, and a campaign would tell it to decimetres.
+    Without that, rounding or a moving base would leave a tiny component of an alias of the frames, such as a shift of
+    the first link, and estimate it to decimetres.
     """
     along = whitener(full[:flat, :flat]).T @ full[:flat, flat:]
     rest, before = full[flat:, flat:] - along.T @ along, np.diag(full)[flat:-1]
@@ -339,7 +339,7 @@ def _expressed(
 ) -> Array | None:
     """Return listed parameters (P, K) equivalent to one prior deviation of each of an effect's K; ``None`` without any.
 
-    Its own parameters first; then, of what contains joints' zeros, with those beside them.
+    Tried are its own parameters, then, for an effect that contains joint zeros, these as well.
     """
     name = f"{effect.name} of {known.campaign}" if isinstance(effect, Discovered) else effect.name
     owner = np.repeat(np.arange(len(listed)), [c.shape[1] for c in columns])

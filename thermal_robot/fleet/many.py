@@ -235,8 +235,8 @@ def _diagnosed(
 def _in_time(time_limit: float, *campaign: Any) -> tuple[list[Plain], bool]:
     """Diagnose a campaign within a time limit; end the process otherwise.
 
-    What a diagnosis leaves refers to itself, and would stay for hundreds of campaigns; what was there after the first,
-    modules above all, is not looked through again.
+    Reference cycles of each diagnosis are collected at once; objects that survive the first one, mostly modules, are
+    frozen.
     """
     with limited(time_limit):
         found = diagnosed(*campaign)

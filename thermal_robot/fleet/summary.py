@@ -74,9 +74,9 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Case:
-    """Effect found in a campaign: probability, share of the gap (m), and place.
+    """Effect found in a campaign: probability, rms distances (m) before and after, held-out share, and place.
 
-    ``confounded_with`` names what the data cannot tell it from. Without a name it is a gap that no effect explains.
+    ``confounded_with`` are its alternatives. An empty ``effect`` stands for a gap that no effect explains.
     """
 
     robot: str

@@ -159,8 +159,8 @@ def _of(distances: Array) -> Array:
 def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
     """Bootstrap interval (95 %, parametric) of RP_l, from normal scatter with the sample's principal axes.
 
-    What n cycles show, over what endlessly many would, depends on the shape of the scatter, not on its size. The draws
-    are the same in each call.
+    The ratio of RP_l from n cycles to its limit depends on the shape of the scatter, not on its size. The draws are the
+    same in each call.
     """
     cycles = len(deviations)
     if cycles < FEWEST_FOR_INTERVAL or value == 0.0:

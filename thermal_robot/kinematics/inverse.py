@@ -89,7 +89,7 @@ def inverse_kinematics(
     displaced: Callable[[Array], Displacement | None] | None = None,
     within: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> Reached:
-    """Damped least squares: joint positions that bring the tool to poses, as near to a start as possible.
+    """Inverse kinematics by damped least squares: joint positions for tool poses, as near as possible to a start.
 
     Parameters
     ----------

@@ -69,8 +69,8 @@ def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]
 def followed(found: Mapping[str, Mimic], joints: Collection[str], chain: Collection[str]) -> dict[str, Mimic]:
     """Resolve chains of mimicking joints to relations with a driving joint.
 
-    Outside the chain a joint that follows nothing, or in the end itself, is left out: as many a hand in use is written,
-    and it moves nothing that was measured. Within the chain it is refused, by name.
+    A joint that follows a missing joint or itself is an error in the chain; outside it, as in many published hands, it
+    is left out.
     """
     ends = {}
     for name in found:

@@ -1,6 +1,6 @@
 """Columns of a workspace map: all postures of an arm at many places, and their quality.
 
-At a few places they are searched from everywhere; from there each leads to those of the neighbours. Where the task
+Postures are searched from many starts at a few places, and from there continued to the neighbours. Where the task
 leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest to home is taken
 among those that hang together:
 
@@ -195,8 +195,8 @@ def _wanting(count: NDArray[np.intp], random: np.random.Generator) -> Rows:
 def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
     """Start configurations of the search for other postures.
 
-    One joint mirrored about home, or half a turn on; or mirrored as an elbow is, whose neighbours make up for it: two
-    equal links that bend the other way stand where they stood.
+    One joint mirrored about home, or turned by half a turn; or an elbow flipped, with its neighbours compensating as
+    for two equal links.
     """
     n, elbows = task.robot.n, np.arange(1, task.robot.n - 1)
     starts = np.repeat(q[:, None], 2 * n + 2 * len(elbows), axis=1)

@@ -140,7 +140,7 @@ class Ledger:
 
 
 def ledger(inputs: PaperInputs | None = None) -> Ledger:
-    """Compute every row.
+    """Compute the ledger: every printed number of the paper beside the recomputed one.
 
     Parameters
     ----------

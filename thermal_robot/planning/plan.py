@@ -1,8 +1,8 @@
 """Optimal experimental design of a first campaign: poses, their order, and expected precision.
 
-Candidates for each place in the order are drawn at random; of these the engine of ``next_samples`` chooses greedily
-what tells most about the parameters of all effects together, with the frames unknown. Collisions and the line of sight
-of the instrument are not checked.
+Candidates are drawn at random; greedy D-optimal design, as in ``next_samples``, chooses those with the most information
+on the parameters of all effects, with the frames unknown. Collisions and the line of sight of the instrument are not
+checked.
 
 How well a campaign will know each effect: posterior standard deviations of the linear Gaussian model.
 

@@ -115,7 +115,7 @@ def svg(figure: Figure, label: str) -> Markup:
 def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
     """Self-contained HTML page of a diagnosis, for A4.
 
-    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
+    If robot and table do not match, the page says why and what to do.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str,
 def fragment(diagnosis: Diagnosis) -> str:
     """HTML of a diagnosis for a notebook, one ``<div>`` with its own style: verdict, numbers, figure, effects.
 
-    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
+    If robot and table do not match, it says why and what to do.
     """
     return render("diagnosis.html", {"d": diagnosis})
 

@@ -35,8 +35,8 @@ _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 def headline(diagnosis: Diagnosis) -> str:
     """Verdict in one sentence of at most 45 words.
 
-    It names at most three causes, the largest shares first, and counts the others. Of what there is to say of them the
-    fullest wording is taken that fits; the rest is left to :mod:`thermal_robot.report.words`.
+    It names at most three causes, the largest shares first, and counts the others. The fullest wording that fits is
+    taken; the rest is left to :mod:`thermal_robot.report.words`.
     """
     text = ""
     for text in _wordings(diagnosis):
@@ -93,7 +93,7 @@ def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]
 def sized(finding: Finding) -> bool:
     """Whether the data determine any parameter of an effect.
 
-    Of a law values before and after may be free while their difference is not.
+    The values of a law may be undetermined while its difference is determined.
     """
     return bool(finding.quantity) or not finding.parameters or any(p.identified for p in finding.parameters)
 
@@ -215,7 +215,7 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
 def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_aside: float | None) -> str:
     """Unexplained share in words; empty where there is none, or it is unknown.
 
-    Where rows set aside are unexplained, too, they count in what remains but not in the size: it is told with them.
+    If the outliers are unexplained, too, they are counted in.
     """
     if not remaining.flagged or remaining.rms == 0.0:
         return ""
@@ -294,7 +294,7 @@ Lines = list[tuple[str, int]]
 def described(finding: Finding, diagnosis: Diagnosis) -> tuple[Lines, list[tuple[str, str]], Lines]:
     """Return the description of an effect: text before its parameters, these as name and value, text after.
 
-    Lines stand with how far they hang. All of a few parameters are shown, in the order of the chain, else the most
+    Lines come with their indentation. A few parameters are all shown, in the order of the chain; of many the most
     significant.
     """
     known = [p for p in finding.parameters if p.identified and p.value is not None]

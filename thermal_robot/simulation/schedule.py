@@ -50,7 +50,7 @@ def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str,
 def visits(rows: int, repeats: int) -> Rows:
     """Row numbers (P, K) of each of P poses: once a round, every second round in reverse.
 
-    The last pose stays the last, so that no pose follows itself: a robot that does not leave repeats nothing.
+    The last pose stays the last, so that no pose follows itself: a repeat requires leaving the pose.
     """
     poses = rows // repeats
     place = np.tile(np.arange(poses), (repeats, 1))

@@ -333,7 +333,7 @@ def _measured(
     """Return the simulated measurement of a robot with effects at work, at its true frames.
 
     Each effect has the (P,) values of its parameters; ``noise`` is one sigma per axis, m and rad; ``joints`` and
-    ``readings`` are the chance of what scatters, and of the instrument.
+    ``readings`` are the random generators of the scatter and of the instrument.
     """
     systematic = [(effect, values) for effect, values in effects if not isinstance(effect, RandomEffect)]
     moved, shift = displacement(observe(plan, frames), systematic)

@@ -156,9 +156,9 @@ def _scene(
 def arrows(displacements: Array, magnification: float, size: float, thicker: float = 1.0) -> tuple[Array, Array]:
     """Return the transforms of :func:`unit_arrow` that draw displacements (N, 3), m.
 
-    Unit quaternions wxyz (N, 4) turn the z axis along them; factors (N, 3) stretch the arrow along its own axes, the
-    last of them to its length, m. The ``size`` of the scene, m, bounds how long it is, and how thick: ``thicker`` times
-    as usual.
+    Returns unit quaternions wxyz (N, 4) that turn the z axis along them; factors (N, 3) stretch the arrow along its own
+    axes, the last of them to its length, m. The ``size`` of the scene, m, bounds how long it is, and how thick:
+    ``thicker`` times as usual.
     """
     lengths = np.minimum(magnification * np.linalg.norm(displacements, axis=1), settings.LONGEST_ARROW * size)
     bounds = thicker * size * settings.NARROWEST, thicker * size * settings.WIDEST

@@ -19,8 +19,8 @@ MANY = 20_000
 def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt.ArrayLike) -> Array | None:
     """Probabilities (2, ...) that normal deviations lie in, and out of, circles about the origin; inputs broadcast.
 
-    They need not be checked: NaN for a case that is not proper, or that another integral tells. ``None`` where these
-    loops are not installed or not worth while, or the shapes do not fit.
+    The input need not be validated: the result is NaN for an invalid case and for one outside this method's range.
+    ``None`` where numba is missing or not worth while, or the shapes do not fit.
     """
     matrices, sizes, means = np.asarray(covariance, float), np.asarray(diameter, float), np.asarray(mean, float)
     if not means.ndim and means == 0.0:

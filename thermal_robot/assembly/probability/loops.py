@@ -1,8 +1,8 @@
 """Compiled loops for the probability of a disc: cases one by one, angles in vector lanes.
 
 Imported only where numba is installed. The same integral along the edge as in `planar`, from the same numbers of angles
-and the same principal axes; what it leaves out is told by NaN. Where constants of `planar` are changed, touch this
-file: numba looks at nothing else to see whether what it has kept is old.
+and the same principal axes; cases outside its range are NaN. Where constants of `planar` are changed, touch this file:
+numba looks at nothing else to see whether what it has kept is old.
 """
 
 from __future__ import annotations

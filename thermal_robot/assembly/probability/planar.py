@@ -1,7 +1,8 @@
 """Probability that a planar deviation lies in a disc or a rectangle: normal, plus uniform along one segment.
 
 A disc's integral runs along its edge where so many angles as `NODES` holds resolve it, along chords across the narrow
-axis where 64 nodes do. Rectangles, what neither resolves, and tails that want all digits are left to graded panels.
+axis where 64 nodes do. Graded panels serve rectangles, discs that neither resolves, and tails to full relative
+accuracy.
 
 **Edge** (Green): a trapezoidal rule that is exact to rounding. In the principal axes of the normal part, each in its
 standard deviation, the disc's edge about the mean is ``z(t) = (a1 cos t - b1, a2 sin t - b2)`` with ``a = R / sigma``

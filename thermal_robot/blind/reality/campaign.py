@@ -151,7 +151,8 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
 def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.random.Generator) -> Array:
     """Draw a fault and scale it to the size that the case asks for.
 
-    Where the cause is not in the library, taken from it, or hidden, that counts which no two other effects imitate.
+    Where the cause is outside the library, removed from it, or hidden, the size is that after the best imitation by two
+    other effects.
     """
     wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
     rough = sized(gauge, fault, fault.draw(gauge.setting, rng), wanted)
@@ -198,7 +199,7 @@ _SENSORS = ("robot", "links")
 def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:
     """Draw campaigns of positions with unknown base and target.
 
-    Alike are the instrument's noise, whether it is stated, and what is recorded of the links.
+    All days share the instrument's noise, whether it is stated, and the temperature sensors.
     """
     noise, stated = float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED)
     sensor, days = str(rng.choice(_SENSORS)), []

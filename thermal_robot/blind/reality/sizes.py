@@ -131,7 +131,7 @@ def testable(fault: Fault, gauge: Gauge) -> bool:
 def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
     """Scale values until the residual after alignment has the wanted size.
 
-    An encoder's steps are not: of the rounds the one that comes nearest counts.
+    Displacements are nearly linear in the values, but for an encoder's steps; the nearest iteration is returned.
     """
     nearest = np.inf, values
     for _ in range(_ROUNDS):
@@ -198,7 +198,7 @@ def truth(
 ) -> dict[str, Any]:
     """Truth in the format of :mod:`thermal_robot.blind.cases`, without the outliers.
 
-    Of faults that are asked for, and of those that are always there; ``noise`` is one sigma per axis, m.
+    It covers the faults asked for and those in the background; ``noise`` is one sigma per axis, m.
     """
     parts: dict[str, Any] = {}
     answers: list[Place] = []
@@ -313,8 +313,8 @@ def deviation(
     """Return the standard deviation σ / |x − P x| of one number of a fault, whose unit moves the target by x, (3M,).
 
     P projects on the columns of unknown frames, of every joint's zero, and of all other numbers at work; σ is the noise
-    per axis, m. The program that is put to the test takes no part in that. Also the rms per axis, m, of what a unit of
-    the number leaves after alignment.
+    per axis, m. The examined program is not used. Also returns the residual rms per axis, m, of a unit of the number
+    after alignment.
     """
     known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
     known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))

@@ -192,7 +192,7 @@ def _speeds(stream: Stream, times: Array) -> Array:
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
     """Least squares: lag, motion of the instrument's frame and place of the target; and what is left, m rms.
 
-    The motion turns about the aligned start, so that ten figures near nothing are sought.
+    The rotation is about the aligned start, so that all ten unknowns are near zero.
     """
     from scipy.optimize import least_squares
 
