@@ -84,7 +84,7 @@ class CampaignError(ThermalRobotError):
     key
         Path of a value in a file that is no table, such as ``effects[2].values[3]``.
     found, expected
-        What stands there and what should.
+        Value found, and value expected.
 
     Examples
     --------

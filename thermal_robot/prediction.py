@@ -75,13 +75,13 @@ class Spread:
         Parameters
         ----------
         observations
-            Of the corrected model.
+            Observations of the corrected model.
         effects
             Its effects with their (P,) values.
         outside
-            Of the same rows, as :meth:`outside` tells it.
+            Extrapolation of the same rows, as :meth:`outside` returns it.
         noise
-            Whether the instrument's noise counts: what a measurement may differ by, or where the target is.
+            Whether to include the instrument's noise.
         """
         moved = sensitivity(observations, [effect for effect, _ in effects])
         if moved.shape[2] != len(self.covariance):

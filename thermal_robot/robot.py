@@ -94,7 +94,7 @@ class Robot:
     urdf_links, urdf_joints
         Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     folder
-        Of the URDF's file, from which its meshes are named; ``None`` where it came as text.
+        Folder of the URDF's file, to which mesh paths are relative; ``None`` where it came as text.
 
     Examples
     --------

@@ -93,7 +93,7 @@ def visuals(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, l
     robot
         As :func:`parsed` returns it.
     folder
-        From which paths of meshes start.
+        Folder to which mesh paths are relative.
 
     Returns
     -------

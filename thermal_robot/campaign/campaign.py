@@ -136,7 +136,7 @@ class Campaign:
     urdf
         The robot's reference as written in the campaign file.
     travelled
-        Of rows taken from a larger campaign: what :attr:`since_turn` was there. Leave it out.
+        Internal: :attr:`since_turn` of rows taken from a larger campaign.
 
     Raises
     ------

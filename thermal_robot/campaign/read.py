@@ -289,7 +289,7 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
     Returns
     -------
     Campaign
-        In SI units; what is doubtful but was accepted stands in its ``warnings``.
+        Campaign in SI units; doubtful but accepted data are in its ``warnings``.
 
     Raises
     ------
@@ -335,7 +335,7 @@ def read_samples(
         CSV or Parquet, or the table itself, already read or a data frame, with the columns and units of the campaign.
         Measured columns are ignored.
     settings
-        Of the campaign that the model was fitted to, or that campaign itself.
+        Settings of the model's campaign, or that campaign itself.
     robot
         The robot; may be left out when a campaign is given.
 

@@ -49,14 +49,14 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     campaign
         With measured positions.
     directory
-        Is made if need be; campaign.toml, measurements.csv and robot.urdf in it are replaced.
+        Folder, created if missing; campaign.toml, measurements.csv and robot.urdf in it are replaced.
     comments
         Sentences that campaign.toml begins with.
 
     Returns
     -------
     Path
-        Of the campaign.toml.
+        Path of the campaign.toml.
 
     Raises
     ------

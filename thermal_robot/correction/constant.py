@@ -202,9 +202,9 @@ def determined(
     Returns
     -------
     CorrectedModel
-        The same effects; those parameters are zero, frames and other parameters what they are without them.
+        Model with these parameters at zero, and all others conditional on that.
     tuple of Told
-        What was left out, as it was fitted.
+        Removed parameters with their fitted values.
 
     Raises
     ------

@@ -172,7 +172,7 @@ class CorrectedModel:
     last_order
         First and last ``order`` of the campaign, where it had that column.
     spread
-        How far its predictions may be off; ``None`` where a file of version 0.2 does not say.
+        Predictive uncertainty; ``None`` for a file of version 0.2, which lacks it.
 
     Examples
     --------
@@ -239,13 +239,13 @@ class CorrectedModel:
         samples
             Their own columns are kept as they stand, but for those of measurements.
         prediction
-            Of them.
+            Prediction of these samples.
 
         Returns
         -------
         pandas.DataFrame
-            Then x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and in ``outside`` the
-            columns in which the row leaves what was measured, separated by blanks.
+            Samples with columns x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and
+            ``outside``: columns in which the row leaves the measured range, separated by blanks.
 
         Examples
         --------
@@ -263,7 +263,7 @@ class CorrectedModel:
         samples
             As for :meth:`predict`.
         noise
-            Whether the standard deviations hold the instrument's noise: what a measurement differs by, not the target.
+            Whether the standard deviations include the instrument's noise, so that they are those of a measurement.
 
         Raises
         ------
@@ -342,13 +342,14 @@ class CorrectedModel:
         samples
             Their other columns are kept as they stand, but for those of measurements.
         commands
-            Of them.
+            Corrected commands of these samples.
 
         Returns
         -------
         pandas.DataFrame
-            Then std.x std.y std.z, in ``outside`` the columns in which the row leaves what was measured, separated by
-            blanks, and in ``miss.direction`` the angle by which the target's direction is missed.
+            Samples with corrected joint positions and the columns std.x std.y std.z, ``outside``: columns in which the
+            row leaves the measured range, separated by blanks, and ``miss.direction``: error angle of the target's
+            direction.
 
         Examples
         --------
@@ -401,7 +402,7 @@ class CorrectedModel:
         q
             (N, n) joint positions, rad or m; (n,) counts as one row.
         conditions
-            By column name, one value for all rows or (N,), SI.
+            Conditions by column name, one value for all rows or (N,), SI.
 
         Raises
         ------

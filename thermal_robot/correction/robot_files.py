@@ -46,7 +46,7 @@ class Calibrated:
     robot
         The nominal one.
     displacement
-        What displaces its joints (n,) and segments (S, 6); nothing of the base and the tool.
+        Displacement of joints (n,) and segments (S, 6); base and tool are not displaced.
     base
         (4, 4) pose of the root frame in the measurement frame.
     target
@@ -62,7 +62,7 @@ class Calibrated:
         (4, 4) the target on the tool frame as the campaign declares it, where the robot was compared with a simulator
         of the user's own, which has it; ``None`` where it was compared with the URDF.
     beyond
-        In a sentence, that the temperature lies outside those that were measured; empty where it does not.
+        Warning if the temperature is outside the measured range; else empty.
 
     Examples
     --------
@@ -324,7 +324,7 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
     convention
         ``standard`` or ``modified``; the module's docstring has the equation of each.
     units
-        Of the angles and lengths; rad and m where absent.
+        Units of angles and lengths; rad and m by default.
 
     Returns
     -------

@@ -52,9 +52,9 @@ class Calibration:
     Attributes
     ----------
     campaign, robot, tool_frame, samples, measures
-        What was calibrated.
+        Names of campaign, robot and tool frame, number of rows, and kind of measurement.
     names
-        Of the effects that were asked for.
+        Names of the calibrated effects.
     outliers
         Row numbers in the file of the measurements set aside.
     rms_before, rms_after, turned_before, turned_after
@@ -63,7 +63,7 @@ class Calibration:
     noise
         One sigma per axis of positions, as it was estimated beside the effects, m.
     warnings, fit
-        What a reader should know of the data; the fit.
+        Warnings on the data, one sentence each; the fit behind the result.
 
     Examples
     --------

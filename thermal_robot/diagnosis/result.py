@@ -90,7 +90,8 @@ class Diagnosis:
     Attributes
     ----------
     campaign, robot, tool_frame, samples, measures, joint_names, reach
-        What was diagnosed; movable joints, root to tool; diagonal of the measured volume, m.
+        Names of campaign, robot and tool frame, number of rows, kind of measurement; joints, root to tool; diagonal of
+        the measured volume, m.
     outliers, left_out
         Row numbers in the file of the measurements set aside; names of the effects left out by request.
     gap, effects, where, unexplained, rows

@@ -72,7 +72,7 @@ class Agreement:
     chi2, figures
         rᵀV⁻¹r of the new rows, and of how many figures.
     whole, whole_figures
-        The same of all rows since the diagnosis.
+        As ``chi2`` and ``figures``, for all rows since the diagnosis.
     aside, rows
         Gross errors since the diagnosis, and of how many rows.
     p_batch, p_whole, p_change, p_aside
@@ -343,21 +343,21 @@ class Updated:
     Attributes
     ----------
     diagnosis
-        Where it began; its effects are held.
+        Initial diagnosis, whose effects stay.
     outliers
         Row numbers of the last new rows that are set aside, as their table counts them.
     model
         The corrected model by all rows.
     agreement
-        How well the last new rows agreed with the model that did not know them.
+        Tests of the last new rows under the model fitted without them.
     estimate, watch
         The fit to all rows; what new rows are compared with.
     wider
-        (P,) by how much the diagnosis widened each deviation for what it could not explain.
+        Factors (P,) by which the diagnosis inflated each standard deviation for an unexplained residual.
     runners, rival, lead
-        Combinations that may come first; the best of them by all rows so far, and its log odds against the chosen one.
+        Alternative combinations; the best of them by all rows so far, and its log odds against the chosen one.
     fallen
-        What new rows said against the choice, one sentence a reason; it stays.
+        Reasons against the selected effects, one sentence for each failed test; they are permanent.
 
     Examples
     --------

@@ -71,10 +71,10 @@ class Finding:
     locations
         Places where it acts, largest share first.
     parameters, unseen
-        Its estimates, empty if it is neither part of the fit nor contained; names of parameters of which the data see
-        nothing, or nothing beside the others.
+        Its estimates, empty if it is neither part of the fit nor contained; names of parameters that the data do not
+        determine.
     size
-        How much a discovered law changes over the rows that were measured, or an effect that is a curve of each joint.
+        Range over the measured rows of a discovered law, or of an effect that is a curve of each joint.
     quantity, shape, describes, usually
         Only of a discovered law: the quantity that it follows, its shape, a sentence about it, and what one of that
         place and quantity usually is; ``None`` where nobody can say.

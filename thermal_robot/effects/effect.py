@@ -139,7 +139,7 @@ class Parameter:
     Attributes
     ----------
     label
-        What it is, without the place ("strain per kelvin").
+        Name without the place ("strain per kelvin").
     unit
         Its unit as text.
     size
@@ -150,9 +150,9 @@ class Parameter:
         The joint's or link's URDF name; ``base``, ``tool`` or ``instrument`` (or a link) for these kinds; empty for all
         that the responses act on.
     responses
-        What one unit does in the channels.
+        Displacement of the channels per unit.
     positive
-        Whether it cannot be negative, as no joint is stiffer than rigid: its prior is half a normal one.
+        Whether it cannot be negative, as a compliance: its prior is half-normal.
     """
 
     label: str
@@ -291,7 +291,7 @@ class Effect(ABC):
         Parameters
         ----------
         observations
-            Of the fitted model.
+            Observations of the fitted model.
         parameters
             Those at the place, at least one.
         error

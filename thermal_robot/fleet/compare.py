@@ -87,7 +87,7 @@ def compare(
         Two or more, in the order in which they were measured: campaigns, their diagnoses, corrected models, or paths of
         campaigns and of model files (``.json``). A model says nothing of effects that it does not hold.
     names
-        What they are called; by default their own names.
+        Names of the campaigns in the result; by default their own.
     only, without, effects
         As for :func:`~thermal_robot.diagnose`, of campaigns that are not diagnosed yet.
     progress

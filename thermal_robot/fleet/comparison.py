@@ -28,15 +28,15 @@ class Parameter:
     Attributes
     ----------
     name, kind, place, unit
-        What it is, and where.
+        Name, kind and name of its place, and unit.
     values, stds
         Per campaign; ``None`` where its data do not determine it.
     between
         The two campaigns that differ most in deviations; empty where fewer than two tell it.
     difference, std
-        Of the later of these less the earlier, and its standard deviation.
+        Later minus earlier of these two campaigns, and its standard deviation.
     chi2, degrees, p_value
-        Of equal values in all campaigns; the probability is that of chance, not corrected for other parameters.
+        Chi-square test of equal values in all campaigns, not corrected for other parameters.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Effect:
     Attributes
     ----------
     name, title
-        Of the effect; a law that was found in one campaign has that campaign's name with it.
+        Name and title of the effect; a discovered law has its campaign's name appended.
     status
         ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: it loses
         its name; ``not_needed``: some diagnosis names it, and the campaigns together do not need it;
@@ -68,11 +68,11 @@ class Effect:
     reason
         Why it loses its name, or is not compared; empty otherwise.
     probability
-        That it is at work in any campaign, by the joint fit.
+        Posterior probability, by the joint fit, that it is at work in any campaign.
     named
         The campaigns whose own diagnosis names it.
     chi2, degrees, p_value
-        Of equal parameters in all campaigns, all others free in each.
+        Chi-square test of equal parameters in all campaigns, all others free in each.
     parameters
         One by one.
     """
@@ -96,11 +96,11 @@ class Change:
     Attributes
     ----------
     effect, title
-        Of the effect.
+        Name and title of the effect.
     kind, place
-        Where; empty for all its places.
+        Kind and name of the place; empty for all places.
     parameters
-        Names of those that differ.
+        Names of the parameters that differ.
     groups
         Campaigns that agree with each other.
     since
@@ -108,9 +108,9 @@ class Change:
     values, unit
         Per campaign, of a single parameter, SI; empty for several.
     chi2, degrees, p_value
-        Of no difference, beside all else that is shared; the probability is corrected for all that was compared.
+        Chi-square test of no difference, given all shared parameters; the p-value is corrected for all comparisons.
     probability
-        That this place differs.
+        Posterior probability that this place differs.
     """
 
     effect: str
@@ -137,7 +137,7 @@ class Predicted:
     campaigns
         The two.
     poses
-        How many.
+        Number of poses.
     rms, stated
         Root mean square of the difference, and of its stated deviation, m.
     beyond
@@ -166,19 +166,19 @@ class Comparison:
     campaigns, samples
         Names of the campaigns in their order, and how many measurements each has; none of a model file.
     robot, tool_frame
-        Which robot.
+        Names of robot and tool frame.
     effects
         Every effect that was compared, those at work first.
     changes
-        What differs, the surest first.
+        Differences, the most certain first.
     predicted
         For every two campaigns.
     not_told
         Parameters that no campaign can tell beside the unknown frames and the others: they are not compared.
     looked_at
-        How many places were compared: all probabilities of changes are corrected for that.
+        Number of places compared, for which the p-values of changes are corrected.
     diagnoses
-        Of the campaigns; in the place of a model file what the comparison knows of it.
+        Diagnoses of the campaigns; for a model file a stand-in.
 
     Examples
     --------

@@ -64,7 +64,7 @@ class Fleet:
     table
         Path of the table: Parquet, a row for each campaign and effect.
     summary
-        What is wrong with which robot, and what several share; it prints as text.
+        Summary of effects by robot and of common parameters; prints as text.
 
     Examples
     --------

@@ -35,13 +35,13 @@ class Count:
     Attributes
     ----------
     effect
-        Its name; laws that were discovered count as one by what they follow.
+        Name of the effect; discovered laws of one quantity count as one.
     found, testable
-        In how many robots; found where the data cannot tell it from another, too.
+        Numbers of robots in which it was found, confounded or not, and in which it is testable.
     confounded
-        In how many of those in which it was found the data cannot tell it from another.
+        Number of robots in which it is confounded with another effect.
     places
-        In how many of them which place has the largest share, most often first.
+        Places with the largest share, with the number of robots, most frequent first.
     parameters
         Whether it is a known effect, whose parameters can be compared.
     """
@@ -107,20 +107,20 @@ class Shared:
     Attributes
     ----------
     effect, parameter, unit
-        Which.
+        Names of effect and parameter, and unit.
     robots
-        How many tell it.
+        Number of robots that determine it.
     mean, mean_std
-        Over the fleet, and one sigma.
+        Mean over the fleet, and its standard deviation.
     spread, spread_std
         Between robots, one sigma, deviations of measurement taken out; and how well that is known. Where groups
         differ it is that within a group.
     p_mean
         P value of the mean being zero, times the number of parameters and labels that were looked at.
     label, p_label
-        By which robots differ, and the p value of that being chance, times the same; empty and 1 where they do not.
+        Label by which robots differ, and its p-value with the same correction; empty and 1 where they do not.
     groups
-        Of that label, farthest from the mean of all first.
+        Groups of that label, farthest from the overall mean first.
     """
 
     effect: str
@@ -161,13 +161,14 @@ class Summary:
     Attributes
     ----------
     campaigns, robots
-        How many.
+        Numbers of campaigns and robots.
     labels
-        By which robots were grouped, their type included.
+        Labels by which robots were grouped, their type included.
     outcomes
-        How many campaigns were ``diagnosed``, ``unusable`` (robot and table do not belong together) or ``failed``.
+        Numbers of campaigns that were ``diagnosed``, ``unusable`` (robot and table do not belong together) or
+        ``failed``.
     failures
-        Those without a diagnosis: name, outcome, reason.
+        Campaigns without a diagnosis: name, outcome, reason.
     effects
         How often each effect was found, most often first.
     gathered
@@ -177,9 +178,9 @@ class Summary:
     apart
         Robots that stand out, most probable first, each against its group.
     found
-        What is wrong with which robot: the campaigns with the largest gaps.
+        Campaigns with the largest gaps, and the effects found in each.
     parameters
-        How many were compared.
+        Number of parameters compared.
     """
 
     campaigns: int

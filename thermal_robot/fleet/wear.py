@@ -57,10 +57,10 @@ def wear(
         At least three of one robot: campaigns, their paths, or diagnoses, which need no new fit. In pairs with dates,
         ``[("2026-03-01", campaign), ...]``, in any order; else in the order of time.
     dates
-        Of the campaigns, where they stand by themselves: ISO 8601 text, or dates. Without dates a jump has its place
+        Dates of the campaigns, if not given in pairs: ISO 8601 text, or dates. Without dates a jump has its place
         between two campaigns, but a trend has no rate.
     limits
-        Of the absolute value of an effect's parameters, SI: ``{"backlash": 5e-4}``.
+        Limits of the absolute value of an effect's parameters, SI: ``{"backlash": 5e-4}``.
     effects
         Names of the effects to consider; all where it is left out. The zeros of joints are always followed.
     false_alarm

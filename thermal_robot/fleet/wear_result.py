@@ -22,13 +22,13 @@ class Visit:
     Attributes
     ----------
     name
-        Of the campaign.
+        Name of the campaign.
     date
         ISO 8601; empty where none was given.
     time
         Days since the first campaign; its number, from 0, where no dates were given.
     rows
-        That were used.
+        Number of rows used.
     """
 
     name: str
@@ -46,13 +46,13 @@ class Jump:
     after
         Number of the last campaign before it, from 0.
     probability
-        That it was then, and not between two others, if the parameter jumped at all.
+        Probability of this date, given that the parameter jumped.
     probabilities
         (K − 1,) the same after each campaign.
     earliest, latest
         Numbers of the campaigns between which it happened with 95 %: the last before it and the first after it.
     size, std
-        By how much, and its standard deviation; unit of the parameter.
+        Size of the step, and its standard deviation; unit of the parameter.
     """
 
     after: int
@@ -79,7 +79,7 @@ class Crossing:
     Attributes
     ----------
     limit
-        In the unit of the parameter.
+        Limit in the unit of the parameter.
     state
         ``passed`` (it is beyond in the last campaign), ``expected`` (a trend leads there), ``never`` (it does not move,
         or has jumped and stays), ``unknown`` (it wanders, or there are no dates for a rate).
@@ -108,11 +108,11 @@ class Worn:
     effect, title
         Its effect's name, and in plain words.
     parameter, place, unit
-        Its own name, its joint or link, and its unit.
+        Name of the parameter, its joint or link, and its unit.
     comparable
         Whether campaigns can be compared in it; ``reason`` says why not.
     alarm
-        Whether it rings: its chance is at most the false-alarm rate.
+        Whether there is an alarm: its p-value is at most the false-alarm rate.
     chance
         Bound on the probability that a series without any change shows one as clear, in whatever parameter, on whatever
         day.
@@ -123,16 +123,16 @@ class Worn:
     kinds
         Probability of each.
     jump, rate
-        Where it is one; a rate needs dates.
+        Step or rate of the change, if it is one; a rate needs dates.
     change, change_std
-        From the first campaign to the last, as its kind has it; 0 where it is constant.
+        Change from the first campaign to the last under this kind of change; 0 where it is constant.
     values, stds
         (K,) as each campaign has it, all others as they are over time, and their standard deviations; ``None`` in a
         campaign that says nothing of it.
     fitted
         (K,) as its kind has it.
     crossing
-        Of a limit that was given for its effect; ``None`` without one.
+        Crossing of the limit of its effect; ``None`` without one.
     confounded_with
         Parameters of whose changes the data cannot tell this one's.
     """
@@ -167,21 +167,21 @@ class Wear:
     Attributes
     ----------
     robot
-        Its name.
+        Name of the robot.
     campaigns
-        In the order of time.
+        Campaigns in the order of time.
     dated
         Whether dates were given.
     parameters
-        Those that ring first, then by how probably they moved.
+        Parameters, alarms first, then by the probability of a change.
     false_alarm
         Stated: at most so many series without any change ring at all.
     scatter
-        How much more the campaigns scatter about each other than their deviations say; 1 where they do not.
+        Overdispersion of the campaigns: their scatter over their standard deviations, at least 1.
     nothing
         Probability that nothing moved.
     notes
-        What a reader must know beside, one sentence each.
+        Remarks, one sentence each.
     """
 
     robot: str

@@ -111,9 +111,9 @@ def accuracy(attained: Attained, commanded: Attained) -> Accuracy:
     Parameters
     ----------
     attained
-        Of n cycles.
+        Attained poses of n cycles.
     commanded
-        Of one row; or of n, where a model predicts every cycle by itself, as one does that knows of temperature.
+        Commanded pose, one row; or n rows, where a model predicts every cycle separately, as one with temperature does.
     """
     away = attained.barycentre - commanded.barycentre
     is_, should = attained.mean_rotation, commanded.mean_rotation
@@ -234,7 +234,7 @@ def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None 
     Parameters
     ----------
     attained
-        Of each measuring time, first to last: two times or more, each of two cycles or more.
+        Attained poses of each measuring time, first to last: two times or more, each of two cycles or more.
     commanded
         Of each measuring time, as for :func:`~thermal_robot.iso9283.accuracy`; ``None`` where AP cannot be
         told.
@@ -328,11 +328,11 @@ class PathCriteria:
     points
         How many of its points were repeated.
     cycles
-        How often each was, the least of all.
+        Smallest number of repeats of any point.
     repeatability
-        RT.
+        Path repeatability RT.
     accuracy, corrected
-        AT, and AT against the prediction of a corrected model; ``None`` as for a pose.
+        Path accuracy AT, and AT against the prediction of a corrected model; ``None`` as for a pose.
     """
 
     path: str

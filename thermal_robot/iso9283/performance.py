@@ -190,7 +190,7 @@ class Performance:
     Attributes
     ----------
     campaign, robot, tool_frame
-        What was measured.
+        Names of campaign, robot and tool frame.
     poses
         Poses at rest, in the sequence in which they were met.
     paths
@@ -202,7 +202,7 @@ class Performance:
     instrument
         RP_l that the instrument alone would show, m; ``None`` where its noise is not given.
     notes
-        What a reader must know, a sentence each.
+        Remarks, a sentence each.
 
     Examples
     --------

@@ -110,7 +110,7 @@ def inverse_kinematics(
     Returns
     -------
     Reached
-        Of every row the nearest that was found. Whether that is near enough is the caller's to say.
+        Nearest solution of each row; the caller decides whether its error is acceptable.
 
     Raises
     ------

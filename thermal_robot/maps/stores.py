@@ -143,12 +143,12 @@ class Map:
     Parameters
     ----------
     path
-        Of the map.
+        Path of the map.
 
     Attributes
     ----------
     notes
-        What decided it: robot, grid, settings.
+        Specification: robot, grid, settings.
 
     Raises
     ------
@@ -212,9 +212,9 @@ class Map:
         largest
             The largest is.
         within
-            By column: what a row must have, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
+            Required range by column, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
         count
-            How many places.
+            Number of places.
 
         Raises
         ------
@@ -274,7 +274,7 @@ def workspace_map(
     path
         ``F.zarr`` (extra ``maps``), or ``F.parquet``, a folder of parts (extra ``parquet``).
     question
-        What is asked of each configuration.
+        Quantities to be computed at each configuration.
     replace
         Begin anew where another map stands there.
     progress

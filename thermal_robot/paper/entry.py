@@ -56,7 +56,7 @@ class Entry:
     Parameters
     ----------
     quantity
-        What is compared.
+        Quantity that is compared.
     where
         Section, table or equation of the paper.
     printed, computed
@@ -66,7 +66,7 @@ class Entry:
     verdict
         One of :data:`VERDICTS`.
     why
-        What lies behind the verdict.
+        Reason of the verdict.
     depends
         Fields of :class:`~thermal_robot.paper.PaperInputs` that were read to compute the row.
     """

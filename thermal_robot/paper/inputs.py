@@ -64,7 +64,7 @@ class PaperInputs:
     repetitions
         Simulated samples behind a rate of rejection; ten times as many behind the law of the skewness.
     seed
-        Of all simulations.
+        Seed of all simulations.
 
     Raises
     ------

@@ -54,8 +54,7 @@ class ExpectedParameter:
     size
         Expected size: its standard deviation before anything is measured.
     sigma, beside
-        Its standard deviation afterwards, with the frames unknown: were this effect the only one at work, and were all
-        of them.
+        Expected posterior standard deviation with unknown frames: with this effect alone, and with all effects.
 
     Examples
     --------
@@ -95,8 +94,8 @@ class Expected:
     parameters
         Its parameters.
     confounded
-        What takes the knowledge of at least one of its parameters away: other effects by name, each beside it alone,
-        and ``"unknown frames"``.
+        What makes at least one of its parameters undeterminable: names of other effects, each taken alone, and
+        ``"unknown frames"``.
     lacks
         What the campaign would have to record for it to be testable; it then has no parameters.
 
@@ -218,9 +217,9 @@ class Plan:
         The rows in their order, a campaign without measurements: joints, time, temperature, payload, and the approaches
         that follow from the order.
     effects
-        How well each effect will be known.
+        Expected precision of each effect.
     information
-        Of all rows about the parameters of all effects, nats.
+        Information of all rows on the parameters of all effects, nats.
     repeats
         How often each pose is measured.
 
@@ -294,11 +293,11 @@ def plan(
     Parameters
     ----------
     robot
-        Whose n joints are commanded, within their limits and within 2.4 rad where one can turn once round.
+        Robot with n joints, commanded within their limits and within 2.4 rad where one can turn once round.
     rows
-        Of the campaign, repeats included.
+        Number of rows, repeats included.
     effects
-        Names of those that are to be told; all where absent.
+        Names of the effects to be determined; all by default.
     repeats
         How often each pose is measured: rows / repeats poses, all of them once a round.
     noise, noise_orientation
@@ -314,9 +313,9 @@ def plan(
     base_known, tool_known
         Whether the frames will be known; by default they are fitted.
     units
-        In which the plan is written; rad and m by default.
+        Units of the plan; rad and m by default.
     seed
-        Of the candidates; the same seed gives the same plan.
+        Seed of the random candidates; the same seed gives the same plan.
 
     Returns
     -------

@@ -405,7 +405,7 @@ def simulate(
     tool_frame
         Link whose pose is measured; only where ``robot`` is no robot yet.
     rows
-        How many are measured, 60 by default, at poses drawn evenly within the joints' limits, and within 2.4 rad where
+        Number of measurements, 60 by default, at poses drawn evenly within the joints' limits, and within 2.4 rad where
         a joint can turn once round.
     repeats
         How often each pose is measured: once a round, labelled ``pose``.
@@ -430,7 +430,7 @@ def simulate(
     base_known, tool_known
         Whether the campaign declares these frames as known, if not as said above.
     seed
-        Of everything that is drawn: the same seed gives the same campaign, and the same poses whatever is at work.
+        Random seed: the same seed gives the same campaign, and the same poses whatever the effects.
 
     Returns
     -------
