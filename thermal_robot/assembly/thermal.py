@@ -552,7 +552,7 @@ def best_poses(
         What is measured: letters for all poses, or a word for each, as for
         :func:`~thermal_robot.assembly.thermal.identify_elongations`.
     seed
-        Seed of the random start.
+        Seed of the random candidates.
 
     Returns
     -------

@@ -37,7 +37,7 @@ def at(row: int) -> np.uint64:
 
 @compiled
 def sincos(room: Array, x: int) -> None:
-    """Sines and cosines of a row of angles below ``LARGEST_REDUCED``, into the next two rows."""
+    """Write sines and cosines of a row of angles below ``LARGEST_REDUCED`` into the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
     angles, sines, cosines = at(x), at(x + 1), at(x + 2)
     for i in range(WIDE):
@@ -56,7 +56,7 @@ def sincos(room: Array, x: int) -> None:
 
 @compiled
 def turn(room: Array, x: int, large: bool) -> None:
-    """Sines and cosines of angles of any size: large ones one by one."""
+    """Write sines and cosines of angles of any size: large ones one by one."""
     sincos(room, x)
     if large:
         angles, sines, cosines = at(x), at(x + 1), at(x + 2)
@@ -229,7 +229,7 @@ def add(room: Array, x: int, factor: float, out: Array, row: int, start: np.uint
 
 @compiled
 def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Tool poses (16, N) of the rows from ``start`` to ``stop``, at least ``LANES`` of them."""
+    """Write the tool poses (16, N) of the rows from ``start`` to ``stop``, at least ``LANES`` of them."""
     kept = still(arm) + 3  # no frame is looked at again but those that stay, and the last
     room = new_room(arm, kept, 0)
     for number in range((stop - start + LANES - 1) // LANES):
@@ -245,7 +245,7 @@ def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def target(room: Array, arm: Arm, tool: int, to: int) -> None:
-    """Position of the point of the tool."""
+    """Write the position of the point of the tool."""
     x, y, z = arm.point
     for m in range(3):
         row, here = tool + 4 * m, at(to + m)
@@ -287,7 +287,7 @@ def add_twist(
 
 @compiled
 def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Jacobians (6 n, N) at the point; the first follower of a driving joint overwrites, the others add."""
+    """Write Jacobians (6 n, N) at the point; the first follower of a driving joint overwrites, the others add."""
     n, kept = q.shape[1], len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point = 12 * kept + 27
@@ -313,7 +313,7 @@ def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def lever_of(room: Array, k: int, point: int, to: int) -> None:
-    """Lever arm of a point from the origin of an element."""
+    """Write the lever arm of a point from the origin of an element."""
     for m in range(3):
         origin, end, here = at(12 * k + 4 * m + 3), at(point + m), at(to + m)
         for i in range(WIDE):
@@ -322,7 +322,7 @@ def lever_of(room: Array, k: int, point: int, to: int) -> None:
 
 @compiled
 def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Placement sensitivities (36 S, N) at the point."""
+    """Write placement sensitivities (36 S, N) at the point."""
     segments, kept = len(arm.placed), len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point, lever = 12 * kept + 27, 12 * kept + 30
@@ -372,7 +372,7 @@ def add_torque(
 
 @compiled
 def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
-    """Return the holding torques (n, N) of the arm and of a payload at the point."""
+    """Write holding torques (n, N) of the arm and of a payload at the point."""
     kept = len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     moment = 12 * kept + 27

@@ -339,7 +339,7 @@ def target(frames: ChainFrames, point: Array | None, part: slice) -> Array:
 
 
 def cross(a: Array, b: Array, out: Array, term: Array) -> None:
-    """Cross product of vectors, or of one with many, components first; here several times faster than ``np.cross``."""
+    """Write the cross product of vectors, or of one with many, components first; faster here than ``np.cross``."""
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.multiply(a[j], b[k], out=out[i])
         np.multiply(a[k], b[j], out=term)

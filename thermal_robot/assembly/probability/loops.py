@@ -59,7 +59,7 @@ def variances(a: float, b: float, c: float) -> tuple[float, float]:
 
 @_reordered
 def _decays(room: Array, bits: npt.NDArray[np.int64], count: int) -> None:
-    """Exponentials exp(−h) of the first row of the work array into the second; ``bits`` is its integer view."""
+    """Write exp(−h) of the first row of the work array into the second; ``bits`` is its integer view."""
     for k in range(count):
         room[1, k] = max(-room[0, k], _LEAST) * _LOG2E + _ROUND
     for k in range(count):
@@ -142,7 +142,7 @@ def circles(
     stop: int,
     found: Array,
 ) -> None:
-    """Probabilities (2, N) inside and outside of the cases from ``start`` to ``stop``; NaN where not applicable.
+    """Write probabilities (2, N) inside and outside, of the cases from ``start`` to ``stop``; NaN where not applicable.
 
     ``nodes`` (K,) numbers of angles; ``table``, ``quarters`` (K, 2, most) their cosines and sines, those of a quarter
     of the edge apart.
