@@ -3,19 +3,18 @@
 An effect that was wrongly named has another size in the next campaign. So an effect is confirmed if two campaigns agree
 on most of it: sizes within half of the larger, which allows for wear and re-adjustment.
 
-Parameters. A campaign alone says θ = G⁺b with covariance G⁺ of all effects that are at work in any campaign together.
-Of one effect with the others free, it says I θ = s, where I and s are what is left of G and b once the others are
-projected out; then
+Parameters. A campaign alone estimates the effects at work in any campaign by θ = G⁺b, with covariance G⁺. For one
+effect with the others free, I θ = s, where I and s are G and b with the others projected out; then
 
     χ² = Σ_c s_cᵀ I_c⁺ s_c − (Σ s_c)ᵀ (Σ I_c)⁺ (Σ s_c)
 
-has Σ rank I_c − rank Σ I_c degrees of freedom if the effect is the same in all campaigns. What only one of them
-determines adds to neither.
+has Σ rank I_c − rank Σ I_c degrees of freedom if the effect is the same in all campaigns. Directions that only one
+campaign determines add to neither.
 
 Predictions, where both campaigns measured: the cross-validation of mrcal (D. Kogan, *mrcal*: cross-validation of
-calibrations): two solutions of the same thing differ by noise, whose size each states. Where they differ by more than
-twice that, a model is wrong. Base and tool of each campaign are its own, so that a base twist and a shift of the target
-that make the two alike mean nothing and are fitted away, in the difference and in the deviations.
+calibrations): two calibrations of one robot differ by noise, whose size each states. A difference above twice that
+means that a model is wrong. Base and tool differ between campaigns, so that a base twist and a shift of the target are
+fitted and subtracted, in the difference and in the standard deviations.
 """
 
 from __future__ import annotations
@@ -77,15 +76,15 @@ def compare(
 ) -> Comparison:
     """Test which effects and parameters campaigns of one robot share, and which changed between them.
 
-    What an unknown frame takes up, such as the first joint's zero, means nothing between campaigns: it is projected out
-    before anything is compared. One joint fit of all campaigns then weighs by evidence whether each effect is the same
-    in all of them or differs, place by place. An effect on whose size no two campaigns agree loses its name.
+    Parameters that an unknown frame absorbs, such as the first joint's zero, are projected out. One joint fit of all
+    campaigns then decides by marginal likelihood whether each effect is shared or differs, place by place. An effect on
+    whose size no two campaigns agree is contradicted.
 
     Parameters
     ----------
     *campaigns
         Two or more, in the order in which they were measured: campaigns, their diagnoses, corrected models, or paths of
-        campaigns and of model files (``.json``). A model says nothing of effects that it does not hold.
+        campaigns and of model files (``.json``). A model carries no information on effects outside it.
     names
         Names of the campaigns in the result; by default their own.
     only, without, effects

@@ -1,13 +1,13 @@
 """Bayesian model selection over all campaigns together: what they share and what differs between them.
 
-Every campaign says y_c = X_c θ_c + noise, its own frames projected out. An effect that is shared is one block of
+The model of campaign c is y_c = X_c θ_c + noise, its own frames projected out. An effect that is shared is one block of
 columns over all campaigns; one of its places (a joint, a link), or one parameter there, that differs in some campaigns
 is a block over these alone. All blocks compete by the marginal likelihood of a diagnosis
 (:mod:`thermal_robot.inference.evidence`), from the campaigns' sums of products; noise and frames are each campaign's
-own. What the search holds for a change must also stand by its chi-square, corrected for all that was looked at.
+own. A change must also be significant by its chi-square, corrected for the number of comparisons.
 
-Blocks that differ are many: of four campaigns fourteen sets may each differ in every place and parameter. Products are
-formed of those that are asked for alone.
+There are many differing blocks: with four campaigns fourteen subsets for every place and parameter. Products are formed
+on demand.
 """
 
 from __future__ import annotations
@@ -116,11 +116,11 @@ class Problem:
     def better(self, held: Sequence[Part], bases: Sequence[Combination], best: float) -> list[Part]:
         """Parts that improve a combination, added or in place of one of its blocks.
 
-        All are weighed to first order; of each place the first is returned that is better exactly, those that promise
-        most before the others. Where the effect is shared, to differ in some campaigns or in all others is the same:
-        then the fewer are returned, which others may join that differ elsewhere. ``held`` are the parts that take part
-        already, as the ``bases`` number them: the best combination, those as near, and those without one of its blocks.
-        ``best`` is the log evidence of the best.
+        All are scored to first order; for each place the first that improves the exact evidence is returned, in the
+        order of the first-order gain. For a shared effect, a difference in some campaigns or in the complement is
+        equivalent: the smaller subset is returned. ``held`` are the parts in the model already, as the ``bases`` number
+        them: the best combination, those as near, and those without one of its blocks. ``best`` is the log evidence of
+        the best.
         """
         found: dict[tuple[int, Place], Part] = {}
         alike = {(p.effect, p.parameters, p.where): p for p in self.parts if not p.shared}
@@ -270,8 +270,8 @@ def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
 def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Search, Combination]:
     """Parts that were evaluated together, the search over them, and the best combination.
 
-    All parts, where they are few. Of many, those that are shared first; others join while one of them, to first order,
-    would better the best combination, beside it or in place of one of its blocks.
+    All parts, where they are few. Otherwise the shared ones first; others join while their first-order gain is
+    positive, added or in place of a block.
     """
     few = len(problem.parts) <= settings.AT_ONCE
     held = [part for part in problem.parts if few or part.shared]

@@ -4,18 +4,18 @@ With y the gap, X the columns of all parameters and F those of the unknown frame
 
     G = Xᵀ(1 − F F⁺)X,   b = Xᵀ(1 − F F⁺)y.
 
-What an unknown frame takes up, such as the first joint's zero, is not in G. Where what remains is no noise, the
+Parameters that an unknown frame absorbs, such as the first joint's zero, are not in G. With a structured residual, the
 information along each axis of G is divided by the variance inflation of :mod:`thermal_robot.diagnosis.uncertainty`.
 
-A model file may stand in the place of a campaign. It holds the values θ of the effects that were found, the covariance
-C of frames and parameters, the deviation π that was expected of each parameter, and the ranges that were measured. The
-rows alone say of θ, by Bayes' theorem for a linear model with normal errors,
+A model file may replace a campaign. It holds the values θ of the effects found, the covariance C of frames and
+parameters, their prior standard deviations π, and the measured ranges. The information of the rows alone is, by Bayes'
+theorem for a linear model with normal errors,
 
     G = C⁻¹ − π⁻²,   b = C⁻¹ θ.
 
-Its parameters θ_M become those that are compared by what they do to the target: X_M = X A + F B over poses within the
-measured ranges, so that θ = A θ_M. An effect that does what the compared parameters cannot do is marginalised with the
-frames. Of all that a model does not hold it says nothing.
+Its parameters θ_M are expressed in the compared ones by their displacement of the target: X_M = X A + F B over poses
+within the measured ranges, so that θ = A θ_M. An effect outside the span of the compared parameters is marginalised
+with the frames. A model carries no information on effects outside it.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Known:
         Raises
         ------
         CampaignError
-            If it rests on a simulator, or does not say how sure it is.
+            If it depends on a simulator, or lacks its uncertainty.
         """
         if model.simulated:
             problem = "this model corrects a simulator's predictions, which it does not hold"
@@ -143,8 +143,8 @@ class Candidate:
 
     ``told`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
     among all that are compared. Of each campaign ``parameters`` are the same with their responses there, empty where it
-    lacks what they need; ``named`` tells whether its diagnosis names the effect. The name and title of a law that was
-    found in one campaign have that campaign's name with it.
+    lacks what they need; ``named``: whether its diagnosis names the effect. A discovered law has its campaign's name
+    appended to its name and title.
     """
 
     name: str
@@ -170,8 +170,8 @@ def candidates(
 ) -> tuple[Candidate, ...]:
     """Effects to compare, those that may be re-zeroed between campaigns first.
 
-    Every effect of a diagnosis, every one that is probable enough in any of them, and those that somebody could set
-    anew between campaigns, such as a joint's zero. A model file is both a diagnosis (``found``) and its fit.
+    All effects of the diagnoses, all that are probable enough in one, and those that may be re-set between campaigns,
+    such as joint zeros. A model file is both a diagnosis (``found``) and its fit.
     """
     listed: list[Candidate] = []
     for key, effect in _settings(fits, names):

@@ -62,11 +62,11 @@ class Effect:
     name, title
         Name and title of the effect; a discovered law has its campaign's name appended.
     status
-        ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: it loses
-        its name; ``not_needed``: some diagnosis names it, and the campaigns together do not need it;
-        ``not_compared``: one campaign alone can tell it; ``absent``: no diagnosis names it, and nothing speaks for it.
+        ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: no two
+        campaigns agree on its size; ``not_needed``: a diagnosis names it, but the joint fit does not need it;
+        ``not_compared``: only one campaign determines it; ``absent``: neither a diagnosis nor the joint fit has it.
     reason
-        Why it loses its name, or is not compared; empty otherwise.
+        Why it is contradicted, or not compared; empty otherwise.
     probability
         Posterior probability, by the joint fit, that it is at work in any campaign.
     named
@@ -74,7 +74,7 @@ class Effect:
     chi2, degrees, p_value
         Chi-square test of equal parameters in all campaigns, all others free in each.
     parameters
-        One by one.
+        Comparison of each parameter.
     """
 
     name: str
@@ -172,9 +172,9 @@ class Comparison:
     changes
         Differences, the most certain first.
     predicted
-        For every two campaigns.
+        Cross-predictions of every two campaigns.
     not_told
-        Parameters that no campaign can tell beside the unknown frames and the others: they are not compared.
+        Parameters that no campaign determines given the unknown frames and the others: they are not compared.
     looked_at
         Number of places compared, for which the p-values of changes are corrected.
     diagnoses

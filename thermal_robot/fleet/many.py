@@ -1,16 +1,16 @@
 """Parallel diagnosis of many campaigns by Dask workers, local or of a cluster.
 
-What is done already, the rows of each campaign by its fingerprint, is a database of SQLite: a process that is killed
-leaves what it has written, and nothing half. Only the process that runs the fleet opens it; a second one is refused.
+Finished rows of each campaign, by its fingerprint, are in an SQLite database, which survives a killed process. Only the
+process that runs the fleet opens it; a second one is refused.
 
 On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
 share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
 does, so that no other user of the machine can hand it work, and serves no page. A cluster's scheduler is named by its
 address; its TLS is that of Dask's own configuration.
 
-As much is handed out at a time as there are threads, so that a process that is killed had one campaign. Dask would
-hand that to others again and again, and count whatever else lay on them as suspicious, too: here it waits until the end
-and is done then by itself, once. If that process is killed as well, it was this campaign.
+At most one task a thread is submitted at a time, so that a killed process had one campaign. Dask would retry that on
+other workers and suspect their tasks, too: here it is retried once at the end, alone. If that process is killed as
+well, the campaign has failed.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ def diagnose_many(
 ) -> Fleet:
     """Diagnose many campaigns with :func:`diagnose` in parallel, and summarise them.
 
-    A run that was stopped continues: what is done, by the content of its files, the version of the program and the
-    options, is not done again. The table is the same, byte for byte, for any number of workers. A campaign that fails
-    is a row with its reason; one that failed for another reason than its own files is tried again by the next run.
+    An interrupted run is resumed: finished campaigns with the same files, program version and options are not repeated.
+    The table is the same, byte for byte, for any number of workers. A failed campaign is a row with its reason; it is
+    retried by the next run unless its own files are the reason.
 
     A script that calls this does so under ``if __name__ == "__main__":``, for its processes import it.
 

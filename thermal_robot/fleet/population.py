@@ -1,14 +1,14 @@
 """Random-effects model by empirical Bayes: population mean of a quantity, spread between robots, and outliers.
 
-Of robot i the value y_i is known with deviation s_i. The robots' own values scatter about the mean of their group,
+The value y_i of robot i is known with standard deviation s_i. The robots scatter about the mean of their group,
 
     y_i ~ (1 − ε) N(μ_g, s_i² + τ²) + ε C(μ_g, W √(s_i² + τ²)),
 
-with Cauchy's law C, some times as wide and without an end, for robots that are unlike the others; these say nothing of
-μ_g. By empirical Bayes all of μ, τ and ε come from the fleet itself
-(Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1, 2006, on flat priors of τ): for
-each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird and Rubin, *J. R. Stat. Soc.* B
-39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over the posterior of τ.
+with a wider Cauchy law C for outlying robots, which carry little information on μ_g. By empirical Bayes μ, τ and ε are
+estimated from the fleet itself (Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1,
+2006, on flat priors of τ): for each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird
+and Rubin, *J. R. Stat. Soc.* B 39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over
+the posterior of τ.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _cauchy(square: Array) -> Array:
 def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Array, Array]:
     """Weighted mean of several values of the same robot.
 
-    Where they differ by more than their deviations, that of the mean grows in proportion (Birge, *Phys. Rev.* 40,
+    Where they differ by more than their deviations, the deviation of the mean is inflated (Birge, *Phys. Rev.* 40,
     1932). Returns numbers of the n robots, and (n,) values and deviations.
     """
     robots, which = np.unique(owners, return_inverse=True)

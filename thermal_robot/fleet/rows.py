@@ -1,15 +1,15 @@
 """Parquet table of a fleet: least-squares estimates of all parameters, one row for each effect; SI.
 
-A fleet cannot be judged by the parameters of the robots in which an effect was found: those are the large ones, and an
-effect too small to be found in any robot may be at work in all. So every campaign tells every parameter of every effect
-that it can test, beside the effects that were found and those that may be at work, as the data alone say it: with G the
-products of the columns, the frames projected out, s the noise, and Λ the priors of the others,
+The parameters of robots in which an effect was found are biased: only large ones are found, and a small effect may be
+at work in all robots. So every campaign estimates every parameter of every testable effect, given the effects that were
+found and those that may be at work: with G the Gram matrix, the frames projected out, s the noise, and Λ the priors of
+the others,
 
     θ = (G/s² + Λ⁻¹)⁻¹ b/s²,
 
-Λ⁻¹ next to nothing for the effect in question, and no parameter held positive. Such estimates scatter about the truth,
-and their mean over a fleet does, too. What is not found but may be at work has its prior of expected size: left out,
-it would be told as something else's, in all robots alike.
+with nearly flat prior for the effect in question, and no parameter held positive. Such estimates are unbiased, and so
+is their mean over a fleet. Effects that may be at work keep their prior of expected size: left out, they would bias
+others in all robots alike.
 """
 
 from __future__ import annotations
@@ -170,8 +170,8 @@ def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None
 def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
     """Least-squares estimates of each effect's parameters, given the others that are or may be at work.
 
-    Of effects in all their places, those of ``names`` that were tried and taken out again, too: name, value, one sigma
-    (SI) and unit of the parameters of which the data know more than the expected size says.
+    Effects in all their places, including those of ``names`` that were removed: name, value, one sigma (SI) and unit of
+    the parameters that the data determine better than the prior.
     """
     e, likely = fit.explanation, _likely(fit)
     own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}

@@ -1,8 +1,8 @@
 """Empirical Bayes summary of a fleet: effects by robot, common parameters, outliers.
 
-Each parameter of each effect is a :func:`~thermal_robot.fleet.population.population` of its own, of values that every
-campaign tells whether the effect was found there or not (:mod:`thermal_robot.fleet.rows`). The table is read in pieces,
-and of parameters those of one effect at a time.
+Each parameter of each effect is fitted as a :func:`~thermal_robot.fleet.population.population` of the estimates of all
+campaigns, whether or not the effect was found there (:mod:`thermal_robot.fleet.rows`). The table is read in pieces, and
+of parameters those of one effect at a time.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class Shared:
     mean, mean_std
         Mean over the fleet, and its standard deviation.
     spread, spread_std
-        Between robots, one sigma, deviations of measurement taken out; and how well that is known. Where groups
-        differ it is that within a group.
+        Standard deviation between robots, corrected for measurement errors, and its own. Where groups differ it is that
+        within a group.
     p_mean
         P value of the mean being zero, times the number of parameters and labels that were looked at.
     label, p_label
@@ -170,13 +170,13 @@ class Summary:
     failures
         Campaigns without a diagnosis: name, outcome, reason.
     effects
-        How often each effect was found, most often first.
+        Number of robots by effect, most frequent first.
     gathered
         Effects that were found in one group more often than chance allows, most striking first.
     shared
         Per parameter that differs from zero over the whole fleet, or between groups: mean and spread.
     apart
-        Robots that stand out, most probable first, each against its group.
+        Outlying robots relative to their group, most probable first.
     found
         Campaigns with the largest gaps, and the effects found in each.
     parameters

@@ -47,9 +47,9 @@ def wear(
 ) -> Wear:
     """Change-point analysis of a robot's parameters over time: constant, jump, linear trend or random walk.
 
-    Each campaign is fitted by itself, which names effects, outliers and noise. Then all are put into one linear
-    problem: the parameters of all effects that were named in any of them, and the zero of every joint, are constants
-    that all share, the unknown frames of each campaign its own. What moves beside is weighed by marginal likelihood.
+    Each campaign is fitted alone for its effects, outliers and noise. Then all enter one linear problem: the parameters
+    of all effects found in any campaign, and all joint zeros, are common constants; unknown frames are each campaign's
+    own. Changes of parameters compete by marginal likelihood.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def wear(
     effects
         Names of the effects to consider; all where it is left out. The zeros of joints are always followed.
     false_alarm
-        Stated probability that a series without any change rings at all.
+        Probability of any alarm in a series without change.
     progress
         Called with a few words at each stage.
 

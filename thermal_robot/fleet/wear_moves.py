@@ -2,13 +2,13 @@
 
 In campaign k the parameters are θ_k = θ + Σ_i a_i s_i(k) e_i: a constant for all campaigns, and moves. Of a move i,
 parameter e_i changes with a shape s_i over time: a step after campaign j (a jump), or a straight line (a trend). A walk
-is all steps of a parameter at once, the variance of each in proportion to the time that it took. With the whitened
-products of campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, everything follows from sums over k:
+is all steps of a parameter at once, the variance of each proportional to its time. With the whitened products of
+campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, everything follows from sums over k:
 
     V_ij = Σ s_i s_j G_k[e_i, e_j] − B_i A⁻¹ B_j',   g_i = Σ s_i b_k[e_i] − B_i A⁻¹ Σ b_k,
 
-with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves that is left beside the constants. For
-moves of prior variances τ, and a factor φ by which campaigns scatter more than their deviations say,
+with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves with the constants projected out. For moves
+of prior variances τ and overdispersion φ of the campaigns,
 
     log BF = −½ log|1 + √τ V √τ/φ²| + ½ g'(V + φ² τ⁻¹)⁻¹ g / φ².
 
