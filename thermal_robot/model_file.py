@@ -81,7 +81,7 @@ class Part:
 
 
 def _pose(value: Any, path: str) -> Array:
-    """Return the schema of a homogeneous matrix with a proper rotation."""
+    """Validate a homogeneous matrix with a proper rotation."""
     pose: Array = matrix((4, 4))(value, path)
     turn = pose[:3, :3]
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
@@ -101,7 +101,7 @@ def _frames(value: Any, path: str) -> Frames:
 
 
 def _urdf(value: Any, path: str) -> str:
-    """Return the schema of URDF text; names of files are refused."""
+    """Validate URDF text; names of files are refused."""
     urdf: str = text("the text of a URDF")(value, path)
     if not urdf.lstrip("\ufeff \t\r\n").startswith("<"):
         raise MisfitError(path, value, "the text of a URDF")
@@ -125,7 +125,7 @@ def _ends(value: Any, path: str) -> tuple[float, float]:
 
 
 def _covariance(value: Any, path: str) -> Array:
-    """Return the schema of a covariance: symmetric, without negative variances."""
+    """Validate a covariance: symmetric, without negative variances."""
     covariance: Array = matrix()(value, path)
     size = float(np.abs(covariance).max(initial=0.0))
     if not size:
@@ -138,7 +138,7 @@ def _covariance(value: Any, path: str) -> Array:
 
 
 def _spread(value: Any, path: str) -> Spread:
-    """Return the schema of the predictive uncertainty."""
+    """Validate the predictive uncertainty."""
     three = listed(NOT_NEGATIVE, 3, "three standard deviations")
     known = {"covariance": _covariance, "beyond": three, "noise": three, "ranges": mapping(_ends)}
     more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE), "between": three}

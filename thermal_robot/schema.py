@@ -62,7 +62,7 @@ def shown(value: Any) -> str:
 
 
 def text(expected: str = "text", *, empty: bool = False) -> Kind:
-    """Return the schema of UTF-8 text without NUL, not empty unless stated."""
+    """Return a validator of UTF-8 text without NUL, not empty unless stated."""
 
     def kind(value: Any, path: str) -> str:
         if not isinstance(value, str) or not (empty or value.strip()) or "\0" in value:
@@ -77,7 +77,7 @@ def text(expected: str = "text", *, empty: bool = False) -> Kind:
 
 
 def word(allowed: Iterable[str], problem: str = "") -> Kind:
-    """Return the schema of one of some words."""
+    """Return a validator of one of some words."""
     words = tuple(allowed)
     expected = alternatives(words)
 
@@ -95,7 +95,7 @@ def alternatives(words: Iterable[str]) -> str:
 
 
 def boolean(value: Any, path: str) -> bool:
-    """Return the schema of true or false."""
+    """Validate true or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise MisfitError(path, value, "true or false")
     return bool(value)
@@ -109,7 +109,7 @@ def number(
     expected: str = "a finite number",
     problem: str = "",
 ) -> Kind:
-    """Return the schema of a finite number in a range; ``problem`` is the message for one outside it."""
+    """Return a validator of a finite number in a range; ``problem`` is the message for one outside it."""
 
     def kind(value: Any, path: str) -> float:
         try:
@@ -130,7 +130,7 @@ POSITIVE = number(above=0.0, expected="a number above 0")
 
 
 def whole(least: int) -> Kind:
-    """Return the schema of a whole number of at least ``least``."""
+    """Return a validator of a whole number of at least ``least``."""
 
     def kind(value: Any, path: str) -> int:
         if not isinstance(value, Integral) or value is True or value is False or not least <= int(value) <= LARGEST:
@@ -141,7 +141,7 @@ def whole(least: int) -> Kind:
 
 
 def listed(item: Kind, count: int | None = None, expected: str = "") -> Kind:
-    """Return the schema of a list of values of one schema, ``count`` of them where given; returns a tuple."""
+    """Return a validator of a list, ``count`` items where given; it returns a tuple."""
     expected = expected or (f"a list of {count} values" if count is not None else "a list")
 
     def kind(value: Any, path: str) -> tuple[Any, ...]:
@@ -154,7 +154,7 @@ def listed(item: Kind, count: int | None = None, expected: str = "") -> Kind:
 
 
 def matrix(shape: tuple[int | None, int | None] = (None, None)) -> Kind:
-    """Return the schema of rows of finite numbers of equal length; returns an array."""
+    """Return a validator of rows of finite numbers of equal length; it returns an array."""
     rows, columns = shape
 
     def kind(value: Any, path: str) -> Any:
@@ -168,7 +168,7 @@ def matrix(shape: tuple[int | None, int | None] = (None, None)) -> Kind:
 
 
 def increasing(item: Kind) -> Kind:
-    """Return the schema of a strictly increasing list of numbers."""
+    """Return a validator of a strictly increasing list of numbers."""
 
     def kind(value: Any, path: str) -> tuple[float, ...]:
         found: tuple[float, ...] = listed(item)(value, path)
@@ -181,7 +181,7 @@ def increasing(item: Kind) -> Kind:
 
 
 def optional(item: Kind) -> Kind:
-    """Return the schema of a value, or null."""
+    """Return a validator of a value, or null."""
 
     def kind(value: Any, path: str) -> Any:
         return None if value is None else item(value, path)
@@ -190,7 +190,7 @@ def optional(item: Kind) -> Kind:
 
 
 def either(one: Kind, lists: Kind) -> Kind:
-    """Return the schema of a list of one schema, or of another value of the other."""
+    """Return a validator that uses ``lists`` for lists, ``one`` for other values."""
 
     def kind(value: Any, path: str) -> Any:
         return (lists if isinstance(value, (list, tuple)) else one)(value, path)
@@ -199,7 +199,7 @@ def either(one: Kind, lists: Kind) -> Kind:
 
 
 def mapping(item: Kind) -> Kind:
-    """Return the schema of values of one schema under arbitrary keys."""
+    """Return a validator of an object with arbitrary keys and values of one kind."""
 
     def kind(value: Any, path: str) -> dict[str, Any]:
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
@@ -210,7 +210,7 @@ def mapping(item: Kind) -> Kind:
 
 
 def record(known: Mapping[str, Kind], may_lack: Iterable[str] = ()) -> Kind:
-    """Return the schema of an object with known keys; all are required but the optional ones."""
+    """Return a validator of an object with known keys; all are required but those that ``may_lack``."""
     spare = frozenset(may_lack)
 
     def kind(value: Any, path: str) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def record(known: Mapping[str, Kind], may_lack: Iterable[str] = ()) -> Kind:
 
 
 def plain(value: Any, path: str) -> Any:
-    """Return the schema of any JSON value with finite numbers; lists become tuples."""
+    """Validate any JSON value with finite numbers; lists become tuples."""
     if isinstance(value, Mapping):
         return mapping(plain)(value, path)
     if isinstance(value, (list, tuple)):

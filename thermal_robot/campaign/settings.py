@@ -174,7 +174,7 @@ _KEYS: dict[str, Kind] = {
 
 
 def settings_kind(value: Any, path: str) -> Settings:
-    """Return the schema of the settings in a file (:mod:`thermal_robot.schema`)."""
+    """Validate the settings in a file (:mod:`thermal_robot.schema`)."""
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
     values = record(_KEYS)({"moves": "unknown", "turned": (), **value} if isinstance(value, Mapping) else value, path)
     sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}

@@ -1,4 +1,4 @@
-"""Schema of the constructor arguments of an effect in a file, from its annotations.
+"""Validation of the constructor arguments of an effect in a file, from its annotations.
 
 An annotation is a type, or a type with a kind of :mod:`thermal_robot.schema` for its range, as in ``lag: NotNegative =
 0.0`` with one of the names below. Lists in a file are tuples in an effect.
@@ -57,7 +57,7 @@ def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
 
 
 def _kind(annotation: Any) -> Kind:
-    """Return the schema of an annotation; any JSON value where there is none."""
+    """Return a validator of an annotation; of any JSON value where there is none."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return next((part for part in parts[1:] if callable(part)), _kind(parts[0]))

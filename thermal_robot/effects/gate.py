@@ -84,7 +84,7 @@ def independent(effect: Effect, observations: Observations) -> tuple[Parameter, 
 
 
 def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-    """Check the driver of an effect at a place (:meth:`Effect.driver`): name, unit, (N,) finite values; or ``None``."""
+    """Return a validated driver (:meth:`Effect.driver`): name, unit, (N,) finite values; ``None`` without one."""
     answer = _asked(effect, "driver", observations, parameters, error)
     if answer is None:
         return None

@@ -473,7 +473,7 @@ class _Search:
         return better
 
     def _revised(self) -> bool:
-        """Backward or exchange step: drop a component or change its kind, if the best of these is better."""
+        """Backward or exchange step: drop a component or change its kind; whether that improved the set."""
         others = [tuple(o for o in self.chosen if o != c) for c in self.chosen]
         moved = [(*rest, (k, c[1])) for rest, c in zip(others, self.chosen, strict=True) for k in self.kinds]
         others += [m for m in moved if len(set(m)) == len(m)]

@@ -530,7 +530,7 @@ def law_of_u(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def counts_of_eq_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Return the number of equations and unknowns of Eq 12, as printed and as the text says."""
+    """Median condition of Eq 12 with five and with ten equations, and its rank as printed."""
     five, _, ten = random_systems(i.pose_sets, i.seed)
     robot = rv_m2_with_hand()
     q = np.random.default_rng(i.seed).uniform(robot.lower, robot.upper, (5, robot.n))

@@ -114,7 +114,7 @@ def found(table: Table, source: str | int) -> str:
 
 
 def _either(of_text: Kind, other: Kind, kind: type) -> Kind:
-    """Return the schema of a value of a type, or else of another schema."""
+    """Return a validator that uses the first one for values of a type, the other one else."""
     return lambda value, path: (of_text if isinstance(value, kind) else other)(value, path)
 
 
@@ -133,7 +133,7 @@ _ORIGINS = ("column", "sum", "value", "count")
 
 
 def column_kind(value: Any, path: str) -> Column:
-    """Return the schema of a column's source: a name, a number, or an inline table."""
+    """Validate a column's source: a name, a number, or an inline table."""
     if not isinstance(value, Mapping):
         return Column((_SOURCE(value, path),))
     given = record(_FIELDS, may_lack=_FIELDS)(value, path)
@@ -144,7 +144,7 @@ def column_kind(value: Any, path: str) -> Column:
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
-    """Return the schema of the sources by column, ``joints`` being a list."""
+    """Validate the sources by column, ``joints`` being a list."""
     if not isinstance(value, Mapping):
         raise MisfitError(path, value, "columns by name")
     joints = list_of(column_kind)
@@ -222,7 +222,7 @@ _KEYS = {
 
 
 def orientation_kind(value: Any, path: str) -> dict[str, Orientation]:
-    """Return the schema of the orientation convention; the one entry of the section is called ``stated``."""
+    """Validate the orientation convention; the one entry of the section is called ``stated``."""
     given = record(_KEYS, may_lack=("order", "sequence", "unit", "inverse"))(value, path)
     kind, counts = given["kind"], _COUNTS[given["kind"]]
     if len(given["columns"]) not in counts:

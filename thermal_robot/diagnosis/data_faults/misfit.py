@@ -279,7 +279,7 @@ def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
 
 
 def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
-    """Whether only another robot, or another motion, makes commands and measurements match.
+    """Mismatch if only another robot, or another motion, makes commands and measurements match; else ``None``.
 
     Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
     their order, may have frames of their own: a base that was moved is no other robot. The model that is meant is told
@@ -380,7 +380,7 @@ def _leaves(other: Misfit) -> float:
 
 
 def another_motion(fitted: Fit) -> Misfit | None:
-    """Whether the residual of a fit exceeds what any robot errs, so that robot and table are of different motions."""
+    """Mismatch if the residual of a fit exceeds what any robot errs: the motions differ; else ``None``."""
     left = fitted.corrected.gap[~fitted.explanation.outliers]
     away, turned = rms(left[:, :3]), rms(left[:, 3:])
     if away > settings.ANOTHER_MOTION * fitted.campaign.reach:
