@@ -144,7 +144,7 @@ class _AsTold(Effect):
     told: tuple[Parameter, ...] = ()
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the the given parameters."""
+        """Return the given parameters."""
         return self.told
 
 

@@ -559,7 +559,7 @@ class _Round:
         return cls._on(asked, ladder, seeds, detours=False)
 
     def without(self, out: frozenset[int]) -> _Round:
-        """Return the the round without some blocks, started from the best combination without them."""
+        """Return the round without some blocks, started from the best combination without them."""
         return self._on(self.asked, self.ladder.without(out), [tuple(b for b in self.best.blocks if b not in out)])
 
     @classmethod

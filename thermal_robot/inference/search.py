@@ -370,7 +370,7 @@ class Search:
         return sorted(found.values(), key=lambda c: -c.log_evidence)
 
     def _bases(self, best: Combination) -> list[Combination]:
-        """Return the the combination, and it without each of its blocks: the starting points of additions."""
+        """Return the combination, and it without each of its blocks: the starting points of additions."""
         return [best, *(self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks)]
 
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:

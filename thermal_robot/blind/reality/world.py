@@ -437,7 +437,7 @@ def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
-    """Return the static equilibrium of joint springs against gravity; returns the joint torques, N·m."""
+    """Solve the static equilibrium of joint springs against gravity; return the joint torques, N·m."""
     yields = bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
