@@ -47,7 +47,7 @@ class Calibrated:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """Parameters of named effects of a robot, and the residual beside them.
+    """Result of a calibration: parameters of named effects of a robot, and the residual.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ _FOUND = ("found", "contained", "confounded")
 
 @dataclass(frozen=True)
 class Count:
-    """Number of robots in which an effect was found.
+    """Numbers of robots in which an effect was found, is testable, and is confounded.
 
     Attributes
     ----------
