@@ -75,16 +75,6 @@ def test_path_of_file_or_directory_gives_the_same(tmp_path: Path, monkeypatch: p
     assert read_campaign(folder / "monday.toml").name == "monday"
 
 
-def test_a_builtin_robot_is_not_a_path(tmp_path: Path) -> None:
-    builtin = load_robot("builtin:rv_m2", "tool0")
-    table = pd.DataFrame(np.random.default_rng(0).uniform(-0.5, 0.5, (9, builtin.n)), columns=builtin.joint_names)
-    table[["x", "y", "z"]] = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
-    table.to_csv(tmp_path / "measurements.csv", index=False)
-    toml = PLAIN_TOML.replace("robot.urdf", "builtin:rv_m2").replace('"tool"', '"tool0"').replace("lift = 101", "")
-    (tmp_path / "campaign.toml").write_text(toml)
-    assert read_campaign(tmp_path).robot.joint_names == builtin.joint_names
-
-
 def test_robot_errors_name_the_campaign(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=r"campaign\.toml, \[robot\]: .*'tol'") as caught:
         read(tmp_path, toml=PLAIN_TOML.replace('"tool"', '"tol"'))
@@ -294,6 +284,8 @@ def test_a_campaign_from_a_frame_is_that_from_files(robot: Robot) -> None:
     assert other.labels["pose"].tolist() == ["1", "2", "3"]
     np.testing.assert_allclose(other.orientation, campaign.orientation)
     assert other.rows.tolist() == [0, 1, 2]
+    none = campaign_from_table(robot, frame, angle_unit="deg", tool="known", noise_position=0.0, noise_orientation=0.0)
+    assert (none.noise_position, none.noise_orientation) == (None, None)
     frame = frame.iloc[[2, 0, 1]]
     assert campaign_from_table(robot, frame, angle_unit="deg", tool="known").rows.tolist() == [2, 0, 1]
     frame.index = pd.Index(["a", "b", "c"])
@@ -331,23 +323,6 @@ def test_arguments_are_checked(robot: Robot, arguments: dict[str, object], colum
     with pytest.raises(CampaignError, match=words) as caught:
         campaign_from_table(robot, pd.DataFrame(), **arguments)
     assert (caught.value.file, caught.value.column) == ("<table>", column)
-
-
-@pytest.mark.parametrize(
-    ("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6), ("inch", 1 / 0.0254), ("ft", 1 / 0.3048)]
-)
-def test_one_campaign_in_any_unit(robot: Robot, unit: str, per_metre: float) -> None:
-    rng = np.random.default_rng(1)
-    q = pd.DataFrame(rng.uniform(0.1, 0.4, (5, 4)), columns=list(robot.joint_names))
-    place = rng.uniform(-1, 1, (5, 3))
-    frame = q.assign(slide=q["slide"] * per_metre)
-    frame[["x", "y", "z"]] = place * per_metre
-    campaign = campaign_from_table(robot, frame, length_unit=unit, noise_position=1e-5 * per_metre)
-    np.testing.assert_allclose(campaign.q, q, rtol=1e-14)
-    np.testing.assert_allclose(campaign.position, place, rtol=1e-14)
-    assert campaign.noise_position == pytest.approx(1e-5)
-    none = campaign_from_table(robot, frame, noise_position=0.0, noise_orientation=0.0)
-    assert (none.noise_position, none.noise_orientation) == (None, None)
 
 
 def test_cells_of_a_frame_are_checked_and_samples_need_no_position(robot: Robot) -> None:

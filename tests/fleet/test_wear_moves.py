@@ -85,16 +85,6 @@ def test_evidence_is_that_of_the_density_of_all_measurements(case, moves, scale,
     assert found - nothing == pytest.approx(wanted, abs=0.01 if factor == 1.0 else 0.05)
 
 
-def test_one_more_move_is_worth_what_both_are_worth(case):
-    series, first, second = case[2], (Move(0, "trend"),), Move(1, "jump", 2)
-    beside = Beside.of(series, first, series.grid)
-    own, pull = beside.left(series, series.made_of([second])[0], series.grid)
-    tau, phi2 = series.grid.variance, series.grid.inflation
-    gain = 0.5 * (pull[:, 0] / phi2) ** 2 / (own[:, 0] / phi2 + 1.0 / tau) - 0.5 * np.log1p(tau * own[:, 0] / phi2)
-    both = Beside.of(series, (*first, second), series.grid).log_likelihood
-    np.testing.assert_allclose(beside.log_likelihood + gain, both, atol=1e-8)
-
-
 def test_priors_are_what_is_stated(case):
     series = case[2]
     for count in (1, 3):

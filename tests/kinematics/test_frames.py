@@ -85,15 +85,6 @@ def test_elongation_lengthens_the_placement_and_turns_nothing(arm):
         np.testing.assert_allclose(moved, 1e-3 * parent @ arm.chain.translations[k] / segment.length, atol=1e-15)
 
 
-def test_a_point_moves_as_the_tool_and_its_lever(arm, configurations):
-    q, point = configurations(arm, ROWS), np.array([0.05, -0.1, 0.2])
-    at_point, at_tool = (kin.frame_jacobians(arm, q, point=p) for p in (point, None))
-    lever = kin.tool_poses(arm, q)[:, :3, :3] @ point
-    moved = at_tool[:, :3] + np.cross(at_tool[:, 3:], lever[:, :, None], axis=1)
-    np.testing.assert_allclose(at_point[:, :3], moved, atol=1e-13)
-    np.testing.assert_allclose(at_point[:, 3:], at_tool[:, 3:], atol=1e-13)
-
-
 def test_the_stretched_arm(rv_m2):
     pose = kin.tool_poses(rv_m2, np.zeros(5))[0]
     np.testing.assert_allclose(pose[:3, 3], [0.0, 0.12 + 0.25 + 0.20 + 0.15, 0.40], atol=1e-15)

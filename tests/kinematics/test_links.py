@@ -55,13 +55,6 @@ def test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment(arm
     )
 
 
-def test_at_zero_elongation_it_is_the_same_robot(arm, configurations):
-    q, augmented, chosen = configurations(arm, 50), kin.augmented_model(arm), kin.growing(arm)
-    assert [arm.segments[s].name for s in chosen] == [s.name for s in arm.segments if s.length > 1e-9]
-    assert augmented.segments == tuple(arm.segments[s].name for s in chosen)
-    np.testing.assert_allclose(augmented.tool_poses(q), kin.tool_poses(arm, q), rtol=0.0, atol=1e-10)
-
-
 def test_the_augmented_model_knows_the_robots_limits_and_gravity(arm):
     augmented = kin.augmented_model(arm)
     # of a joint beside the chain the limits are those between which it takes the first that follows it
@@ -83,15 +76,6 @@ def test_elongated_it_is_the_elongated_robot(arm, configurations):
         twists[:, s, :3] = grown[:, column, None] * arm.segments[s].direction
     expected = kin.tool_poses(arm, q, kin.Displacement(segment=twists))
     np.testing.assert_allclose(augmented.tool_poses(q, grown), expected, rtol=0.0, atol=1e-10)
-
-
-def test_jacobian_is_the_finite_difference(arm, configurations):
-    q, augmented, step = configurations(arm, 20), kin.augmented_model(arm), 1e-3
-    jacobian = kin.elongation_jacobian(arm, q)
-    for column, unit in enumerate(np.eye(len(augmented.segments))):
-        above, below = (augmented.tool_poses(q, sign * step * unit)[:, :3, 3] for sign in (1, -1))
-        # The position is linear in an elongation, so a long step costs nothing but rounding.
-        np.testing.assert_allclose((above - below) / (2 * step), jacobian[:, :, column], rtol=0.0, atol=1e-11)
 
 
 def test_shapes_that_do_not_fit_are_said(rv_m2):
