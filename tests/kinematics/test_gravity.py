@@ -7,8 +7,25 @@ import pinocchio
 import pytest
 
 from thermal_robot import kinematics as kin
+from thermal_robot.kinematics.links import to_pinocchio
 from thermal_robot.kinematics.urdf import parse_urdf
 from thermal_robot.robot import load_robot
+
+
+def potential_energy(robot, q, payload, com):
+    model, data = robot.model, robot.model.createData()
+    arm = [pinocchio.computePotentialEnergy(model, data, row) for row in to_pinocchio(robot, q)]
+    poses = kin.tool_poses(robot, q)
+    return np.array(arm) - payload * ((poses[:, :3, 3] + poses[:, :3, :3] @ com) @ robot.gravity)
+
+
+def test_torque_is_the_gradient_of_the_potential_energy(arm, configurations):
+    q = configurations(arm, 30)
+    payload, com, step = np.linspace(0.0, 10.0, 30), np.array([0.05, -0.02, 0.1]), 1e-5
+    torques = kin.gravity_torques(arm, q, payload=payload, payload_com=com)
+    for j, unit in enumerate(np.eye(arm.n)):
+        below, above = (potential_energy(arm, q + h * unit, payload, com) for h in (-step, step))
+        np.testing.assert_allclose(torques[:, j], (above - below) / (2 * step), rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(
