@@ -363,14 +363,6 @@ BESIDE = ["geometric", "transmission_error", "backlash", "drift"]
 
 
 @pytest.mark.slow
-def test_lost_motion_among_a_hundred_rows_of_a_real_arm_is_named_and_measured(ur5):
-    campaign = with_lost_motion(ur5.take(np.arange(100)))
-    found = diagnose(campaign, only=["geometric", "backlash"]).to_dict()
-    answer = judged("backlash", {"said": found, "truth": LOST}, None, 1e-4)
-    assert answer[0], answer[1]
-
-
-@pytest.mark.slow
 def test_lost_motion_of_a_real_arm_is_named_and_measured(ur5):
     found = diagnose(with_lost_motion(ur5), only=BESIDE).to_dict()
     answer = judged("backlash", {"said": found, "truth": LOST}, None, 1e-4)
