@@ -321,3 +321,8 @@ def test_impossible_questions_are_refused(given, words, first):
     many = np.broadcast_to(covariance, (first, *covariance.shape)) if first else covariance
     with pytest.raises(ValueError, match=words):
         joining_probability(**{"clearance": 1.0, **given, "covariance": many})
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="cannot be broadcast"):
+        joining_probability(np.broadcast_to(np.eye(2), (3, 2, 2)), np.ones(4))
