@@ -7,6 +7,7 @@ import pytest
 from thermal_robot.assembly.probability.kernels import (
     density,
     inside_probability,
+    integrate_panels,
     log_density,
     log_tail,
     outside_probability,
@@ -103,3 +104,12 @@ def test_arguments_broadcast_and_a_number_stays_a_number():
     assert density(1.0, 2.0, 0.5).shape == ()
     # a vectorised exponential may round otherwise than a single one
     assert table[1, 1] == pytest.approx(density(1.0, 2.0, 0.5), rel=1e-14)
+
+
+def test_depth_limits_where_a_jump_is_found():
+    # The edge is placed to 2^-depth of the panel, and no better: 1/3 has no finite binary fraction.
+    ends = np.array([[0.0, 1.0]])
+    found = [integrate_panels(lambda _, t: (t > 1.0 / 3.0).astype(float), ends, depth=d)[0] for d in (3, 10, 20)]
+    errors = np.abs(np.array(found) - 2.0 / 3.0)
+    np.testing.assert_array_less(errors, [2.0**-3, 2.0**-10, 2.0**-20])
+    assert errors[0] > errors[1] > errors[2] > 0.0
