@@ -1,7 +1,6 @@
 """A choice is made again at its own exact fit until it stays, with constants where the evidence is largest."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,9 +14,7 @@ from thermal_robot.effects import Backlash, JointGain, choose, gate
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.exact import (
-    _leading,
     _others,
-    _ridge_step,
     corrected_observations,
     gauss_newton,
     heard,
@@ -147,27 +144,6 @@ def test_rivals_of_a_setting_have_one_joint_less_one_more_or_another(nominal):
     laws = [Discovered(place=f"joint_{k}", quantity="time", tried=50.0) for k in (1, 2, 3)]
     assert list(_others(laws[1], nominal, laws)) == laws
     assert set(rivals(scale, nominal)) == {scale}
-
-
-def test_an_effect_in_all_joints_is_tried_in_those_that_do_most(nominal):
-    joints = nominal.robot.joint_names
-    (offset,) = choose(("joint_offset",), (), ())
-    values = 1e-4 * np.array([0.0, 5.0, 0.1, 4.0, 0.0])
-    found = [e.places for e in _leading(offset, block(nominal, offset), values)]
-    assert [len(own) for own in found] == [2, 3, 4]
-    assert found[0] == (joints[1], joints[3])
-    assert all(set(a) < set(b) for a, b in pairwise(found))
-    assert list(_leading(replace(offset, places=("joint_2",)), block(nominal, offset), values)) == []
-
-
-def test_places_stay_with_the_settings_that_have_them(nominal):
-    """Elongations of one link each are named by links, those common to all by joints besides."""
-    (warm,) = choose(("thermal_elongation",), (), ())
-    known = gate.variants(warm, nominal)
-    for setting in (alone for whole in known for alone in gate.alone(whole, nominal)):
-        for other in _others(setting, nominal, known):
-            assert set(other.places) <= set(gate.places_of(gate.checked(replace(other, places=()), nominal)))
-            gate.checked(other, nominal)
 
 
 def explained(data, names):
@@ -403,17 +379,3 @@ def test_a_linear_fit_that_went_astray_does_not_end_worse_than_it_began(fitted):
     assert objective(campaign, explanation, kept.frames, found) < begun
     for (_, one), (_, other) in zip(found, right, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
-
-
-def test_a_step_minimises_misfit_and_prior_together_and_a_damped_one_is_shorter_and_goes_downhill():
-    rng = np.random.default_rng(0)
-    design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
-    state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
-    rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
-    wanted = np.concatenate([gap, -state / prior])
-    stack = np.column_stack([design, gap])
-    steps, sizes = zip(*(_ridge_step(stack.T @ stack, state, prior, d) for d in (0.0, 0.1, 10.0)), strict=True)
-    np.testing.assert_allclose(steps[0], np.linalg.lstsq(rows, wanted, rcond=None)[0], rtol=1e-9)
-    assert sizes[0] == pytest.approx(np.linalg.norm(rows @ steps[0]), rel=1e-9)  # what it moves, in noise
-    assert (np.diff(np.linalg.norm(steps, axis=1)) < 0.0).all()
-    assert min(step @ rows.T @ wanted for step in steps) > 0.0

@@ -7,7 +7,7 @@ import pytest
 from helpers import commanded
 from simulate import simulate
 
-from thermal_robot.effects import Effect, JointOffset, Parameter, TransmissionError, at_joint, gate, library
+from thermal_robot.effects import Effect, Parameter, TransmissionError, at_joint, gate, library
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import block
@@ -50,16 +50,6 @@ def test_every_quantity_is_tried_at_every_place(here):
     links = laws(here, ("link",), ["time"])
     segments = [s.name for s in robot.segments[1:] if s.movable]
     assert {(law.place, law.shape) for law in links} == {(s, k) for s in segments for k in ("smooth", "constant")}
-
-
-@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
-def test_every_law_that_is_tried_has_columns(arm):
-    here = observed(arm)
-    for law in laws(here, ("joint", "base", "tool", "link"), ["time", "payload", arm.joint_names[0]]):
-        own = block(here, law).columns
-        assert own.shape[2] >= 1
-        assert np.isfinite(own).all()
-        assert np.abs(own).max() > 0.0
 
 
 def test_labels_are_levels_with_their_names(rv_m2):
@@ -123,20 +113,6 @@ def test_shapes_are_those_that_the_quantity_may_have():
         assert names(shapes(of_quantity(plain, count), count)) == {"levels"} | more
 
 
-def test_every_shape_holds_the_constant_and_marks_lie_within_the_range():
-    """An error that is the same throughout must not look like a law; beyond the outer marks no row would speak."""
-    values = np.random.default_rng(2).uniform(-1.0, 1.0, 200)
-    law = of_quantity(Discovered(quantity="velocity.joint_1", place="velocity.joint_1"), values)
-    for shape in shapes(law, values):
-        functions = shape.functions(values)[0]
-        ones = np.ones(200)
-        fitted = functions @ np.linalg.lstsq(functions, ones, rcond=None)[0]
-        np.testing.assert_allclose(fitted, ones, atol=1e-9, err_msg=shape.shape)
-        if shape.shape in ("step", "slide", "hinge", "bump"):
-            assert np.mean(values < shape.marks[0]) > 0.05
-            assert np.mean(values > shape.marks[0]) > 0.05
-
-
 @pytest.mark.parametrize("unit", [(1.0, 0.0), (1e-3, 273.15), (-40.0, 7.0)], ids=["as it is", "scaled", "reversed"])
 def test_smooth_columns_are_uncorrelated_and_do_not_depend_on_units(unit):
     rng = np.random.default_rng(3)
@@ -151,10 +127,6 @@ def test_smooth_columns_are_uncorrelated_and_do_not_depend_on_units(unit):
         # a straight line is one of their sums
         line = values - values.mean()
         np.testing.assert_allclose(own @ (own.T @ line) / 300, line, atol=1e-6)
-
-
-def test_a_quantity_that_does_not_vary_has_no_columns():
-    assert smooth_columns(np.full(20, 3.0)).shape == (20, 0)
 
 
 def test_conditions_are_what_is_recorded_and_of_joints_their_own(here):
@@ -199,11 +171,6 @@ class Sag(Effect):
             Parameter("sag", "rad", 1e-3, "joint", joint, (at_joint(j, q[:, j]),))
             for j, joint in enumerate(observations.robot.joint_names)
         )
-
-
-def test_what_a_saved_law_could_not_name_is_left_out_and_so_is_what_stands_still(here):
-    assert modulated(here, [Sag(), JointOffset()]) == []
-    assert modulated(observed(here.robot, covariates={}), [library()["backlash"]]) == []
 
 
 def test_a_session_is_a_value_each_for_an_effect_and_no_factor(rv_m2):

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from inference.problems import small_problem
 
 from thermal_robot.inference.weights import (
     Noise,
     distance_limit,
-    first_whitening,
     reweigh,
     robust_noise,
     settled_noise,
@@ -90,15 +88,6 @@ def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others(
     np.testing.assert_array_equal(whitening.noise, SIGMA[:3])
     rows[:5] += 500.0 * SIGMA[:3]
     np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 0.0, 3)[1]), np.arange(5))
-
-
-def test_rows_that_are_not_used_have_no_weight_at_first():
-    linear, _ = small_problem(0)
-    use = np.arange(12) > 3
-    linear.gap[~use] = 1e9
-    whitening = first_whitening(linear, Noise(), use)
-    np.testing.assert_array_equal(whitening.weights, use)
-    assert whitening.noise.max() < 1e3
 
 
 @measured
