@@ -10,7 +10,6 @@ from simulate import commands
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference.grouping import (
     blocks,
-    each,
     in_a_row,
     in_order,
     near_repeats,
@@ -55,17 +54,6 @@ def test_points_of_two_paths_are_not_the_same_pose_whatever_they_are_called(rv_m
     assert repeated_poses(campaign.take([3, 5]))[0] != repeated_poses(campaign.take([3, 5]))[1]
 
 
-def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
-    q = commands(rv_m2, 60, np.random.default_rng(1))
-    label = np.array([f"p{k % 20}" for k in range(60)])
-    label[::7] = ""
-    campaign = Campaign("labelled", rv_m2, q, labels={"pose": label})
-    cluster = near_repeats(campaign)
-    for name in set(label) - {""}:
-        assert len(set(cluster[label == name])) == 1
-    assert len(set(cluster)) == len(set(label) - {""}) + np.sum(label == "")
-
-
 def test_a_path_is_not_one_single_repeat(rv_m2):
     """Samples along a path lie within a hair of each other from end to end: they still make blocks."""
     along = np.linspace(0.0, 1.0, 500)[:, None]
@@ -88,22 +76,6 @@ def test_blocks_are_consecutive_in_time_and_of_one_size(rv_m2, samples):
     assert set(block) == set(range(20))
     assert np.ptp(np.bincount(block)) <= 1
     assert set(blocks(Campaign("long", rv_m2, q), 4)) == set(range(4))
-
-
-def test_each_row_is_in_the_mask_of_its_label():
-    labels = np.array([3, 1, 3, 7, 1])
-    masks = each(labels)
-    np.testing.assert_array_equal(np.sum(masks, axis=0), np.ones(5))
-    assert [sorted(np.flatnonzero(mask)) for mask in masks] == [[1, 4], [0, 2], [3]]
-
-
-def test_neighbourhoods_share_the_rows_out_evenly(rv_m2):
-    rng = np.random.default_rng(4)
-    campaign = Campaign("rows", rv_m2, rng.uniform(-1, 1, (200, 5)))
-    boxes = neighbourhoods(campaign, 16)
-    assert np.ptp(np.bincount(boxes)) <= 1
-    inside = np.mean([campaign.q[boxes == b].var(axis=0).sum() for b in range(16)])
-    assert inside < 0.7 * campaign.q.var(axis=0).sum()
 
 
 def clocked(robot, **columns):
@@ -148,10 +120,11 @@ def test_repeated_poses_are_those_of_one_command_or_label(arm):
     # the label counts where there is one, an empty one stands alone
     label = np.array([f"p{k % 20}" for k in range(120)])
     label[:4] = ""
-    told = repeated_poses(replace(apart, labels={"pose": label}))
-    assert len(set(told)) == 20 + 4
-    for name in set(label) - {""}:
-        assert len(set(told[label == name])) == 1
+    far = replace(campaign, q=commands(arm, 120, np.random.default_rng(1)), labels={"pose": label})
+    for rows in (repeated_poses(far), near_repeats(far)):
+        for name in set(label) - {""}:
+            assert len(set(rows[label == name])) == 1
+        assert len(set(rows)) == 20 + 4
 
 
 def same(labels):
@@ -174,6 +147,7 @@ def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
     half = neighbourhoods(campaign, 2)
     assert max(q[half == half[q[:, 1].argmin()], 1]) < min(q[half == half[q[:, 1].argmax()], 1])
     boxes = neighbourhoods(campaign, 16)
+    assert np.ptp(np.bincount(boxes)) <= 1
     low = np.array([q[boxes == b].min(axis=0) for b in range(16)])
     high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
     apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])

@@ -314,13 +314,14 @@ def test_a_smooth_error_of_one_joint_is_followed(rv_m2):
     assert apart(found.smooth - moved) < 0.5 * NOISE
 
 
-def test_noise_is_not_followed():
+@pytest.mark.parametrize("draws", [20, pytest.param(100, marks=pytest.mark.slow)])
+def test_noise_is_not_followed(draws):
     """In at least 95 of 100 draws a discrepancy is less probable than before."""
     beliefs = []
     campaign = campaign_of("rv_m2")
     linear, offered = bare(campaign)
     rng = np.random.default_rng(11)
-    for _ in range(100):
+    for _ in range(draws):
         drawn = replace(linear, gap=NOISE * rng.normal(size=linear.gap.shape))
         beliefs.append(explain(drawn, Noise(NOISE), forms=offered).discrepancy.probability)
     assert np.mean(np.array(beliefs) < 0.5) >= 0.95, np.sort(beliefs)[-10:]

@@ -71,14 +71,6 @@ def test_aliases_of_the_frames_vanish():
     assert again.total == pytest.approx(plain.total, rel=1e-9)
 
 
-def test_a_frame_that_is_there_twice_counts_once():
-    linear, whitening = small_problem(2)
-    twice = replace(linear, frames=np.concatenate([linear.frames, linear.frames[:, :, :1] * 5.0], axis=2))
-    plain, again = gram(linear, whitening), gram(twice, whitening)
-    assert again.equations == plain.equations
-    np.testing.assert_allclose(again.matrix, plain.matrix, rtol=1e-9, atol=1e-9)
-
-
 def test_rows_without_weight_do_not_count():
     linear, whitening = small_problem(3)
     spoilt = replace(linear, gap=linear.gap.copy())
@@ -100,6 +92,10 @@ def test_the_frames_step_leaves_nothing_that_frames_could_explain(twice):
     step = frame_step(linear, whitening, linear.gap)
     left = flat(linear, whitening, (linear.gap - linear.frames @ step)[:, :, None])
     assert np.abs(flat(linear, whitening, linear.frames).T @ left).max() < 1e-9
+    # and a frame that is there twice counts once
+    plain, again = gram(small_problem(5)[0], whitening), gram(linear, whitening)
+    assert again.equations == plain.equations
+    np.testing.assert_allclose(again.matrix, plain.matrix, rtol=1e-9, atol=1e-9)
     none = replace(linear, frames=linear.frames[:, :, :0])
     assert frame_step(none, whitening, linear.gap).shape == (0,)
 
@@ -214,12 +210,11 @@ def test_geometric_contains_offsets_and_for_positions_scale_and_nothing_else(arm
 
 
 @pytest.mark.parametrize("arm", ["ur10"], indirect=True)
-def test_two_effects_of_which_one_contains_the_other_are_never_named_together(arm):
-    for seed, both in enumerate([["geometric", "joint_offset"], ["geometric", "instrument_scale"]]):
-        campaign = simulate(arm, both, seed=seed)[0]
-        found = diagnose(campaign)
-        assert found.verdict == ("geometric",)
-        assert found.finding(both[1]).status != "found"
+@pytest.mark.parametrize("part", [pytest.param("joint_offset", marks=pytest.mark.slow), "instrument_scale"])
+def test_two_effects_of_which_one_contains_the_other_are_never_named_together(arm, part):
+    found = diagnose(simulate(arm, ["geometric", part], seed=int(part == "instrument_scale"))[0])
+    assert found.verdict == ("geometric",)
+    assert found.finding(part).status != "found"
 
 
 def test_each_row_is_whitened_by_its_own_noise():
@@ -280,22 +275,15 @@ def covariances(rng, rows):
     return (turned * 10.0 ** rng.uniform(-10, -6, (rows, 1, 3))) @ turned.transpose(0, 2, 1)
 
 
-@pytest.mark.parametrize("only", [False, True], ids=["with its values", "its columns alone"])
-def test_squared_lengths_are_those_of_the_covariance(only):
+def test_squared_lengths_are_those_of_the_covariance():
     """Of the gap and of every column: |x|² in noise is xᵀ S⁻¹ x."""
     rng = np.random.default_rng(1)
     linear = small_problem(1)[0]
     covariance = covariances(rng, 12)
-    white = generalised(linear, covariance, NOISE)
-    inverse = np.linalg.inv(covariance)
-    pairs = [(linear.frames, white.frames)]
-    pairs += [(a.columns, b.columns) for a, b in zip(linear.blocks, white.blocks, strict=True)]
-    pairs += [] if only else [(linear.gap[:, :, None], white.gap[:, :, None])]
-    for plain, own in pairs:
-        expected = np.einsum("nik,nij,njl->nkl", plain, inverse, plain)
-        own = own / NOISE[:, None]
-        found = np.einsum("nik,nil->nkl", own, own)
-        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+    plain, white = linear.stack, generalised(linear, covariance, NOISE).stack / NOISE[:, None]
+    expected = np.einsum("nik,nij,njl->nkl", plain, np.linalg.inv(covariance), plain)
+    found = np.einsum("nik,nil->nkl", white, white)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 def test_the_fit_is_that_of_weighted_least_squares():
