@@ -8,7 +8,7 @@ import pytest
 from updating_cases import ALL, EFFECTS, OLD, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, log_odds, rivals
+from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, log_odds
 from thermal_robot.errors import CampaignError, EstimationError
 
 
@@ -149,12 +149,6 @@ def test_what_is_drawn_anew_in_every_pose_is_left_to_a_fresh_diagnosis(known):
         replace(known, fit=replace(fit, explanation=e)).update(measured(40))
 
 
-def test_expected_sizes_are_those_of_the_priors(known):
-    e, grown = known.fit.explanation, fixed_point(known.fit)
-    told = np.concatenate([e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks])
-    assert np.allclose(grown.fitted.expected(grown.choice), told, rtol=0.02)
-
-
 def test_rows_are_outside_by_chance_as_often_as_is_stated(known):
     """Outermost rows are new ones now and then; many of them hardly ever."""
     rng, said, spread = np.random.default_rng(0), 0, known.model.spread
@@ -206,19 +200,3 @@ def test_rows_that_show_more_bring_a_runner_forward(sparse, little):
     before = log_odds(fixed_point(sparse.fit), listed)[with_play].max()
     after = log_odds(fixed_point(sparse.fit).plus(in_full(little.take(np.arange(60, 400)))), listed)[with_play].max()
     assert before < 0.0 < after
-
-
-def test_prior_odds_count(found, grown):
-    listed = chosen(found.fit)[1][:1]
-    likelier = [listed[0]._replace(log_prior=listed[0].log_prior + 2.0)]
-    assert log_odds(grown, likelier)[0] - log_odds(grown, listed)[0] == pytest.approx(2.0)
-
-
-def test_rivals_are_other_combinations_the_most_probable_first(found):
-    e, listed = found.fit.explanation, rivals(found.fit)
-    chance = {}
-    for combination, probability in zip(e.combinations, e.probabilities, strict=True):
-        chance[combination.blocks] = max(chance.get(combination.blocks, 0.0), probability)
-    assert e.best.blocks not in listed
-    assert listed
-    assert [chance[b] for b in listed] == sorted((chance[b] for b in listed), reverse=True)
