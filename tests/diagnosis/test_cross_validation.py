@@ -26,7 +26,7 @@ from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.grouping import blocks, each
+from thermal_robot.inference.grouping import each
 from thermal_robot.inference.kernels import Form, Smooth, Spectrum
 from thermal_robot.inference.problem import Linear
 from thermal_robot.kinematics import exp6
@@ -60,15 +60,6 @@ def test_rows_held_out_are_predicted_by_a_fit_to_the_others():
             right = fitted(known.linear, chosen, known.whitening.weights, ~test)[test]
             np.testing.assert_allclose(left[test[walk.numbers]], right, atol=1e-6)
         assert walk.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
-
-
-def test_a_row_has_no_part_in_its_own_prediction():
-    known = model()
-    test = known.block == 7
-    moved = np.where(test[:, None], 40.0, 0.0)
-    other = replace(known, linear=replace(known.linear, gap=known.linear.gap + moved))
-    left = [Walk.over(m, [test]).residuals((0, 2)) for m in (known, other)]
-    np.testing.assert_allclose(left[1] - left[0], 40.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("tests", ["blocks", "regions"])
@@ -121,15 +112,6 @@ def test_a_fold_that_leaves_the_frames_open_is_left_out():
     assert len(walk.tests) == 19
     assert not (walk.numbers == np.flatnonzero(short.block == 4)[0]).any()
     assert list(walk.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
-
-
-def test_rows_set_aside_do_not_judge():
-    known = model()
-    kept = np.arange(ROWS) % 10 != 0
-    walk = Walk.over(replace(known, kept=kept), each(known.block))
-    assert walk.counts[0] == kept.sum()
-    left = walk.residuals((0,))[kept[walk.numbers]]
-    assert walk.squares((0,))[0] == pytest.approx((left**2).sum(), rel=1e-9)
 
 
 def test_what_a_model_leaves_out_counts_as_noise_against_priors():
@@ -265,18 +247,6 @@ def test_the_gap_of_rows_held_out_is_that_of_the_registered_robot(rv_m2):
         registered = np.sqrt((known.before.gap[kept, :3] ** 2).sum(axis=1).mean())
         # nine to twelve unknowns of the frames in 360 equations
         assert held_out(known).overall.rms_before == pytest.approx(registered, rel=0.12)
-
-
-def test_parts_are_fitted_at_the_nominal_robot(rv_m2):
-    """What the frames alone leave does not depend on what the corrected robot looks like."""
-    known = fit(simulate(rv_m2, ["geometric", "backlash"], seed=1, ratio=(20.0, 30.0))[0], choose((), (), ()))
-    model = Model.of(known.explanation, blocks(known.campaign))
-    nominal = replace(known.before, blocks=tuple(block(known.nominal, effect) for effect, _ in known.effects))
-    values = [known.explanation.values[b][0] for b in known.explanation.best.blocks]
-    part = Walk.over(model.partial(nominal, values), each(model.block)).squares(())
-    bare = Walk.over(model.partial(known.before), each(model.block)).squares(())
-    assert len(values) == 2
-    np.testing.assert_allclose(part, bare, rtol=1e-9)
 
 
 def test_without_effects_nothing_shrinks(rv_m2):

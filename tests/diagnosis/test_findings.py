@@ -19,7 +19,6 @@ from thermal_robot.diagnosis.findings import (
     rivals,
     separates,
     titled,
-    told_inside,
     unknown_frames,
     within_frames,
 )
@@ -190,10 +189,6 @@ def test_where_geometry_is_found_its_zeros_are_told_with_numbers(rv_m2):
     assert separates(tuple(found.values())) == ()
 
 
-def test_zeros_that_suffice_are_found_themselves(offsets):
-    assert said(offsets)["joint_offset"].unseen == ()
-
-
 @pytest.fixture(scope="module")
 def parted():
     off = {"joint_offset": {"joint_3": 1e-3}}
@@ -209,16 +204,6 @@ def test_figures_stand_where_the_data_identify(parted):
             assert (one.value is None, one.std is None) == (not one.identified, not one.identified)
     first = [one.name for one in estimates(parted, 0) if one.identified]
     assert 0 < len(first) < len(estimates(parted, 0))  # segments have redundant parameters
-
-
-def test_parts_name_their_container(parted):
-    parts = told_inside(parted)
-    assert {name: part.container for name, part in parts.items()} == {
-        "joint_offset": "geometric",
-        "geometric": "geometric",
-    }
-    zero = next(one for one in parts["joint_offset"].parameters if one.name == "zero offset, joint_3")
-    assert zero.value == pytest.approx(1e-3, abs=4.0 * zero.std)
 
 
 NOISE, SIGMA = 20e-6, 6e-4  # m, rad
@@ -258,12 +243,6 @@ def visits(rv_m2):
     return scattering(rv_m2, repeats=3, poses=50)
 
 
-@pytest.fixture(scope="module")
-def steps(rv_m2):
-    """Each pose twice; the encoder rounds."""
-    return scattering(rv_m2, repeats=2, poses=60, stepped=True)
-
-
 def test_scatter_anew_at_each_visit_is_named_with_its_joint_and_sigma(rv_m2, visits):
     encoder, wear = random_findings(*visits)
     assert (encoder.status, wear.status) == ("not_found", "found")
@@ -276,13 +255,6 @@ def test_scatter_anew_at_each_visit_is_named_with_its_joint_and_sigma(rv_m2, vis
     assert abs(size.value / factor - SIGMA) < 3.0 * size.std / factor
 
 
-def test_steps_are_named_with_their_height(rv_m2, steps):
-    encoder, _ = random_findings(*steps)
-    assert encoder.status == "found"
-    assert encoder.locations[0].name == rv_m2.joint_names[JOINT]
-    assert encoder.parameters[0].value == pytest.approx(np.sqrt(12.0) * SIGMA, rel=0.1)
-
-
 def test_without_steps_or_repeats_the_two_kinds_are_one_and_an_encoder_is_one_of_three_causes(single):
     """Wear explains the scatter as well, and so does what nobody recorded."""
     encoder, wear = random_findings(*single)
@@ -290,16 +262,6 @@ def test_without_steps_or_repeats_the_two_kinds_are_one_and_an_encoder_is_one_of
     assert (wear.status, wear.needs, wear.probability) == ("not_testable", ("pose",), None)
     assert single[1].scatter.probability["pose"] > 0.9
     assert 0.2 < encoder.probability < 0.5
-
-
-def test_steps_that_should_show_and_do_not_refute_an_encoder(rv_m2):
-    """Errors that are anew in every pose, large against the noise, and no multiple of any step."""
-    known, seen = scattering(rv_m2, poses=200)
-    assert seen.scatter.probability["pose"] > 0.9
-    encoder, _ = random_findings(known, seen)
-    assert (encoder.status, encoder.locations, encoder.parameters) == ("not_found", (), ())
-    assert encoder.probability < 0.05
-    assert not seen.explains_size
 
 
 def test_scatter_never_shrinks_the_gap_its_places_share_it_out_and_not_found_is_never_probable(single, visits, steps):

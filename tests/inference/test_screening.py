@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers import NOISE, with_law
+from helpers import NOISE, erring, with_law
 from simulate import simulate
 
 from thermal_robot.campaign.turning import SLIPS
@@ -222,12 +222,6 @@ def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, seeds, name):
             assert best.law.describe().startswith(f"the zero of {in_words('joint', law.place)} jumped at time")
 
 
-def erring(data, seed=7, **twists):
-    """The campaign's rows measured anew, with displacements of joints or the tool at work."""
-    real = observe(data, Frames.declared(data), displacement=Displacement(**twists)).predicted_position
-    return replace(data, position=real + NOISE * np.random.default_rng([seed, 7]).normal(size=real.shape))
-
-
 def wound(path, slips):
     """How far elements hold a joint that passes positions (N,) in this order, each from −1 to 1, summed."""
     held = np.zeros((len(path), len(slips)))
@@ -252,7 +246,7 @@ def test_friction_on_springs_comes_first_and_leaves_the_noise(arm, seeds, ratio)
         fitted = frame_columns(small)[0].reshape(len(moved), -1)
         left = moved - fitted @ np.linalg.lstsq(fitted, moved, rcond=1e-10)[0]
         shift *= 1e-5 * ratio * NOISE / np.sqrt((left**2).mean())
-        here, target = seen(erring(data, seed, joint=shift))
+        here, target = seen(erring(data, [seed, 7], joint=shift))
         first = scan(here, [target])[0][0][0].law
         assert (first.place, first.quantity) == (arm.joint_names[j], f"since_turn.{arm.joint_names[j]}")
         best = shaped(here, target, first).law
@@ -310,7 +304,7 @@ def in_sessions(robot, joint, zeros, seed=3):
     data = replace(plain, covariates=covariates, labels={"session": np.array(["am", "noon", "pm"])[part]})
     shift = np.zeros_like(data.q)
     shift[:, robot.joint_names.index(joint)] = np.array(zeros)[part]
-    return erring(data, seed, joint=shift)
+    return erring(data, [seed, 7], joint=shift)
 
 
 @pytest.mark.parametrize("zeros", [(0.0, 0.0, 4e-4), (0.0, -4e-4, -4e-4)])
@@ -360,7 +354,7 @@ def test_a_tool_that_stands_elsewhere_in_one_session_is_no_curve_over_weeks(rv_m
         "time": data.covariates["time"] + 1.8e6 * np.digitize(data.covariates["time"], [5e3, 1e4]),
     }
     data = replace(data, covariates=weeks)
-    here, target = seen(erring(data, tool=np.outer(noon, [4.2e-4, 0.0, 0.0, 0.0, 0.0, 0.0])))
+    here, target = seen(erring(data, [7, 7], tool=np.outer(noon, [4.2e-4, 0.0, 0.0, 0.0, 0.0, 0.0])))
     found = scan(here, [target])[0][0]
     at_tool = [i.law for i in found if i.law.kind == "tool" and not i.law.by]
     assert (found[0].law.kind, found[0].law.quantity) == ("tool", "session")
@@ -377,7 +371,7 @@ def test_a_joint_that_relaxes_after_each_start_comes_first(rv_m2, sizes):
     since = time - np.array([time[session == run].min() for run in runs])[which]
     shift = np.zeros_like(data.q)
     shift[:, 2] = 8e-4 * np.array(sizes)[which] * np.exp(-since / 500.0)
-    here, target = seen(erring(data, joint=shift))
+    here, target = seen(erring(data, [7, 7], joint=shift))
     first = scan(here, [target])[0][0][0].law
     assert (first.place, first.quantity) == ("joint_3", "time")
     best = shaped(here, target, first).law
