@@ -30,25 +30,24 @@ def points(axes, label):
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 
 
-def mean_and_error(values):
-    return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
-
-
-def test_backlash_sets_the_two_sides_apart_by_its_play(rv_m2):
-    figure, found, values, _ = shown(rv_m2, "backlash", places=["joint_3"])
-    play = values["lost motion, joint_3"] * MRAD
-    axes = figure.axes[0]
-    assert axes.get_title(loc="left").startswith("joint_3: ")
+@pytest.mark.parametrize("name", ["backlash", "joint_gain"])
+def test_play_sets_two_sides_apart_a_gain_is_a_slope_and_nothing_is_left_of_either(rv_m2, name):
+    joint, kind = {"backlash": ("joint_3", "lost motion"), "joint_gain": ("joint_2", "gain error")}[name]
+    figure, found, values, _ = shown(rv_m2, name, places=[joint])
+    axes, true = figure.axes[0], values[f"{kind}, {joint}"] * MRAD
+    assert axes.get_title(loc="left").startswith(f"{joint}: ")
     assert axes.get_ylabel() == "error (mrad)"
-    assert axes.get_xlabel() == "approach.joint_3"
-    assert list(axes.get_xticks()) == [-1.0, 1.0]
-    for label, expected in (("as measured", play), ("with this effect taken off", 0.0)):
+    assert axes.get_xlabel() == {"backlash": f"approach.{joint}", "joint_gain": f"position of {joint} (rad)"}[name]
+    for label, expected in (("as measured", true), ("with this effect taken off", 0.0)):
         x, y = points(axes, label)
-        low, high = mean_and_error(y[x < 0]), mean_and_error(y[x > 0])
         assert len(x) == len(found.places[0].before)
-        assert abs(low[0] - high[0] - expected) < 3.0 * np.hypot(low[1], high[1])
-    x, law = points(axes, "fitted law")
-    assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(play, rel=0.1)
+        (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
+        slope, sigma = np.array([slope, np.sqrt(covariance[0, 0])]) * (-2.0 if name == "backlash" else 1.0)
+        assert abs(slope - expected) < 3.0 * abs(sigma)
+    if name == "backlash":
+        assert list(axes.get_xticks()) == [-1.0, 1.0]
+        x, law = points(axes, "fitted law")
+        assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(true, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -59,16 +58,6 @@ def test_the_error_of_a_joint_is_a_length_where_it_slides_and_else_an_angle(awkw
     first = found.places[0]
     assert (first.name, first.unit) == (joint, unit)
     assert figure.axes[0].get_ylabel() in [f"error ({word})" for word in drawn]
-
-
-def test_a_gain_is_a_slope_and_nothing_is_left_of_it(rv_m2):
-    figure, _, values, _ = shown(rv_m2, "joint_gain", places=["joint_2"])
-    axes = figure.axes[0]
-    assert axes.get_xlabel() == "position of joint_2 (rad)"
-    for label, expected in (("as measured", values["gain error, joint_2"] * MRAD), ("with this effect taken off", 0.0)):
-        x, y = points(axes, label)
-        (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
-        assert abs(slope - expected) < 3.0 * np.sqrt(covariance[0, 0])
 
 
 def test_the_spread_is_that_of_the_points(rv_m2):

@@ -44,7 +44,7 @@ def told(known):
 def off(rv_m2):
     """(seeds, 2) how far the gain is off in a smooth world, in deviations before and after."""
     found = []
-    for seed in range(24):
+    for seed in range(12):
         known = fit(warped(rv_m2, seed, 2e-4), [JointGain()])
         found.append([(told(k)[0] - GAIN) / told(k)[1] for k in (known, as_remainder_says(known))])
     return np.array(found)
