@@ -118,8 +118,8 @@ def test_effects_are_asked_for_by_name(hall):
 
 
 @pytest.fixture(scope="module")
-def diagnosis():
-    return tr.diagnose(tr.demo_campaign())
+def diagnosis(diagnosed_once):
+    return diagnosed_once(tr.demo_campaign())
 
 
 def test_parameters_are_those_of_the_findings(diagnosis):
