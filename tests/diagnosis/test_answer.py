@@ -17,6 +17,7 @@ from thermal_robot.inference.generate import discovered
 
 
 def test_the_parts_agree_with_each_other(hall):
+    # the parts agree with each other
     assert set(hall.verdict) == {"thermal_elongation", "backlash"}
     assert hall.verdict == tuple(f.name for f in hall.effects if f.status == "found")
     assert sum(hall.where.axes.values()) == pytest.approx(1.0)
@@ -30,16 +31,12 @@ def test_the_parts_agree_with_each_other(hall):
     assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach", "range"}
     assert hall.remaining is hall.unexplained or hall.remaining == hall.unexplained
     assert hall.reach == pytest.approx(np.linalg.norm(np.ptp(hall.fit.campaign.position, axis=0)))
-
-
-def test_every_quantity_and_joint_has_its_unit(hall):
+    # every quantity and joint has its unit
     assert set(hall.rows.units) == {*hall.rows.covariates, *hall.joint_names}
     assert hall.rows.units["temperature"] == "°C"
     assert hall.rows.units["joint_1"] == "rad"
     assert hall.rows.units["time"] == "s"
-
-
-def test_rows_were_held_out_once_unless_set_aside(hall):
+    # rows were held out once unless set aside
     rows = hall.rows
     assert (np.isnan(rows.held_out_after) <= rows.outliers).all()
     kept = ~np.isnan(rows.held_out_after)

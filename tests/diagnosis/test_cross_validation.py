@@ -351,14 +351,13 @@ def warm(rv_m2):
     return found
 
 
-def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate(warm):
+def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate_and_the_right_one_does_not(warm):
+    # a correction that interpolates leaves more where it must extrapolate
     for name, factor in (("session", 1.2), ("temperature", 1.15)):
         ratio = [wrong[name].rms_after / wrong["time"].rms_after for _, wrong in warm]
         assert np.mean(ratio) > factor, name
         assert np.mean(np.array(ratio) > 1.0) > 0.75, name
-
-
-def test_the_right_explanation_leaves_the_same_whatever_is_held_out(warm):
+    # the right explanation leaves the same whatever is held out
     apart = []
     for right, _ in warm:
         blocked = right["time"]
@@ -369,9 +368,7 @@ def test_the_right_explanation_leaves_the_same_whatever_is_held_out(warm):
     assert np.max(np.abs(apart)) < 4.0
     for right, _ in warm:
         assert all(0.8 < s.rms_after / (np.sqrt(3.0) * NOISE) < 1.5 for s in right.values())
-
-
-def test_schemes_come_in_order_and_say_what_they_are(warm):
+    # schemes come in order and say what they are
     for pair in warm:
         for schemes in pair:
             after = [s.rms_after for s in schemes.values()]
@@ -383,15 +380,14 @@ def test_schemes_come_in_order_and_say_what_they_are(warm):
             assert schemes["reach"].rows == pytest.approx(0.2 * schemes["time"].rows, abs=1)
 
 
-def test_the_hardest_is_told_where_it_leaves_clearly_more_than_the_average():
+def test_the_hardest_and_what_harms_other_sessions_and_regions_are_told():
+    # the hardest is told where it leaves clearly more than the average
     average = HeldOut("blocked", 5, 4e-4, 1e-4, 0.94, (0.9, 0.96))
     found = [FoldScheme(name, name, 2, 40, 4e-4, left, 0.9, 1e-6) for name, left in (("reach", 1.5e-4), ("time", 1e-4))]
     assert hardest(found, average).name == "reach"
     assert hardest(found, replace(average, rms_after=1.3e-4)) is None
     assert hardest((), average) is None
-
-
-def test_harm_to_other_sessions_and_regions_is_told_and_no_other():
+    # harm to other sessions and regions is told and no other
     found = [FoldScheme(name, name, 2, 40, 1e-4, 2e-4, -3.0, 1e-6) for name in ("reach", "temperature", "region")]
     assert harmed(found).name == "region"
     assert harmed(found[:2]) is None

@@ -78,7 +78,8 @@ def test_no_axis_becomes_wider_than_its_prior(rv_m2):
     assert np.linalg.eigvalsh(wide).max() <= max(1.0, np.linalg.eigvalsh(narrow).max()) + 1e-9
 
 
-def test_a_diagnosis_that_leaves_noise_alone_keeps_them(rv_m2):
+def test_a_diagnosis_that_leaves_noise_alone_and_a_fit_of_nothing_keep_them(rv_m2):
+    # a diagnosis that leaves noise alone keeps them
     plain = simulate(rv_m2, ["joint_gain"], seed=4, noise=NOISE, ratio=(5.0, 6.0))[0]
     found = diagnose(plain, effects=(), only=("joint_gain",))
     assert not found.unexplained.flagged
@@ -88,10 +89,7 @@ def test_a_diagnosis_that_leaves_noise_alone_keeps_them(rv_m2):
     deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
     assert [p.std for p in gain.parameters if p.identified] == pytest.approx(deviations.tolist(), rel=1e-6)
     assert effect.name == "joint_gain"
-
-
-def test_a_fit_of_nothing_stays_as_it_is(rv_m2):
-    """A smooth discrepancy and no effect, as where frames are known and no candidate is worth its place."""
+    # A smooth discrepancy and no effect, as where frames are known and no candidate is worth its place.
     known = fit(warped(rv_m2, 0, 2e-4), [])
     assert known.explanation.discrepancy.form is not None
     assert as_remainder_says(known) is known

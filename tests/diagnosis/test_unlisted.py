@@ -55,7 +55,8 @@ def found(rv_m2):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_place_and_quantity_are_named_and_nobody_is_blamed(found, name):
+def test_a_law_is_named_with_its_place_and_predicts_to_less_than_the_noise(found, name, tmp_path):
+    # place and quantity are named and nobody is blamed
     law, _, diagnosis, _, _ = found[name]
     assert diagnosis.unexplained.flagged
     assert diagnosis.verdict[0].startswith("discovered.")
@@ -70,10 +71,7 @@ def test_place_and_quantity_are_named_and_nobody_is_blamed(found, name):
     assert all(name.startswith("discovered.") for name in diagnosis.verdict)
     # a step of the clock is an event: its headline names the rows, its description the time, too
     assert ("in rows" if name == "step" else law.quantity) in diagnosis.summary
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_the_corrected_model_predicts_to_less_than_the_noise(found, name, tmp_path):
+    # the corrected model predicts to less than the noise
     _, _, diagnosis, fresh, true = found[name]
     diagnosis.model.save(tmp_path / "model.json")
     for model in (diagnosis.model, CorrectedModel.load(tmp_path / "model.json")):
@@ -82,7 +80,8 @@ def test_the_corrected_model_predicts_to_less_than_the_noise(found, name, tmp_pa
     jsonschema.validate(json.loads(json.dumps(diagnosis.to_dict())), schema())
 
 
-def test_a_steps_time_and_height_are_read_off(found):
+def test_a_law_is_read_off_becomes_a_file_and_needs_its_column(found, tmp_path, rv_m2):
+    # a steps time and height are read off
     _, values, diagnosis, _, _ = found["step"]
     law = next(effect for effect, _ in diagnosis.model.effects if isinstance(effect, Discovered))
     assert law.shape in ("step", "slide")
@@ -93,9 +92,7 @@ def test_a_steps_time_and_height_are_read_off(found):
     error = np.hypot(before.std, after.std)
     assert abs((after.value - before.value) - (values[1] - values[0])) < 4.0 * error
     assert error < 0.1 * values[1]
-
-
-def test_a_law_becomes_an_effect_file_that_does_the_same(found, tmp_path, rv_m2):
+    # a law becomes an effect file that does the same
     _, _, diagnosis, fresh, _ = found["hinge"]
     law, values = next((e, v) for e, v in diagnosis.model.effects if isinstance(e, Discovered))
     (tmp_path / "elbow_cable.py").write_text(law.to_source(values, "elbow_cable"))
@@ -107,6 +104,11 @@ def test_a_law_becomes_an_effect_file_that_does_the_same(found, tmp_path, rv_m2)
     here = observe(fresh, diagnosis.model.frames)
     own, again = (displacement(here, [(e, values)])[0].joint for e in (law, named))
     np.testing.assert_array_equal(own, again)
+    # a law of a column that is missing cannot be predicted
+    _, _, diagnosis, fresh, _ = found["ramp"]
+    assert "speed" in diagnosis.model.needs
+    with pytest.raises(Exception, match="speed"):
+        diagnosis.model.predict(fresh.drop_covariate("speed"))
 
 
 def beside_play(robot, seed):
@@ -120,13 +122,6 @@ def beside_play(robot, seed):
 def test_with_a_known_effect_beside_it_both_are_named(rv_m2):
     verdicts = [beside_play(rv_m2, seed) for seed in range(4)]
     assert sum("backlash" in v and len(v) == 2 and any(n.startswith("discovered.") for n in v) for v in verdicts) >= 3
-
-
-def test_a_law_of_a_column_that_is_missing_cannot_be_predicted(found):
-    _, _, diagnosis, fresh, _ = found["ramp"]
-    assert "speed" in diagnosis.model.needs
-    with pytest.raises(Exception, match="speed"):
-        diagnosis.model.predict(fresh.drop_covariate("speed"))
 
 
 def test_a_noise_that_is_not_stated_does_not_explain_a_remainder(rv_m2):

@@ -153,7 +153,8 @@ def test_the_moment_on_the_base_is_what_a_turn_of_it_works_against(arm):
     np.testing.assert_allclose(overturning(seen), expected, atol=1e-9)
 
 
-def test_an_outstretched_arm_sinks_under_its_own_weight(rv_m2):
+def test_a_load_or_weight_sinks(rv_m2):
+    # an outstretched arm sinks under its own weight
     stretched = Campaign("stretched", rv_m2, np.zeros((1, 5)))
     for j in (1, 2, 3):
         sunk = mine(stretched, JointCompliance(), 1e-5 * np.eye(5)[j])
@@ -163,10 +164,7 @@ def test_an_outstretched_arm_sinks_under_its_own_weight(rv_m2):
     for values in ([1e-6, 1e-6], [1e-6, 7e-7, 1e-6, 7e-7]):
         # all weights lie on the tool's side: it goes down
         assert (mine(swung, BaseCompliance(below=len(values) > 2), values)[:, 2] < 0.0).all()
-
-
-def test_what_the_base_turns_about_lies_below(rv_m2):
-    """A point at the depth stays where it is: each turn by ω shifts the origin, 0.7 m above, by 0.7 ω × up."""
+    # A point at the depth stays where it is: each turn by ω shifts the origin, 0.7 m above, by 0.7 ω × up.
     parameters = BaseCompliance(below=True).parameters(observe(commanded(rv_m2)))
     assert [p.unit for p in parameters] == ["rad/(N·m)", "m/(N·m)"] * 2
     for spring, shift in zip(parameters[::2], parameters[1::2], strict=True):

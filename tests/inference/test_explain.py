@@ -171,7 +171,8 @@ def test_rows_of_one_pose_that_err_alike_count_less():
     assert np.mean(told) < 0.2
 
 
-def test_the_discrepancy_is_a_part_of_the_remainder_and_what_poses_share():
+def test_the_discrepancy_is_what_poses_share_and_part_of_the_remainder():
+    # the discrepancy is a part of the remainder and what poses share
     linear, each = alike(10, 2e-4)
     found = explained(linear, forms=(each,))
     for pose in range(8):
@@ -179,6 +180,12 @@ def test_the_discrepancy_is_a_part_of_the_remainder_and_what_poses_share():
         assert np.ptp(found.smooth[own], axis=0).max() < 1e-12
         # three sigma of the mean of ten rows
         assert np.abs(found.smooth[own][0] - found.remainder[own].mean(axis=0)).max() < 3.0 * 2e-5 / np.sqrt(10.0)
+    # a noise that is not stated is read off the remainder
+    linear, _, _ = problem(7, (1,))
+    found = explained(linear, Noise())
+    assert found.best.blocks == (1,)
+    assert (found.whitening.noise * found.best.noise)[0] == pytest.approx(2e-5, rel=0.15)
+    assert found.whitening.held == 0.0
 
 
 def test_where_the_search_starts_does_not_matter():
@@ -191,11 +198,3 @@ def test_where_the_search_starts_does_not_matter():
     # a start that is not allowed is left out
     two = explained(linear, families=("a", "b", "a"), starts=[(0, 2)])
     assert not {0, 2} <= set(two.best.blocks)
-
-
-def test_a_noise_that_is_not_stated_is_read_off_the_remainder():
-    linear, _, _ = problem(7, (1,))
-    found = explained(linear, Noise())
-    assert found.best.blocks == (1,)
-    assert (found.whitening.noise * found.best.noise)[0] == pytest.approx(2e-5, rel=0.15)
-    assert found.whitening.held == 0.0

@@ -48,16 +48,14 @@ def found(stepped):
     return lawful(stepped)
 
 
-def test_the_true_law_is_the_first_that_is_offered(offered):
+def test_the_true_law_is_offered_first_and_pays_for_all_among_which_it_was_picked(offered, stepped):
+    # the true law is the first that is offered
     assert 1 < len(offered) <= settings.COMPARED_LAWS
     assert len(set(offered)) == len(offered)
     assert {law.name for law in offered} == {"discovered.2"}
     assert (offered[0].kind, offered[0].place, offered[0].quantity) == ("joint", "joint_3", "time")
     assert offered[0].shape in ("step", "slide")
-
-
-def test_a_law_pays_for_all_places_quantities_and_shapes_among_which_it_was_picked(stepped, offered):
-    """At each of five joints, base, tool: every quantity, and of each shapes; and segments besides."""
+    # At each of five joints, base, tool: every quantity, and of each shapes; and segments besides.
     robot = stepped.campaign.robot
     for law in offered:
         # a mark in time has its share of the range, all others are counted

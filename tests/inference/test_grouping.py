@@ -84,7 +84,8 @@ def clocked(robot, **columns):
     return Campaign("clocked", robot, q, covariates={k: np.asarray(v, dtype=float) for k, v in columns.items()})
 
 
-def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m2):
+def test_rows_follow_each_other_by_the_clock_and_stand_in_a_row_where_three_do(rv_m2):
+    # rows follow each other by the clock and without one as in the file
     backwards = np.arange(12.0)[::-1]
     np.testing.assert_array_equal(in_order(clocked(rv_m2)), np.arange(12))
     np.testing.assert_array_equal(in_order(clocked(rv_m2, time=backwards)), np.arange(12)[::-1])
@@ -92,9 +93,7 @@ def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m
     # the time is the better clock; rows of one time stay as they are
     both = clocked(rv_m2, time=np.arange(12.0) // 3, order=backwards)
     np.testing.assert_array_equal(in_order(both), np.arange(12))
-
-
-def test_of_rows_set_aside_those_that_follow_each_other_thrice_stand_in_a_row(rv_m2):
+    # of rows set aside those that follow each other thrice stand in a row
     time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
     aside = np.isin(np.arange(12), [0, 1, 2, 4, 9, 10, 11])
     # by the clock: rows 0, 2, 4 at 0, 1, 2; rows 10, 1 at 5 and 6; rows 9, 11 at 10 and 11

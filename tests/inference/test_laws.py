@@ -59,7 +59,8 @@ def test_a_stated_gear_adds_the_orders_of_the_motor(rv_m2):
     assert harmonics(here, "joint_1") == (1.0, 2.0, 3.0)
 
 
-def test_knots_stand_apart_where_most_values_lie_in_one_spot():
+def test_quantities_are_levels_or_smooth_with_knots_apart():
+    # knots stand apart where most values lie in one spot
     rng = np.random.default_rng(0)
     values = np.concatenate([1.0 - 1e-6 * rng.random(500), rng.uniform(0.7, 1.0, 20)])
     marks = np.array(of_quantity(Discovered(), values).marks)
@@ -68,9 +69,7 @@ def test_knots_stand_apart_where_most_values_lie_in_one_spot():
     np.testing.assert_allclose(
         of_quantity(Discovered(), spread).marks, np.quantile(spread, np.linspace(0.02, 0.98, 5)), rtol=1e-12
     )
-
-
-def test_few_values_are_levels_and_many_a_smooth_law():
+    # few values are levels and many a smooth law
     few = of_quantity(Discovered(), np.array([3.0, 1.0, 2.0, 1.0, 3.0]))
     assert (few.shape, few.marks, few.origin, few.span) == ("levels", (1.0, 2.0, 3.0), 1.0, 2.0)
     assert of_quantity(Discovered(), np.arange(6.0)).shape == "levels"

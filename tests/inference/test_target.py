@@ -27,7 +27,8 @@ def squares(gap, columns):
     return float(left @ left)
 
 
-def test_in_noise_every_p_value_is_as_likely_the_share_is_zero_and_the_evidence_falls():
+def test_in_noise_p_values_are_uniform_the_share_is_zero_and_the_evidence_falls():
+    # in noise every p value is as likely the share is zero and the evidence falls
     rng = np.random.default_rng(0)
     noise = [plain(gap, design).worth(further) for gap, design, further in (drawn(rng) for _ in range(200))]
     assert kstest([w.p_value for w in noise], "uniform").pvalue > 0.01
@@ -36,10 +37,7 @@ def test_in_noise_every_p_value_is_as_likely_the_share_is_zero_and_the_evidence_
     assert (shares < 0.0).any()
     assert np.mean([w.gain for w in noise]) < -3.0
     assert np.mean([w.gain > 0.0 for w in noise]) < 0.02
-
-
-def test_weights_hardly_make_the_test_of_noise_bolder():
-    """With the weights of a robust fit, too, no more than its share of p-values lies below a level."""
+    # With the weights of a robust fit, too, no more than its share of p-values lies below a level.
     rng = np.random.default_rng(1)
     found = []
     for _ in range(200):

@@ -29,19 +29,14 @@ def chances(stream):
     return np.array(found)
 
 
-def test_the_chance_of_a_misfit_is_even_where_nothing_changes(chances):
-    """Kolmogorov's distance of 60 draws from an even law exceeds 0.25 once in a thousand."""
+def test_chances_are_even_where_nothing_changes(chances):
+    # Kolmogorov's distance of 60 draws from an even law exceeds 0.25 once in a thousand.
     p = np.sort(chances[:, 0])
     assert np.abs(p - (np.arange(60) + 0.5) / 60).max() < 0.25
-
-
-def test_the_chance_of_a_change_is_not_understated(chances):
-    """By Bonferroni it is at least as large as it should be; batches share the errors of one diagnosis."""
+    # By Bonferroni it is at least as large as it should be; batches share the errors of one diagnosis.
     assert (chances[:, 1] < 0.1).sum() <= 16
     assert (chances[:, 1] < 1e-3).sum() <= 2
-
-
-def test_rows_without_gross_errors_speak_of_none(chances):
+    # rows without gross errors speak of none
     assert (chances[:, 2] > 0.5).all()
 
 

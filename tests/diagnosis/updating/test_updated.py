@@ -47,21 +47,18 @@ def test_tables_and_batches_are_the_same_as_one_campaign(found, whole, updated):
     assert last.diagnosis is found
 
 
-def test_the_diagnosis_itself_stays(found, whole, updated):
+def test_the_diagnosis_stays_and_the_update_is_saved_and_printed(found, whole, updated, tmp_path):
+    # the diagnosis itself stays
     before = found.parameters
     found.update(whole.take(np.arange(OLD, OLD + 10)))
     assert found.parameters.equals(before)
     assert found.samples == OLD
     assert updated.diagnosis is found
-
-
-def test_the_model_is_saved_and_loaded(updated, whole, tmp_path):
+    # the model is saved and loaded
     updated.model.save(tmp_path / "model.json")
     again = tr.CorrectedModel.load(tmp_path / "model.json")
     assert np.allclose(again.predict(whole)[0], updated.model.predict(whole)[0], atol=1e-12)
-
-
-def test_it_is_plain_values_and_prints_whether_the_choice_stands(updated):
+    # it is plain values and prints whether the choice stands
     assert "the choice stands" in str(updated)
     fallen = replace(updated, fallen=("The new rows leave 3 times as much.",))
     assert "to be diagnosed anew" in repr(fallen)
@@ -102,25 +99,25 @@ def with_spread(found, spread):
     return replace(found, model=replace(found.model, spread=spread))
 
 
-def test_more_of_the_same_lets_the_choice_stand(known):
+def test_more_of_the_same_or_nothing_lets_the_choice_stand(known):
+    # more of the same lets the choice stand
     for seed in range(5):
         assert known.update(measured(40, seed=60 + seed)).fallen == ()
+    # no rows say nothing
+    assert known.update(measured(40).take([])).fallen == ()
 
 
-def test_play_that_begins_makes_it_fall_and_it_stays_so(known):
+def test_what_is_new_in_the_rows_makes_the_choice_fall(known):
+    # play that begins makes it fall and it stays so
     worn = {**EFFECTS, "backlash": {**EFFECTS["backlash"], "joint_4": 3e-4}}
     fallen = known.update(measured(60, seed=7, effects=worn))
     assert any("backlash" in reason and "joint_4" in reason for reason in fallen.fallen)
     assert fallen.update(measured(40, seed=61)).fallen[: len(fallen.fallen)] == fallen.fallen
-
-
-def test_more_noise_makes_it_fall(known):
+    # more noise makes it fall
     rows = measured(60, seed=8)
     louder = replace(rows, position=rows.position + 2e-5 * np.random.default_rng(0).normal(size=(60, 3)))
     assert any("times the mean square" in reason for reason in known.update(louder).fallen)
-
-
-def test_rows_elsewhere_make_it_fall(known):
+    # rows elsewhere make it fall
     rows = measured(40, seed=9)
     narrow = {name: (-0.5, 0.5) for name in known.model.spread.ranges if name == "joint_1"}
     said = with_spread(known, replace(known.model.spread, ranges=narrow)).update(rows).fallen
@@ -136,10 +133,6 @@ def test_an_effect_that_can_be_tested_now_makes_it_fall():
     assert known.finding("thermal_elongation").status == "not_testable"
     said = with_spread(known, None).update(hall.take(np.arange(200, 240))).fallen
     assert any("thermal_elongation could not be tested" in reason for reason in said)
-
-
-def test_no_rows_say_nothing(known):
-    assert known.update(measured(40).take([])).fallen == ()
 
 
 def test_what_is_drawn_anew_in_every_pose_is_left_to_a_fresh_diagnosis(known):
