@@ -128,7 +128,7 @@ def test_the_origin_and_the_unit_of_time_do_not_matter(rv_m2):
     assert found.gap.rms_after == pytest.approx(plain.gap.rms_after, rel=1e-4)
 
 
-@pytest.mark.parametrize(("gross", "explained"), [(0.2, True), (0.45, False)])
+@pytest.mark.parametrize(("gross", "explained"), some([(0.2, True), (0.45, False)], 2))
 def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
     right = 0
     for seed in range(3):
@@ -207,7 +207,7 @@ def test_withholding_everything_is_refused(offset):
         diagnose(offset, only=["drift"], without=["drift"])
 
 
-@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
+@pytest.mark.parametrize("turning", some((None, 3e-5), 2), ids=["positions", "poses"])
 @pytest.mark.parametrize("only", [("joint_offset",), ("tool_frame",)])
 def test_where_base_and_tool_are_known_one_effect_is_enough_to_ask_for(rv_m2, only, turning):
     # no column of a frame is fitted, and the gap is far beyond what one expects
