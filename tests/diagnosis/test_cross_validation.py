@@ -193,7 +193,8 @@ def test_noise_is_not_explained_and_does_not_shrink(arm):
         named.append(found.verdict)
         flagged.append(found.unexplained.flagged)
         shrinkage.append(found.gap.held_out.shrinkage)
-        gains += [f.shrinkage for f in found.effects if f.status == "not_found"]
+        # in thirty rows an effect may shrink by chance what was held out
+        gains += [f.shrinkage for f in found.effects if f.status == "not_found" and campaign.samples > 30]
         kept = campaign.samples - len(found.outliers)
         assert set(found.outliers) >= {row for row in truth["outliers"] if far(campaign, found, row)}
         assert found.gap.rms_before / found.gap.noise_floor == pytest.approx(1.0, abs=4.0 / np.sqrt(3 * kept) + 0.2)
@@ -203,6 +204,7 @@ def test_noise_is_not_explained_and_does_not_shrink(arm):
         else:
             assert "noise" in found.summary
     assert sum(bool(n) for n in named) + sum(flagged) <= 1, named
+    assert not any(name.startswith("discovered.") for verdict in named for name in verdict)
     assert np.median(shrinkage) < 0.005
     assert max(shrinkage) < 0.05
     # nor would anything else have shrunk rows held out
