@@ -1,6 +1,7 @@
 """A choice is made again at its own exact fit until it stays, with constants where the evidence is largest."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from thermal_robot.effects import Backlash, JointGain, choose, gate
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.exact import (
+    _leading,
     _others,
     corrected_observations,
     gauss_newton,
@@ -136,6 +138,17 @@ def test_rivals_of_a_setting_have_one_joint_less_one_more_or_another(nominal):
     laws = [Discovered(place=f"joint_{k}", quantity="time", tried=50.0) for k in (1, 2, 3)]
     assert list(_others(laws[1], nominal, laws)) == laws
     assert set(rivals(scale, nominal)) == {scale}
+
+
+def test_an_effect_in_all_joints_is_tried_in_those_that_do_most(nominal):
+    joints = nominal.robot.joint_names
+    (offset,) = choose(("joint_offset",), (), ())
+    values = 1e-4 * np.array([0.0, 5.0, 0.1, 4.0, 0.0])
+    found = [e.places for e in _leading(offset, block(nominal, offset), values)]
+    assert [len(own) for own in found] == [2, 3, 4]
+    assert found[0] == (joints[1], joints[3])
+    assert all(set(a) < set(b) for a, b in pairwise(found))
+    assert list(_leading(replace(offset, places=("joint_2",)), block(nominal, offset), values)) == []
 
 
 def explained(data, names):

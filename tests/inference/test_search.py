@@ -100,6 +100,23 @@ def test_without_some_blocks_it_is_the_search_that_never_had_them():
         assert any(out & set(blocks) for blocks in search.seen)  # that of which they were left out keeps them
 
 
+def test_every_neighbour_of_a_combination_is_weighed():
+    search = alike(5)
+    found = search.weigh((0, 1))
+    seen = {c for c in search.seen if len(set(c) ^ {0, 1}) == 1}
+    assert {(0,), (1,), *(tuple(sorted((0, 1, k))) for k in range(2, 7))} <= seen
+    exact = Search(search.gram, search.log_prior)
+    assert found.log_evidence >= max(exact.evaluate(c).log_evidence for c in ((0, 1), (0,), (1,)))
+
+
+def test_what_rounding_hides_has_nothing_added_to_it():
+    search = alike(2)
+    hidden = replace(search.evaluate(()), blocks=(0,), log_evidence=-np.inf)
+    search.seen[(0,)] = hidden
+    assert search._with_one_more(hidden, search.evaluate(())) == []
+    assert np.isfinite(search.run().log_evidence)
+
+
 def gains_of(linear, whitening, beside):
     """What each further block gains beside some: to first order, and computed exactly."""
     search = Search(gram(linear, whitening), (0.0,) * len(linear.blocks))
