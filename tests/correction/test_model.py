@@ -189,6 +189,13 @@ def test_orientation_is_predicted_where_it_was_measured(arm):
     assert found.gap.orientation_after < 0.7 * found.gap.orientation_before
 
 
+def test_orientation_does_not_depend_on_the_sign_of_quaternions(rv_m2):
+    campaign, _, _ = simulate(rv_m2, ["joint_offset"], seed=5, turning=TURNING)
+    flipped = replace(campaign, orientation=campaign.orientation * np.where(np.arange(120) % 2, 1.0, -1.0)[:, None])
+    one, other = diagnose(campaign).model, diagnose(flipped).model
+    np.testing.assert_allclose(other.predict(campaign)[0], one.predict(campaign)[0], rtol=0, atol=1e-12)
+
+
 def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
     """The user's simulator has the robot's true lengths, the URDF has not; both have the wrong zeros."""
     campaign, _, (fresh, place) = simulate(rv_m2, ["joint_offset"], seed=6, fresh=100)
