@@ -65,7 +65,7 @@ STRAIGHT = (
 
 def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out rows whose measured pose is that of another row's command, with a sentence for each run of them."""
-    if campaign.samples <= faults.DRAWN:
+    if campaign.samples <= faults.DRAWN or campaign.position is None:
         return campaign, ()
     order = in_order(campaign)
     readings = Readings.of(campaign).take(order)

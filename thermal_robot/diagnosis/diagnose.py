@@ -93,7 +93,7 @@ def diagnose(
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
 
-    if campaign.position is None or not campaign.samples:
+    if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     campaign, left = not_executed(campaign)

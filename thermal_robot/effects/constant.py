@@ -22,6 +22,7 @@ from thermal_robot.effects.effect import (
     at_tool,
 )
 from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.observables import components, instrument_rows
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -218,7 +219,7 @@ class ToolFrame(Effect):
         return (own, *(replace(own, alone=component) for component, _ in TWIST))
 
     def _turns(self, observations: Observations) -> bool:
-        return observations.campaign.measures == "pose" if self.turns is None else self.turns
+        return components(observations.campaign) == 6 if self.turns is None else self.turns
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
@@ -242,6 +243,10 @@ class InstrumentScale(Effect):
     title: ClassVar[str] = "a scale error of the instrument"
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return what would make it testable: an instrument."""
+        return () if instrument_rows(observations.campaign).any() else ("rows of kind position or pose",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""

@@ -43,6 +43,7 @@ from thermal_robot.inference.screening import (
     scan,
     shaped,
 )
+from thermal_robot.observables import components
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
@@ -139,7 +140,7 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations, order = fit.corrected, in_order(fit.campaign)
-    turns, joints = fit.campaign.measures == "pose", fit.campaign.robot.joint_names
+    turns, joints = components(fit.campaign) == 6, fit.campaign.robot.joint_names
     plain = Discovered(quantity="none", shape="constant", turns=turns)
     where = [("base", "base"), ("tool", "tool"), *(("joint", joint) for joint in joints)]
     places = [replace(plain, kind=kind, place=place) for kind, place in where]

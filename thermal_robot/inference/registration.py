@@ -7,6 +7,7 @@ distance settles: what one start finds does not depend on the others.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -14,11 +15,13 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.names import POSITION
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
-from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
+from thermal_robot.observables import instrument_rows
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
 
@@ -177,25 +180,42 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
 
 
 def frames_known(campaign: Campaign) -> bool:
-    """Tell whether no frame has to be fitted: both are declared, or a simulator holds the tool."""
+    """Tell whether nothing has to be fitted: both frames are declared, or a simulator holds the tool."""
+    if campaign.position is None and campaign.measured and unknown_frames(campaign):
+        return False
     return campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None)
 
 
 def found_frames(campaign: Campaign) -> Frames:
     """Find the unknown frames to where they are nearly linear; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
+    if campaign.position is None:
+        return _found_by_instrument(campaign, frames)
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     some = np.linspace(0, rows - 1, min(rows, settings.START_ROWS)).astype(np.int64)
     return Frames(*alternate(campaign, frames, frames.tool[:3, 3] + starts(campaign), some=some)[1])
 
 
+def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
+    """Find the base by those rows that an instrument measured; where there are none it stands as declared."""
+    rows = np.flatnonzero(instrument_rows(campaign))
+    if campaign.base_known or len(rows) < 3:
+        return frames
+    some, places = campaign.take(rows), np.column_stack([campaign.readings[axis][rows] for axis in POSITION])
+    found = found_frames(replace(some, position=places, readings={}))
+    return found if not campaign.tool_known else replace(found, tool=frames.tool)
+
+
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
     """Return the frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
-    base_step, tool_step = (step[np.array(names, dtype=object) == name] for name in ("base", "tool"))
+    own = np.array(names, dtype=object)
+    base_step, tool_step = (step[own == name] for name in ("base", "tool"))
+    shared = {name: each for name, each in frames.artefacts.items() if name in names}
+    artefacts = {name: each.moved(step[own == name]) for name, each in shared.items()}
     base = frames.base @ exp6(base_step) if base_step.size else frames.base
     turn = exp6(np.concatenate([tool_step, np.zeros(6 - tool_step.size)])) if tool_step.size else np.eye(4)
-    return Frames(base, turn @ frames.tool)
+    return Frames(base, turn @ frames.tool, {**frames.artefacts, **artefacts})
 
 
 def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
@@ -212,7 +232,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
-        frames = moved(frames, step, names)
+        frames = moved(observations.frames, step, names)
         if np.abs(step).max() < settings.ROUNDING:
             break
     return frames

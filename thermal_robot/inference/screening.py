@@ -30,6 +30,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import robust_noise
+from thermal_robot.observables import components
 from thermal_robot.observations import Observations
 
 
@@ -237,7 +238,7 @@ __all__ = [
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
     """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
-    turns = observations.campaign.measures == "pose"
+    turns = components(observations.campaign) == 6
     robot = observations.robot
     places = {
         "joint": robot.joint_names,
@@ -586,7 +587,7 @@ def _rows(parameter: Parameter) -> Iterator[Response]:
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
     """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
-    turns = observations.campaign.measures == "pose"
+    turns = components(observations.campaign) == 6
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
     follow = {
         name: Discovered(

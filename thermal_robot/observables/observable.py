@@ -1,0 +1,122 @@
+"""Measurement models: what a row reads of the tool's pose, its derivative by the tool's twist, and its nuisances.
+
+A row of whatever kind is told as a displacement of the target, m, and a turn, rad, in the root frame's axes: by how
+much the target is off from where the reading puts it, along what the reading sees. What a reading does not see of a
+twist is zero there, in the gap as in every column.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import Campaign
+
+Rows = NDArray[np.int64]
+
+
+class Artefact(Protocol):
+    """Nuisance parameters of a thing beside the robot that readings share: a stand, a plane, an anchor, a camera."""
+
+    @property
+    def width(self) -> int:
+        """Number of its free parameters."""
+
+    def moved(self, step: Array) -> Any:
+        """Return it after a step (width,) of its parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Rows of one kind with what is predicted of them.
+
+    Attributes
+    ----------
+    campaign, rows
+        Whose rows these are, and their (n,) numbers; ``None`` for all.
+    position, rotation
+        (n, 3) m and (n, 3, 3): the target's predicted pose in the root frame.
+    base
+        (4, 4) pose of the root frame in the measurement frame.
+    instrument
+        (n, 3) displacement that the instrument adds, measurement frame, m; ``None`` for none.
+    """
+
+    campaign: Campaign
+    rows: Rows | None
+    position: Array
+    rotation: Array
+    base: Array
+    instrument: Array | None = None
+
+    def own(self, values: Any) -> Any:
+        """Return the rows of this kind of an array over all rows."""
+        return values if self.rows is None else values[self.rows]
+
+    def labels(self, name: str) -> NDArray[np.str_]:
+        """(n,) labels of a column."""
+        return np.asarray(self.own(self.campaign.labels[name]))
+
+    def readings(self, *names: str) -> Array:
+        """(n, k) figures of columns, SI."""
+        return np.column_stack([self.own(self.campaign.readings[name]) for name in names])
+
+    @property
+    def where(self) -> Array:
+        """(n, 3) predicted position of the target in the measurement frame, m."""
+        return np.asarray(self.position @ self.base[:3, :3].T + self.base[:3, 3])
+
+    def in_root(self, vectors: Array) -> Array:
+        """(..., 3) vectors of the measurement frame in the axes of the root frame."""
+        return np.asarray(vectors @ self.base[:3, :3])
+
+
+class Observable(ABC):
+    """One kind of measurement.
+
+    Attributes
+    ----------
+    kind
+        What the column ``kind`` says.
+    says
+        What a row of it says, for a reader; ``of`` its spread, ``about`` what.
+    turns
+        Whether it sees turns of the target beside its place.
+    locates
+        Whether it says where the root frame is: readings are in a frame that something else than the arm defines.
+    """
+
+    kind: ClassVar[str]
+    says: ClassVar[str]
+    turns: ClassVar[bool] = False
+    locates: ClassVar[bool] = False
+
+    def has_length(self, seen: Seen) -> bool:
+        """Whether the rows carry a length, and so tell the robot's scale."""
+        return True
+
+    def artefacts(self, seen: Seen) -> dict[str, Artefact]:
+        """Return by name what the rows share, where the predicted poses put it; nothing by default."""
+        return {}
+
+    @abstractmethod
+    def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
+        """(n, 3) or (n, 6) measured − predicted: displacement, m, and turn, rad, root frame axes."""
+
+    @abstractmethod
+    def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
+        """(n, 6, K) what rows see of twists (n, 6, K) of the target, root frame axes."""
+
+    def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
+        """(n, 3, w) derivative of predicted − measured by the w parameters of one artefact, root frame axes."""
+        raise NotImplementedError(f"{self.kind} has no artefact {name}")
+
+    def seen_components(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[int, int]:
+        """Return how many components of place and of turn a row sees."""
+        return 3, 3 if self.turns else 0
