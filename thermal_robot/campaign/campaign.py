@@ -286,7 +286,7 @@ class Campaign:
     @cached_property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of measurement of the rows, sorted; see :mod:`thermal_robot.observables`."""
-        if self.position is None and "kind" in self.labels:
+        if "kind" in self.labels:
             return tuple(np.unique(self.labels["kind"]).tolist())
         return ("position",) if self.orientation is None else ("pose",)
 

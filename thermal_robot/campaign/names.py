@@ -14,9 +14,13 @@ KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "position": (POSITION, ()),
     "pose": ((*POSITION, *ORIENTATION), ()),
     "socket": ((), ("stand", "socket")),
+    "plane": ((), ("plane",)),
+    "distance": (("distance",), ("anchor",)),
+    "controller": ((*POSITION, *ORIENTATION), ()),
 }
 """Columns of each kind of measurement: its figures and its labels."""
 KIND = "kind"  # Column that says which kind each row is
+OPTIONAL = {"plane": ("height",)}  # Figures that rows of a kind may have, 0 where they have none
 OF_KINDS = tuple(dict.fromkeys(label for _, labels in KINDS.values() for label in labels))
 PIXELS = ("u", "v")
 NOISE = "noise"  # Column of the instrument's one sigma of each row
@@ -90,7 +94,8 @@ def axes_of(target: int) -> tuple[str, str, str]:
 
 def of_kinds() -> set[str]:
     """Return the columns of all kinds of measurement."""
-    return {column for groups in KINDS.values() for group in groups for column in group}
+    optional = {column for columns in OPTIONAL.values() for column in columns}
+    return optional | {column for groups in KINDS.values() for group in groups for column in group}
 
 
 def reading_scale(column: str, length: float) -> float:

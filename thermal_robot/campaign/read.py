@@ -59,11 +59,9 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         settings = replace(settings, tool_known=False)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
     q = _commands(table, robot, units)
-    plain = measured and not told and not columns.kinds
+    settings, columns = framed(settings, columns)
+    plain = measured and not told and columns.kinds in ((), ("controller",))
     poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
-    if columns.kinds:
-        # nothing but an instrument says where the base stands: without one it stands where the URDF has it
-        settings = replace(settings, base_known=settings.base_known or not {"position", "pose"} & {*columns.kinds})
     poses["readings"], labels = readings(table, columns, settings)
     for key, group in (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION)):
         poses[key] = _quaternions(table, group) if group in columns.groups else None
@@ -100,6 +98,16 @@ def arrived(campaign: Campaign) -> Campaign:
     return replace(campaign, covariates={**campaign.covariates, **found}, derived=tuple(found))
 
 
+def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
+    """Return what is declared of the frames where it follows from what was measured, and the columns that are read."""
+    if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
+        groups = (*columns.groups, names.ORIENTATION)
+        return replace(settings, base_known=True, tool_known=True), replace(columns, groups=groups)
+    # nothing but an instrument says where the base stands: without one it stands where the URDF has it
+    alone = bool(columns.kinds) and not {"position", "pose"} & {*columns.kinds}
+    return replace(settings, base_known=settings.base_known or alone), columns
+
+
 def readings(
     table: Table, columns: Columns, settings: Settings
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
@@ -107,6 +115,8 @@ def readings(
     labels = {label: np.array(table.text(label), dtype=np.str_) for label in columns.labels}
     if not columns.kinds:
         return {}, labels
+    if columns.kinds == ("controller",):
+        return {}, labels | {names.KIND: np.full(len(table.rows), "controller")}
     stated = table.text(names.KIND) if names.KIND in table.columns else [columns.kinds[0]] * len(table.rows)
     kind, figures = np.array(stated, dtype=np.str_), dict[str, Array]()
     for own in columns.kinds:
@@ -118,6 +128,9 @@ def readings(
             if row is not None:
                 raise table.error("a value is missing", column, row, found="an empty cell", expected="a number")
             figures[column] = np.where(here, values, figures.get(column, 0.0))
+        for column in (name for name in names.OPTIONAL.get(own, ()) if name in table.columns):
+            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
+            figures[column] = np.where(here & ~np.isnan(values), values, 0.0)
         for column in texts:
             cells = np.array(table.text(column), dtype=np.str_)
             row = first_true(np.asarray(here & (cells == "")))

@@ -34,7 +34,7 @@ from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
-from thermal_robot.observables import components, kinds_of
+from thermal_robot.observables import components, kinds_of, of_model
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
 
@@ -143,7 +143,8 @@ def answer(
     held = [effect.name for effect, _ in fit.effects]
     systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in laws}, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    found, harms = _no_surer(by_share(titled((*systematic, *chance), (*candidates, *random_effects()))), gap)
+    told = titled((*systematic, *chance), (*candidates, *random_effects()), of_model(campaign))
+    found, harms = _no_surer(by_share(told), gap)
     groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,

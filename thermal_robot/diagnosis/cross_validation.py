@@ -193,7 +193,7 @@ class Model:
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
         whole = self.whole[own]
-        equations = max(int(self._used.sum()) * self.linear.measures, 1) / len(whole)
+        equations = max(int(self._used.sum()) * self.linear.measures - self.whitening.unseen, 1) / len(whole)
         # the gap of the nominal robot is what registration leaves
         variance = np.maximum(whole[:, -1, -1] / equations if self.apart else 0.0, np.full(len(whole), self.variance))
         for _ in range(settings.FOLD_ROUNDS):

@@ -27,6 +27,7 @@ from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit, require_enough
 from thermal_robot.inference.scatter import random_gap
+from thermal_robot.observables import of_model
 
 
 def diagnose(
@@ -84,6 +85,8 @@ def diagnose(
         progress("reading the campaign")
         campaign = read_campaign(campaign)
     candidates = choose(only, without, effects)
+    if campaign.measured and of_model(campaign):
+        candidates = tuple(effect for effect in candidates if effect.in_model)
     # where nothing was left out the candidates are all; installed packages are looked up once
     everything = {effect.name for effect in (*effects, *candidates)}
     if only or without:
@@ -156,7 +159,7 @@ def _concluded(
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Let terms that nobody listed join the known effects, prune by one rule, then ask what is random."""
     fit = known
-    for number in range(1, settings.SELECTIONS):
+    for number in range(1, 1 if of_model(known.campaign) else settings.SELECTIONS):
         wider = grown(fit, number, progress)
         if wider is None:
             break

@@ -20,7 +20,7 @@ def unseen(fit: Fit) -> Iterator[str]:
     A direction is not seen where its column lies, to rounding, in the span of the frames and of what rows share.
     Where an instrument measured in a frame of its own its frames are told elsewhere, and nothing is yielded.
     """
-    campaign, seen = fit.campaign, fit.corrected
+    campaign, seen = fit.campaign, fit.nominal  # corrected, what varies may part what is alike
     if campaign.position is not None:
         return
     basis = orthonormal(equations_of(frame_columns(seen)[0]))
@@ -50,7 +50,7 @@ def unseen(fit: Fit) -> Iterator[str]:
 
 def _told(fit: Fit) -> Array:
     """(N, 3, 6) what a twist of the base does to the place of the target, whether a row sees it or not."""
-    point = fit.corrected.position
+    point = fit.nominal.position
     moved = np.zeros((len(point), 3, 6))
     moved[:, :, :3] = np.eye(3)
     moved[:, :, 3:] = np.cross(np.eye(3)[None], point[:, None, :]).transpose(0, 2, 1)

@@ -22,6 +22,7 @@ from thermal_robot.effects.effect import (
     at_tool,
 )
 from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.effects.settings import IN_MODEL
 from thermal_robot.observables import components, instrument_rows
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class Geometric(Effect):
 
     name: ClassVar[str] = "geometric"
     title: ClassVar[str] = "geometric errors of the links"
+    in_model: ClassVar[str] = "a calibration of this one arm, or another variant, in the controller"
     size_spread: ClassVar[float] = 1.0
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -128,6 +130,7 @@ class JointOffset(Effect):
 
     name: ClassVar[str] = "joint_offset"
     title: ClassVar[str] = "joint zero offsets"
+    in_model: ClassVar[str] = "other joint zeros in the controller"
     singular: ClassVar[str] = "a zero offset"
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
@@ -160,6 +163,8 @@ class BaseFrame(Effect):
 
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
+    in_model: ClassVar[str] = "a base frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
@@ -200,6 +205,8 @@ class ToolFrame(Effect):
 
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
+    in_model: ClassVar[str] = "a tool or flange frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
 
     @property

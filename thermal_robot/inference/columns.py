@@ -16,7 +16,7 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
-from thermal_robot.observables import components
+from thermal_robot.observables import components, of_model
 from thermal_robot.observations import Observations, observe
 
 
@@ -71,6 +71,8 @@ def block(observations: Observations, effect: Effect) -> Block:
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])
+    if of_model(campaign):
+        sizes = sizes * effect.in_model_times
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])

@@ -43,7 +43,7 @@ from thermal_robot.inference.screening import (
     scan,
     shaped,
 )
-from thermal_robot.observables import components
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
@@ -169,7 +169,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
 
     def target(some: Iterable[int], trusted: Rows) -> Target:
         design = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in some)], axis=2)
-        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise)
+        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise, seen=e.whitening.seen)
 
     yield target(blocks, ~single), 0.0
     yield target(blocks, e.outliers & ~single), 0.0
@@ -441,8 +441,9 @@ class _Pursuit:
         return block(self.observations, _ripple(found)).sizes ** -2.0
 
     def _target(self, found: Sequence[_Wave], like: Target | None = None) -> Target:
-        relative = self.observations.campaign.relative_noise
-        return Target.of(self.gap, self._columns(found), self.changed, relative, like)
+        campaign = self.observations.campaign
+        relative, seen = campaign.relative_noise, seen_components(campaign)
+        return Target.of(self.gap, self._columns(found), self.changed, relative, like, seen)
 
     def _moves(self, joint: str) -> tuple[Array, Array]:
         """(N,) positions of a joint, and (N, m, 1) what a unit of it moves."""

@@ -30,7 +30,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import robust_noise
-from thermal_robot.observables import components
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 
@@ -66,12 +66,14 @@ def gained(total: Array | float, explained: Array | float, rank: Array | float, 
 class Target:
     """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
 
-    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design;
+    ``unseen``: how many of the N·m components no row sees.
     """
 
     white: Array
     root: Array
     basis: Array
+    unseen: int = 0
 
     @classmethod
     def of(
@@ -81,24 +83,25 @@ class Target:
         trusted: NDArray[np.bool_] | None = None,
         relative: Array | None = None,
         like: Target | None = None,
+        seen: NDArray[np.int64] | None = None,
     ) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
 
         Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
-        differs, ``relative`` (N, m) says how. Weights are found by iteration, or at once from those of a target that is
-        nearly ``like`` this one.
+        differs, ``relative`` (N, m) says how; where rows see fewer components, ``seen`` (N, m/3). Weights
+        are found by iteration, or at once from those of a target that is nearly ``like`` this one.
         """
         if relative is not None:
             like = None if like is None else replace(like, root=like.root * relative)
-            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like)
-            return cls(even.white, even.root / relative, even.basis)
-        found = _weighed(gap, design, gap if like is None else like.left, first=like is None)
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like, seen=seen)
+            return replace(even, root=even.root / relative)
+        found = _weighed(gap, design, gap if like is None else like.left, seen, first=like is None)
         for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
-            found = _weighed(gap, design, found.left)
+            found = _weighed(gap, design, found.left, seen)
         if trusted is not None and trusted.any():
-            noise = np.repeat(robust_noise(found.left), 3)
+            noise = np.repeat(robust_noise(found.left, seen=seen), 3)
             found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
-        return found
+        return found if seen is None else replace(found, unseen=int((3 - seen).sum()))
 
     @property
     def left(self) -> Array:
@@ -108,7 +111,7 @@ class Target:
     @property
     def freedom(self) -> int:
         """Residual degrees of freedom: equations less the rank of the design."""
-        return max(int(len(self.white) - self.basis.shape[1]), 1)
+        return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
     def worth(self, columns: Array) -> Worth:
         """Return what further columns (N, m, K) explain; nothing where they would leave too few degrees of freedom."""
@@ -142,10 +145,13 @@ class Target:
         )
 
 
-def _weighed(gap: Array, design: Array, left: Array, first: bool = False) -> Target:
+def _weighed(
+    gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
+) -> Target:
     """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
-    noise = np.repeat(robust_noise(left), 3)
-    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * left.shape[1])
+    noise = np.repeat(robust_noise(left, seen=seen), 3)
+    figures = left.shape[1] if seen is None else np.maximum(seen.sum(axis=1), 1)
+    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * figures)
     return _projected(gap, design, 1.0 / np.sqrt(1.0 + np.broadcast_to(far2, len(gap)))[:, None] / noise)
 
 
@@ -519,13 +525,13 @@ class Thin:
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
-        relative = self.observations.campaign.relative_noise
-        first = Target.of(self.linear.gap, design, self.changed, relative)
+        relative, seen = self.observations.campaign.relative_noise, seen_components(self.observations.campaign)
+        first = Target.of(self.linear.gap, design, self.changed, relative, seen=seen)
         if not sound:
             return first
         distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
         near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
-        return Target.of(self.linear.gap, design, near | self.changed, relative)
+        return Target.of(self.linear.gap, design, near | self.changed, relative, seen=seen)
 
 
 def conditions(observations: Observations, joint: str = "") -> list[str]:

@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.kinematics import tool_poses
+from thermal_robot.observables.distance import Distance
 from thermal_robot.observables.observable import Artefact, Observable, Rows, Seen
-from thermal_robot.observables.position import Pose, Position
+from thermal_robot.observables.plane import OnPlane
+from thermal_robot.observables.position import Controller, Pose, Position
 from thermal_robot.observables.socket import Socket
 
-KINDS: dict[str, Observable] = {own.kind: own for own in (Position(), Pose(), Socket())}
+KINDS: dict[str, Observable] = {
+    own.kind: own for own in (Position(), Pose(), Socket(), OnPlane(), Distance(), Controller())
+}
 """Every kind of measurement by its name."""
 
 
@@ -32,6 +36,14 @@ def kinds_of(campaign: Campaign) -> list[tuple[Observable, Rows | None]]:
 def components(campaign: Campaign) -> int:
     """Return m, the components of a row: 3 of place, 6 where any row sees turns."""
     return 6 if any(KINDS[kind].turns for kind in campaign.kinds) else 3
+
+
+def seen_components(campaign: Campaign) -> NDArray[np.int64] | None:
+    """(N, m/3) how many components of place, and of turn, each row sees; ``None`` where it is all in all."""
+    found = np.zeros((campaign.samples, components(campaign) // 3), dtype=np.int64)
+    for own, rows in kinds_of(campaign):
+        found[slice(None) if rows is None else rows] = (own.places, 3 if own.turns else 0)[: found.shape[1]]
+    return None if (found == 3).all() else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +153,11 @@ class Sight:
         return whole if self.size is None else whole * self.size.relative, tuple(names)
 
 
+def of_model(campaign: Campaign) -> bool:
+    """Whether the rows are a model's word alone, so that no robot can be the cause of what differs."""
+    return all(own.of_model for own, _ in kinds_of(campaign))
+
+
 def instrument_rows(campaign: Campaign) -> NDArray[np.bool_]:
     """(N,) the rows that an instrument with a frame of its own measured."""
     seen = np.zeros(campaign.samples, dtype=bool)
@@ -149,4 +166,4 @@ def instrument_rows(campaign: Campaign) -> NDArray[np.bool_]:
     return seen
 
 
-__all__ = ["KINDS", "Artefact", "Sight", "components", "instrument_rows", "kinds_of"]
+__all__ = ["KINDS", "Artefact", "Sight", "components", "instrument_rows", "kinds_of", "of_model", "seen_components"]

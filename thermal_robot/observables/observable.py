@@ -86,16 +86,22 @@ class Observable(ABC):
         What the column ``kind`` says.
     says
         What a row of it says, for a reader; ``of`` its spread, ``about`` what.
+    places
+        How many components of the target's place a row sees.
     turns
         Whether it sees turns of the target beside its place.
     locates
         Whether it says where the root frame is: readings are in a frame that something else than the arm defines.
+    of_model
+        Whether what is read is another model's word of the same joints: a difference is then the model's.
     """
 
     kind: ClassVar[str]
     says: ClassVar[str]
+    places: ClassVar[int] = 3
     turns: ClassVar[bool] = False
     locates: ClassVar[bool] = False
+    of_model: ClassVar[bool] = False
 
     def has_length(self, seen: Seen) -> bool:
         """Whether the rows carry a length, and so tell the robot's scale."""
@@ -117,6 +123,51 @@ class Observable(ABC):
         """(n, 3, w) derivative of predicted − measured by the w parameters of one artefact, root frame axes."""
         raise NotImplementedError(f"{self.kind} has no artefact {name}")
 
-    def seen_components(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[int, int]:
-        """Return how many components of place and of turn a row sees."""
-        return 3, 3 if self.turns else 0
+
+class Along(Observable):
+    """A reading of one component, along a line that what it shares defines.
+
+    A member says by its ``label`` which rows share, where that starts, what is read, and its derivative.
+    """
+
+    places: ClassVar[int] = 1
+    label: ClassVar[str]
+
+    def names(self, seen: Seen) -> list[str]:
+        """Return the artefact of each row."""
+        return [f"{self.label} {own}" for own in seen.labels(self.label)]
+
+    def artefacts(self, seen: Seen) -> dict[str, Artefact]:
+        """Return what the rows share, where the predicted poses put it."""
+        names = np.array(self.names(seen))
+        return {str(name): self.start(seen, names == name, name) for name in np.unique(names)}
+
+    @abstractmethod
+    def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
+        """Return one artefact, from the rows (n,) that have to do with it."""
+
+    @abstractmethod
+    def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
+        """(n,) predicted − read, m, and (n, 3) the unit vector along which, measurement frame."""
+
+    @abstractmethod
+    def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
+        """(n, w) derivative of predicted − read by the parameters of an artefact, as if all rows had to do with it."""
+
+    def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
+        """(n, 3) read − predicted along its line, m."""
+        beyond, along = self.read(seen, artefacts)
+        return seen.in_root(-beyond[:, None] * along)
+
+    def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
+        """(n, 6, K) the displacement along the line."""
+        along = seen.in_root(self.read(seen, artefacts)[1])
+        moved = np.zeros_like(twists)
+        moved[:, :3] = along[:, :, None] * np.einsum("ni,nik->nk", along, twists[:, :3])[:, None]
+        return moved
+
+    def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
+        """(n, 3, w) what the parameters of one artefact do to the rows that have to do with it."""
+        here = np.array(self.names(seen)) == name
+        along = seen.in_root(self.read(seen, artefacts)[1])
+        return np.asarray(here[:, None, None] * along[:, :, None] * self.slopes(seen, artefacts, name)[:, None])

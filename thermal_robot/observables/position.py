@@ -58,3 +58,15 @@ class Pose(Position):
             return twists
         turned = seen.rotation.transpose(0, 2, 1) @ twists[:, 3:]
         return np.concatenate([twists[:, :3], turned], axis=1)
+
+
+class Controller(Pose):
+    """Pose that the controller itself reports of its joints: forward kinematics by another model.
+
+    Nothing was measured: what differs is its model, its tool or its frames, and no robot.
+    """
+
+    kind: ClassVar[str] = "controller"
+    says: ClassVar[str] = "the controller's own pose"
+    locates: ClassVar[bool] = False
+    of_model: ClassVar[bool] = True
