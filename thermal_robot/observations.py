@@ -304,7 +304,7 @@ def observe(
     found = Observations(campaign, frames, position, rotation, instrument, displacement)
     _hold(found)
     vars(found)["chain"] = chain  # as the property would find it
-    if missing := found.sight.artefacts.keys() - frames.artefacts.keys():
-        known = {**frames.artefacts, **{name: found.sight.artefacts[name] for name in sorted(missing)}}
-        object.__setattr__(found, "frames", replace(frames, artefacts=known))
+    own = found.sight.artefacts
+    if any(frames.artefacts.get(name) is not artefact for name, artefact in own.items()):
+        object.__setattr__(found, "frames", replace(frames, artefacts={**frames.artefacts, **own}))
     return found

@@ -14,7 +14,6 @@ from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.registration import moved, register
 from thermal_robot.observables.socket import Stand
 from thermal_robot.observations import Frames, observe
-from thermal_robot.simulation.brought import sockets
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +22,15 @@ def ur10():
 
 
 def offsets(robot, values):
-    effect = library()["joint_offset"]
-    return [(effect, np.asarray(values, dtype=float))]
+    return {"joint_offset": dict(zip(robot.joint_names, values, strict=True))}
+
+
+def sockets(robot, effects=None, rows=10, noise=0.0, tool=(0.0, 0.0, 0.0), seed=0):
+    """Two sockets on each of three stands, so many rows in each; it is not known where the ball sits."""
+    at = np.eye(4)
+    at[:3, 3] = tool
+    made = tr.simulate(robot, effects, rows=6 * rows, measures="socket", noise=noise, tool=at, seed=seed)
+    return replace(made, covariates={}, target=np.zeros(3))
 
 
 def test_a_sound_robot_spreads_about_no_socket(ur10):
@@ -34,7 +40,7 @@ def test_a_sound_robot_spreads_about_no_socket(ur10):
 
 @pytest.mark.parametrize("known", [False, True])
 def test_columns_are_derivatives_of_the_gap(ur10, known):
-    campaign = sockets(ur10, offsets(ur10, [0, 2e-3, -1e-3, 2e-3, 1e-3, 0]), rows=5, tool=np.array([0.0, 0.01, 0.05]))
+    campaign = sockets(ur10, offsets(ur10, [0, 2e-3, -1e-3, 2e-3, 1e-3, 0]), rows=5, tool=(0.0, 0.01, 0.05))
     if known:
         campaign = replace(campaign, facts={"socket": {"distances": (("0", "1", 0.05),)}})
     frames = register(campaign)
@@ -74,7 +80,7 @@ def test_what_moves_all_stands_is_an_alias_of_them(ur10):
 
 def test_what_was_wrong_is_found_wherever_the_stands_stand(ur10):
     true = np.array([0.0, 4e-3, -3e-3, 2e-3, 3e-3, 0.0])
-    campaign = sockets(ur10, offsets(ur10, true), rows=15, noise=5e-5, target=np.array([0.02, 0.0, 0.1]), seed=1)
+    campaign = sockets(ur10, offsets(ur10, true), rows=15, noise=5e-5, tool=(0.02, 0.0, 0.1), seed=1)
     fit = fit_named(campaign, [library()["joint_offset"]])
     ((effect, values),) = fit.effects
     seen = {p.place: v for p, v in zip(checked(effect, fit.nominal), values, strict=True)}

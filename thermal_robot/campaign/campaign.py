@@ -290,6 +290,15 @@ class Campaign:
             return tuple(np.unique(self.labels["kind"]).tolist())
         return ("position",) if self.orientation is None else ("pose",)
 
+    @cached_property
+    def numbered(self) -> Mapping[str, tuple[tuple[str, ...], NDArray[np.int64]]]:
+        """Of each label of a kind of measurement its values, sorted, and (N,) the number of that of each row."""
+        found = {}
+        for name in (name for name in names.OF_KINDS if name in self.labels):
+            values, number = np.unique(self.labels[name], return_inverse=True)
+            found[name] = tuple(values.tolist()), number.ravel()
+        return found
+
     @property
     def measured(self) -> bool:
         """Whether anything was measured: rows to predict say nothing."""

@@ -78,6 +78,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "priors": kinds.PRIORS,
     "gears": kinds.GEARS,
     "socket": {"distances": _pairs},
+    "camera": kinds.CAMERAS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect

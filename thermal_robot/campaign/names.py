@@ -16,11 +16,16 @@ KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "socket": ((), ("stand", "socket")),
     "plane": ((), ("plane",)),
     "distance": (("distance",), ("anchor",)),
+    "pixel": (("u", "v"), ("camera",)),
     "controller": ((*POSITION, *ORIENTATION), ()),
 }
 """Columns of each kind of measurement: its figures and its labels."""
 KIND = "kind"  # Column that says which kind each row is
-OPTIONAL = {"plane": ("height",)}  # Figures that rows of a kind may have, 0 where they have none
+OPTIONAL = {
+    "plane": ("height",),
+    "pixel": ("board.x", "board.y", "board.z"),
+}
+"""Figures that rows of a kind may have, 0 where they have none."""
 OF_KINDS = tuple(dict.fromkeys(label for _, labels in KINDS.values() for label in labels))
 PIXELS = ("u", "v")
 NOISE = "noise"  # Column of the instrument's one sigma of each row

@@ -49,6 +49,17 @@ SIGMA = number(
 _ABOVE = "a number above 0"
 PRIORS = mapping(number(above=0.0, expected=_ABOVE, problem="the expected size of an effect must be positive"))
 GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio must be positive"))
+_PIXELS = number(above=0.0, expected="a number of pixels above 0")
+CAMERAS = mapping(
+    record(
+        {
+            **dict.fromkeys(("fx", "fy", "cx", "cy"), _PIXELS),
+            "mount": word(("hand", "room"), WORD),
+            "refine": boolean,
+        },
+        may_lack=("refine",),
+    )
+)
 """What the values of a campaign may be, whoever states them: campaign.toml, a call, a model file."""
 
 
@@ -202,6 +213,8 @@ def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[st
     if socket := sections.get("socket"):
         pairs = ((str(one), str(other), length * scale) for one, other, length in socket.get("distances", ()))
         found["socket"] = {"distances": tuple(pairs)}
+    if camera := sections.get("camera"):
+        found["camera"] = {name: dict(own) for name, own in camera.items()}
     return found
 
 
@@ -210,6 +223,8 @@ def facts_in(facts: Mapping[str, Any], scale: float) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if socket := facts.get("socket"):
         found["socket"] = {"distances": [[one, other, length / scale] for one, other, length in socket["distances"]]}
+    if camera := facts.get("camera"):
+        found["camera"] = {name: dict(own) for name, own in camera.items()}
     return found
 
 

@@ -16,7 +16,7 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
-from thermal_robot.observables import components, of_model
+from thermal_robot.observables import components, of_model, tool_width
 from thermal_robot.observations import Observations, observe
 
 
@@ -104,7 +104,7 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     if "base" in names:
         parts.append(observations.base_sensitivity[:, :measures, :])
     if "tool" in names:
-        parts.append(observations.tool_sensitivity[:, :measures, :measures])
+        parts.append(observations.tool_sensitivity[:, :measures, : tool_width(campaign)])
     shared, artefacts = observations.sight.columns()
     if artefacts:
         parts.append(shared)
@@ -124,4 +124,4 @@ def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
 def _unknown(campaign: Campaign) -> tuple[str, ...]:
     base = 0 if campaign.base_known else 6
     fixed = campaign.tool_known or campaign.simulated_position is not None
-    return ("base",) * base + ("tool",) * (0 if fixed else components(campaign))
+    return ("base",) * base + ("tool",) * (0 if fixed else tool_width(campaign))

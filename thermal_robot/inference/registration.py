@@ -8,6 +8,7 @@ distance settles: what one start finds does not depend on the others.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations, product
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -21,9 +22,17 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
-from thermal_robot.observables import instrument_rows
+from thermal_robot.observables import instrument_rows, tool_width
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
+
+CUBE = [
+    np.asarray(turn)
+    for axes in permutations(np.eye(3))
+    for signs in product((1.0, -1.0), repeat=3)
+    if np.linalg.det(turn := np.array(axes) * np.array(signs)[:, None]) > 0.0
+]
+"""The 24 turns of a cube: no turn is farther than 63° from the next of them."""
 
 
 class Placed(NamedTuple):
@@ -190,7 +199,7 @@ def found_frames(campaign: Campaign) -> Frames:
     """Find the unknown frames to where they are nearly linear; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
     if campaign.position is None:
-        return _found_by_instrument(campaign, frames)
+        return _turned(campaign, _found_by_instrument(campaign, frames))
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     some = np.linspace(0, rows - 1, min(rows, settings.START_ROWS)).astype(np.int64)
@@ -205,6 +214,30 @@ def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
     some, places = campaign.take(rows), np.column_stack([campaign.readings[axis][rows] for axis in POSITION])
     found = found_frames(replace(some, position=places, readings={}))
     return found if not campaign.tool_known else replace(found, tool=frames.tool)
+
+
+def _turned(campaign: Campaign, frames: Frames) -> Frames:
+    """Find how the target is turned on the tool, where that matters: by the turn of a cube that leaves least."""
+    if campaign.tool_known or tool_width(campaign) == 3:
+        return frames
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
+    some, found = campaign.take(rows), list[tuple[float, Frames]]()
+    for turn in CUBE:
+        tool = frames.tool.copy()
+        tool[:3, :3] = turn
+        begun = replace(frames, tool=tool)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found.append((_away(some, begun), begun))
+    nearest = sorted(found, key=lambda one: one[0])[: settings.TURNS_TRIED]
+    tried = [refined_frames(some, begun, robust=True) for _, begun in nearest]
+    best = min(tried, key=lambda one: _away(some, one))
+    return replace(best, artefacts={})
+
+
+def _away(campaign: Campaign, frames: Frames) -> float:
+    """Return the median distance that frames leave, m; infinite where it is no number."""
+    distance = float(np.median(np.linalg.norm(observe(campaign, frames).gap, axis=1)))
+    return distance if np.isfinite(distance) else np.inf
 
 
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:

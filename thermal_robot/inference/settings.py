@@ -80,6 +80,7 @@ LARGEST_CLUSTER = 0.1
 """Of all rows: a larger cluster is a path, not a repeated pose."""
 FOLDS = 5
 """Regions of joint space that are held out in turn; of temperature, reach and joints' ranges the outermost fifth is."""
+TURNS_TRIED = 4  # turns of the target on the tool from which a fit begins: the next of a cube may be its neighbour
 FEWEST_STANDS = 3  # without one of them two are left: from fewer a fit would not be held out, but another campaign
 BLOCKS = 20
 """Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""

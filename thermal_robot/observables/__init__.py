@@ -8,6 +8,7 @@ from thermal_robot.observables.catalogue import (
     kinds_of,
     of_model,
     seen_components,
+    tool_width,
 )
 from thermal_robot.observables.observable import Artefact, Observable, Seen
 
@@ -22,4 +23,5 @@ __all__ = [
     "kinds_of",
     "of_model",
     "seen_components",
+    "tool_width",
 ]

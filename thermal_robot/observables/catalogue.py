@@ -14,13 +14,14 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observables.distance import Distance
-from thermal_robot.observables.observable import Artefact, Observable, Rows, Seen
+from thermal_robot.observables.observable import Observable, Rows, Seen
+from thermal_robot.observables.pixel import Pixel
 from thermal_robot.observables.plane import OnPlane
 from thermal_robot.observables.position import Controller, Pose, Position
 from thermal_robot.observables.socket import Socket
 
 KINDS: dict[str, Observable] = {
-    own.kind: own for own in (Position(), Pose(), Socket(), OnPlane(), Distance(), Controller())
+    own.kind: own for own in (Position(), Pose(), Socket(), OnPlane(), Distance(), Pixel(), Controller())
 }
 """Every kind of measurement by its name."""
 
@@ -36,6 +37,11 @@ def kinds_of(campaign: Campaign) -> list[tuple[Observable, Rows | None]]:
 def components(campaign: Campaign) -> int:
     """Return m, the components of a row: 3 of place, 6 where any row sees turns."""
     return 6 if any(KINDS[kind].turns for kind in campaign.kinds) else 3
+
+
+def tool_width(campaign: Campaign) -> int:
+    """Return how many components of the tool frame matter: three of its place, and its turn where rows see that."""
+    return 6 if any(KINDS[kind].turns or KINDS[kind].turned for kind in campaign.kinds) else 3
 
 
 def seen_components(campaign: Campaign) -> NDArray[np.int64] | None:
@@ -79,7 +85,8 @@ class Sight:
     artefacts: Mapping[str, Any]
     samples: int
     measures: int
-    size: Size | None = None
+    size: Size | None
+    shared: Mapping[str, tuple[str, ...]]
 
     @classmethod
     def of(
@@ -97,10 +104,16 @@ class Sight:
                 values if rows is None or values is None else values[rows] for values in (*pose, instrument)
             )
             parts.append((own, Seen(campaign, rows, np.asarray(position), np.asarray(rotation), base, added)))
-        known = {name: artefact for own, seen in parts for name, artefact in own.artefacts(seen).items()}
-        known = {name: artefacts.get(name, artefact) for name, artefact in known.items()}
+        known, shared = dict[str, Any](), dict[str, tuple[str, ...]]()
+        for own, seen in parts:
+            names = own.shares(seen)
+            given = {name: artefacts[name] for name in names if name in artefacts}
+            given = {name: each for name, each in given.items() if own.covers(seen, name, each)}
+            begun = {} if len(given) == len(names) else own.artefacts(seen)
+            known |= {name: given.get(name, begun.get(name)) for name in names}
+            shared[own.kind] = names
         size = None if any(own.has_length(seen) for own, seen in parts) else Size.of(campaign, pose[0])
-        return cls(tuple(parts), known, campaign.samples, components(campaign), size)
+        return cls(tuple(parts), known, campaign.samples, components(campaign), size, shared)
 
     @property
     def gap(self) -> Array:
@@ -142,7 +155,7 @@ class Sight:
         """(N, m, w) derivative of the gap by all that rows share, and the artefact of each column."""
         parts, names = [], []
         for own, seen in self.parts:
-            for name in own.artefacts(seen):
+            for name in self.shared[own.kind]:
                 found, rows = own.column(seen, self.artefacts, name), seen.own(np.arange(self.samples))
                 whole = np.zeros((self.samples, self.measures, found.shape[2]))
                 whole[rows, :3] = found
@@ -164,6 +177,3 @@ def instrument_rows(campaign: Campaign) -> NDArray[np.bool_]:
     for own, rows in kinds_of(campaign):
         seen[slice(None) if rows is None else rows] = own.locates
     return seen
-
-
-__all__ = ["KINDS", "Artefact", "Sight", "components", "instrument_rows", "kinds_of", "of_model", "seen_components"]

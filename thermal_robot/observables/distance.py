@@ -49,10 +49,10 @@ class Distance(Along):
 
     def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
         """(n,) how much farther the target is predicted than read, m, and (n, 3) the line to it, measurement frame."""
-        anchors = [artefacts[name] for name in self.names(seen)]
-        lines = seen.where - np.array([own.place for own in anchors])
+        names, number = seen.shared(self.label)
+        lines = seen.where - np.array([artefacts[name].place for name in names])[number]
         far = np.linalg.norm(lines, axis=1)
-        zeros = np.array([own.zero for own in anchors])
+        zeros = np.array([artefacts[name].zero for name in names])[number]
         return far + zeros - seen.readings("distance")[:, 0], lines / far[:, None]
 
     def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:

@@ -63,6 +63,13 @@ class Seen:
         """(n,) labels of a column."""
         return np.asarray(self.own(self.campaign.labels[name]))
 
+    def shared(self, label: str) -> tuple[list[str], NDArray[np.int64]]:
+        """Return what rows of a label share, by name, and (n,) the number of that of each row."""
+        values, number = self.campaign.numbered[label]
+        number = self.own(number)
+        there = np.unique(number)
+        return [f"{label} {values[k]}" for k in there], np.searchsorted(there, number)
+
     def readings(self, *names: str) -> Array:
         """(n, k) figures of columns, SI."""
         return np.column_stack([self.own(self.campaign.readings[name]) for name in names])
@@ -90,26 +97,40 @@ class Observable(ABC):
         How many components of the target's place a row sees.
     turns
         Whether it sees turns of the target beside its place.
+    turned
+        Whether the target's own turn on the tool matters to it, if but through what the target carries.
     locates
         Whether it says where the root frame is: readings are in a frame that something else than the arm defines.
     of_model
         Whether what is read is another model's word of the same joints: a difference is then the model's.
+    label
+        Column that says which rows share an artefact; empty where none do.
     """
 
     kind: ClassVar[str]
     says: ClassVar[str]
     places: ClassVar[int] = 3
     turns: ClassVar[bool] = False
+    turned: ClassVar[bool] = False
     locates: ClassVar[bool] = False
     of_model: ClassVar[bool] = False
+    label: ClassVar[str] = ""
 
     def has_length(self, seen: Seen) -> bool:
         """Whether the rows carry a length, and so tell the robot's scale."""
         return True
 
+    def shares(self, seen: Seen) -> tuple[str, ...]:
+        """Return the names of what the rows share; nothing without a ``label``."""
+        return tuple(seen.shared(self.label)[0]) if self.label else ()
+
     def artefacts(self, seen: Seen) -> dict[str, Artefact]:
         """Return by name what the rows share, where the predicted poses put it; nothing by default."""
         return {}
+
+    def covers(self, seen: Seen, name: str, artefact: Any) -> bool:
+        """Whether an artefact of this name holds all that the rows have to do with; that of fewer rows may not."""
+        return True
 
     @abstractmethod
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
@@ -127,20 +148,15 @@ class Observable(ABC):
 class Along(Observable):
     """A reading of one component, along a line that what it shares defines.
 
-    A member says by its ``label`` which rows share, where that starts, what is read, and its derivative.
+    A member says where what its rows share starts, what is read, and its derivative.
     """
 
     places: ClassVar[int] = 1
-    label: ClassVar[str]
-
-    def names(self, seen: Seen) -> list[str]:
-        """Return the artefact of each row."""
-        return [f"{self.label} {own}" for own in seen.labels(self.label)]
 
     def artefacts(self, seen: Seen) -> dict[str, Artefact]:
         """Return what the rows share, where the predicted poses put it."""
-        names = np.array(self.names(seen))
-        return {str(name): self.start(seen, names == name, name) for name in np.unique(names)}
+        names, number = seen.shared(self.label)
+        return {name: self.start(seen, number == k, name) for k, name in enumerate(names)}
 
     @abstractmethod
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
@@ -168,6 +184,7 @@ class Along(Observable):
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
         """(n, 3, w) what the parameters of one artefact do to the rows that have to do with it."""
-        here = np.array(self.names(seen)) == name
+        names, number = seen.shared(self.label)
+        here = number == names.index(name)
         along = seen.in_root(self.read(seen, artefacts)[1])
         return np.asarray(here[:, None, None] * along[:, :, None] * self.slopes(seen, artefacts, name)[:, None])

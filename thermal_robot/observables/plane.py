@@ -67,9 +67,9 @@ class OnPlane(Along):
 
     def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
         """(n,) how far the predicted target is above where it was read, m, and (n, 3) the normal, measurement frame."""
-        planes = [artefacts[name] for name in self.names(seen)]
-        normals = np.array([own.normal for own in planes])
-        offsets = np.array([own.offset for own in planes])
+        names, number = seen.shared(self.label)
+        normals = np.array([artefacts[name].normal for name in names])[number]
+        offsets = np.array([artefacts[name].offset for name in names])[number]
         return (normals * seen.where).sum(axis=1) - offsets - self._heights(seen), normals
 
     def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:

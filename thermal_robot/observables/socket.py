@@ -75,6 +75,7 @@ class Socket(Observable):
 
     kind: ClassVar[str] = "socket"
     says: ClassVar[str] = "a ball in its socket"
+    label: ClassVar[str] = "stand"
 
     def has_length(self, seen: Seen) -> bool:
         """Whether distances of sockets are known: nothing else of them is a length."""
@@ -82,23 +83,30 @@ class Socket(Observable):
 
     def artefacts(self, seen: Seen) -> dict[str, Artefact]:
         """Return the stands, their sockets in the middle of where the target is predicted."""
-        stands, sockets, where = seen.labels("stand"), seen.labels("socket"), seen.where
+        (stands, number), sockets, where = seen.shared("stand"), seen.labels("socket"), seen.where
         found: dict[str, Artefact] = {}
-        for stand in np.unique(stands):
-            own = tuple(np.unique(sockets[stands == stand]).tolist())
-            points = [np.median(where[(stands == stand) & (sockets == socket)], axis=0) for socket in own]
+        for k, stand in enumerate(stands):
+            own = tuple(np.unique(sockets[number == k]).tolist())
+            points = [np.median(where[(number == k) & (sockets == socket)], axis=0) for socket in own]
             known = seen.campaign.facts.get("socket", {}).get("distances", ())
             lengths = ((a, b, float(length)) for a, b, length in known if a in own and b in own)
             pairs = tuple((own.index(a), own.index(b), length) for a, b, length in lengths)
-            found[f"stand {stand}"] = Stand(own, np.array(points), pairs).held()
+            found[stand] = Stand(own, np.array(points), pairs).held()
         return found
+
+    def covers(self, seen: Seen, name: str, artefact: Stand) -> bool:
+        """Whether the stand has all sockets of these rows."""
+        (names, number), sockets = seen.shared(self.label), seen.labels("socket")
+        return {*np.unique(sockets[number == names.index(name)]).tolist()} <= {*artefact.sockets}
 
     def _points(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
         """(n, 3) the socket of each row, measurement frame, m."""
         points = np.empty_like(seen.position)
-        for row, (stand, socket) in enumerate(zip(seen.labels("stand"), seen.labels("socket"), strict=True)):
-            own = artefacts[f"stand {stand}"]
-            points[row] = own.points[own.sockets.index(socket)]
+        (names, number), sockets = seen.shared("stand"), seen.labels("socket")
+        for k, name in enumerate(names):
+            own = artefacts[name]
+            for socket, point in zip(own.sockets, own.points, strict=True):
+                points[(number == k) & (sockets == socket)] = point
         return points
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
@@ -114,7 +122,8 @@ class Socket(Observable):
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
         """(n, 3, w) what the stand's free directions do to predicted − socket."""
         own: Stand = artefacts[name]
-        here = np.char.add("stand ", seen.labels("stand")) == name
+        names, number = seen.shared("stand")
+        here = number == names.index(name)
         columns = np.zeros((len(here), 3, own.width))
         directions = own.basis.reshape(len(own.sockets), 3, -1)
         for number, socket in enumerate(own.sockets):

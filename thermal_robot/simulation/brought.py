@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +14,16 @@ from thermal_robot.campaign.names import KIND
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.exact import corrected_observations
+from thermal_robot.observables.plane import Plane
 from thermal_robot.observables.socket import Stand
 from thermal_robot.observations import Frames, observe
-from thermal_robot.robot import Robot
 
 ROUNDS, CLOSED = 40, 1e-11
 """Newton steps at most, and the distance in m at which a loop is closed: rounding of a metre is a thousandth of it."""
 LEAST = 1e-3  # share of a Jacobian's largest singular value below which a joint is no way to close a loop
-SWAY, BETWEEN = 1.0, 0.05
-"""By how much, rad or m, postures at one socket differ at most; m from one socket of a stand to the next."""
+SWAY, BETWEEN, LED = 1.0, 0.05, 2.0
+"""By how much, rad or m, postures at one socket differ at most; m from one socket of a stand to the next;
+rad at most to which a joint is led."""
 
 
 def brought(
@@ -57,43 +59,70 @@ def brought(
     raise CampaignError(plan.name, "the robot does not reach what it is to touch", expected="another place or seed")
 
 
-def sockets(
-    robot: Robot,
-    effects: Sequence[tuple[Effect, Array]] = (),
-    *,
-    stands: int = 3,
-    each: int = 2,
-    rows: int = 20,
-    noise: float = 0.0,
-    target: Array | None = None,
-    tool: Array | None = None,
-    seed: int = 0,
-) -> Campaign:
-    """Simulate a campaign of sockets: so many stands with so many sockets each, so many postures at every one.
+TOUCHED = ("socket", "plane")
+"""Kinds of which the robot is led to what a row says."""
+STANDS, SOCKETS, PLANES, ANCHORS = 3, 2, 3, 4
+"""Of a campaign that is simulated: the fewest of which one can be held out; as printed; a corner; the fewest that see
+every direction twice."""
+ABOUT = 1.2  # of the extent of the places: how far from their middle a draw wire stands
 
-    ``noise`` is one sigma per axis of the play, m; ``target`` (3,) is where the ball truly sits on the tool,
-    m, ``tool`` what is declared of it.
+
+def touched(
+    kind: str,
+    plan: Campaign,
+    frames: Frames,
+    effects: Sequence[tuple[Effect, Array]],
+    noise: float,
+    rng: np.random.Generator,
+) -> Campaign:
+    """Return the campaign of a robot that is led into sockets, or onto planes, from the postures of a plan.
+
+    ``noise`` is one sigma per axis of the play, m.
     """
-    rng = np.random.default_rng(seed)
-    low, high = np.maximum(robot.lower, -2.0), np.minimum(robot.upper, 2.0)
-    middles = rng.uniform(low + 0.25 * (high - low), high - 0.25 * (high - low), (stands, robot.n))
-    q = np.repeat(middles, each * rows, axis=0)
-    q = np.clip(q + rng.uniform(-SWAY, SWAY, q.shape), low, high)
-    labels = {
-        KIND: np.full(len(q), "socket"),
-        "stand": np.repeat([f"place {k}" for k in range(stands)], each * rows),
-        "socket": np.tile(np.repeat([str(k) for k in range(each)], rows), stands),
-    }
-    true, told = (np.zeros(3) if own is None else np.asarray(own, dtype=float) for own in (target, tool))
-    plan = Campaign("sockets", robot, q, labels=labels, target=told, base_known=True, moves="unknown")
-    sits = np.eye(4)
-    sits[:3, 3] = true
-    held = Campaign("middles", robot, middles, target=true, base_known=True)
-    places = observe(held).position
-    apart = BETWEEN * np.arange(each)[:, None] * np.array([0.0, 1.0, 0.0])
-    artefacts = {
-        f"stand place {k}": Stand(tuple(map(str, range(each))), place + apart) for k, place in enumerate(places)
-    }
-    away = noise * rng.normal(size=(len(q), 3))
-    found = brought(plan, Frames(np.eye(4), sits, artefacts), effects, away)
-    return replace(found, noise_position=noise or None)
+    labels, artefacts, q = _stands(plan, rng) if kind == "socket" else _planes(plan, frames)
+    labels = {**plan.labels, KIND: np.full(plan.samples, kind), **labels}
+    rows = replace(plan, q=q, labels=labels, base_known=True, moves="unknown", orientation=None)
+    away = noise * rng.normal(size=(plan.samples, 3))
+    if kind == "plane":  # play across a plane shows nothing
+        normals = np.array([artefacts[f"plane {own}"].normal for own in labels["plane"]])
+        away = normals * (away * normals).sum(axis=1, keepdims=True)
+    true = Frames(np.eye(4), frames.tool, artefacts)
+    return replace(brought(rows, true, effects, away), noise_position=noise or None)
+
+
+def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any], Array]:
+    """Return the labels of sockets, the stands, and postures near them."""
+    robot, each = plan.robot, -(-plan.samples // (STANDS * SOCKETS))
+    low, high = np.maximum(robot.lower, -LED), np.minimum(robot.upper, LED)
+    middles = rng.uniform(low + 0.25 * (high - low), high - 0.25 * (high - low), (STANDS, robot.n))
+    stand = (np.arange(plan.samples) // (SOCKETS * each)).clip(max=STANDS - 1)
+    socket = np.arange(plan.samples) // each % SOCKETS
+    q = np.clip(middles[stand] + rng.uniform(-SWAY, SWAY, plan.q.shape), low, high)
+    places = observe(Campaign("middles", robot, middles, target=plan.target, base_known=True)).position
+    apart = BETWEEN * np.arange(SOCKETS)[:, None] * np.array([0.0, 1.0, 0.0])
+    sockets = tuple(str(k) for k in range(SOCKETS))
+    artefacts = {f"stand place {k}": Stand(sockets, place + apart) for k, place in enumerate(places)}
+    return {"stand": np.char.add("place ", stand.astype(str)), "socket": socket.astype(str)}, artefacts, q
+
+
+def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, Any], Array]:
+    """Return the labels of planes, the planes through the middle of all places, and the plan's postures."""
+    middle = np.median(observe(plan, frames).position, axis=0)
+    number = np.arange(plan.samples) % PLANES
+    planes = {f"plane {k}": Plane(normal, float(normal @ middle)) for k, normal in enumerate(np.eye(PLANES))}
+    return {"plane": number.astype(str)}, planes, plan.q
+
+
+def as_kind(kind: str, campaign: Campaign) -> Campaign:
+    """Return the rows that an instrument measured as those of another kind."""
+    if kind == "controller":
+        labels = {**campaign.labels, KIND: np.full(campaign.samples, kind)}
+        return replace(campaign, labels=labels, base_known=True, tool_known=True)
+    if kind != "distance":
+        return campaign
+    points, number = np.asarray(campaign.position), np.arange(campaign.samples) % ANCHORS
+    corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+    anchors = points.mean(axis=0) + ABOUT * np.ptp(points, axis=0).max() * corners / np.sqrt(3.0)
+    read = {"distance": np.linalg.norm(points - anchors[number], axis=1)}
+    labels = {**campaign.labels, KIND: np.full(campaign.samples, kind), "anchor": number.astype(str)}
+    return replace(campaign, position=None, readings=read, labels=labels, base_known=True)
