@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
+from thermal_robot.campaign.importers.hand_eye import CORNERS, MOVEIT
 from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of
 from thermal_robot.campaign.importers.programs import KUKA, RAPID
 from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
@@ -28,6 +29,8 @@ FORMATS: dict[str, Format] = {
     "jacobi": JACOBI,
     "ipa_ur10": IPA_UR10,
     "mukca": MUKCA,
+    "moveit": MOVEIT,
+    "corners": CORNERS,
 }
 """Formats by name, in the order of the help."""
 IMPORTED = "Imported by `thermal-robot import"  # What the first line of a campaign.toml says that was imported
