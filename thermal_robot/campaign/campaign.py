@@ -156,6 +156,8 @@ class Campaign:
     >>> campaign = tr.demo_campaign()
     >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels, campaign.relative_noise
     (120, 'position', 'tool0', None, None)
+    >>> campaign.kinds, campaign.measured, campaign.numbered
+    (('position',), True, {})
     >>> campaign.clock.shape, campaign.since_turn["joint_2"].shape, campaign.reach > 1.0
     ((120,), (120,), True)
     """

@@ -63,8 +63,8 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     plain = measured and not told and columns.kinds in ((), ("controller",))
     poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
     poses["readings"], labels = readings(table, columns, settings)
-    for key, group in (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION)):
-        poses[key] = _quaternions(table, group) if group in columns.groups else None
+    turns = (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION))
+    poses |= {key: _quaternions(table, group) if group in columns.groups else None for key, group in turns}
     simulated = names.SIMULATED_POSITION in columns.groups
     poses["simulated_position"] = _vectors(table, names.SIMULATED_POSITION, units) if simulated else None
     poses |= {"position": told.position, "orientation": told.orientation} if told else {}

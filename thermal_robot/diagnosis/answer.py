@@ -143,8 +143,8 @@ def answer(
     held = [effect.name for effect, _ in fit.effects]
     systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in laws}, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    told = titled((*systematic, *chance), (*candidates, *random_effects()), of_model(campaign))
-    found, harms = _no_surer(by_share(told), gap)
+    every = titled((*systematic, *chance), (*candidates, *random_effects()), of_model(campaign))
+    found, harms = _no_surer(by_share(every), gap)
     groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,
@@ -163,14 +163,7 @@ def answer(
         separates=groups,
         model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
-        warnings=(
-            *campaign.warnings,
-            *unseen(fit),
-            *notes,
-            *harms,
-            *last.notes,
-            *cautions(fit, last.refused, sensitivity),
-        ),
+        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *_last_words(fit, last, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
@@ -181,6 +174,11 @@ def answer(
         performance=None if last.misfit else criteria(fit, shrinkage),
         says=", ".join(kind.says for kind, _ in kinds_of(campaign)),
     )
+
+
+def _last_words(fit: Fit, last: Conclusion, sensitivity: Sensitivity) -> tuple[str, ...]:
+    """Return what the readings cannot see, and the cautions of the final fit."""
+    return (*unseen(fit), *cautions(fit, last.refused, sensitivity))
 
 
 def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:

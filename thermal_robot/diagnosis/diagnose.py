@@ -84,9 +84,7 @@ def diagnose(
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    candidates = choose(only, without, effects)
-    if campaign.measured and of_model(campaign):
-        candidates = tuple(effect for effect in candidates if effect.in_model)
+    candidates = _asked_of(campaign, choose(only, without, effects))
     # where nothing was left out the candidates are all; installed packages are looked up once
     everything = {effect.name for effect in (*effects, *candidates)}
     if only or without:
@@ -116,6 +114,11 @@ def diagnose(
         )
         prepare(diagnosis := told(found))
         return diagnosis
+
+
+def _asked_of(campaign: Campaign, effects: Sequence[Effect]) -> Sequence[Effect]:
+    """Return the effects that may be at work: where the rows are a model's word, those that a model holds."""
+    return [effect for effect in effects if effect.in_model] if of_model(campaign) else effects
 
 
 @contextmanager
