@@ -13,7 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference import settings
 from thermal_robot.inference.problem import Linear, Whitening
-from thermal_robot.observables import seen_components
+from thermal_robot.observables import of_model, seen_components
 
 Figures = int | NDArray[np.int64]
 """How many figures a row has, or (N,) each row."""
@@ -35,8 +35,10 @@ class Noise:
     @classmethod
     def of(cls, campaign: Campaign) -> Noise:
         """Return what a campaign states."""
-        seen = seen_components(campaign)
-        return cls(campaign.noise_position, campaign.noise_orientation, campaign.relative_noise, seen)
+        seen, place, turn = seen_components(campaign), campaign.noise_position, campaign.noise_orientation
+        if of_model(campaign):  # what is computed has no noise: it is written to some digits
+            place, turn = place or settings.WRITTEN_TO, turn or settings.WRITTEN_TO
+        return cls(place, turn, campaign.relative_noise, seen)
 
     def figures(self, measures: int) -> NDArray[np.int64] | int:
         """Return how many figures a row has: (N,) where rows differ."""

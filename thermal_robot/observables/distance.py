@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.observables.observable import Along, Artefact, Seen
@@ -37,7 +38,7 @@ class Distance(Along):
     says: ClassVar[str] = "distance to a point"
     label: ClassVar[str] = "anchor"
 
-    def start(self, seen: Seen, here: Array, name: str) -> Artefact:
+    def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
         """Return the anchor by trilateration: |p|² − L² = 2 p·a − 2 z L − (|a|² − z²), linear but for the last term."""
         places, lengths = seen.where[here], seen.readings("distance")[here, 0]
         middle = places.mean(axis=0)

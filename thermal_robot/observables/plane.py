@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.observables.observable import Along, Artefact, Seen
@@ -55,7 +56,7 @@ class OnPlane(Along):
         own = seen.campaign.readings.get("height")
         return np.zeros(len(seen.position)) if own is None else np.asarray(seen.own(own))
 
-    def start(self, seen: Seen, here: Array, name: str) -> Artefact:
+    def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
         """Return the plane nearest to where the target is predicted, heights allowed for."""
         places, heights = seen.where[here], self._heights(seen)[here]
         middle, above = places.mean(axis=0), heights - heights.mean()

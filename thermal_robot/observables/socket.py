@@ -126,6 +126,6 @@ class Socket(Observable):
         here = number == names.index(name)
         columns = np.zeros((len(here), 3, own.width))
         directions = own.basis.reshape(len(own.sockets), 3, -1)
-        for number, socket in enumerate(own.sockets):
-            columns[here & (seen.labels("socket") == socket)] = -seen.base[:3, :3].T @ directions[number]
+        for socket, direction in zip(own.sockets, directions, strict=True):
+            columns[here & (seen.labels("socket") == socket)] = -seen.base[:3, :3].T @ direction
         return columns

@@ -47,8 +47,8 @@ def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
 def _apart(one: Array, other: Array) -> float:
     """Return how far the axes of turns are from one common rotation of the others: rms over their size."""
     origin = np.zeros((1, 3))
-    both = [np.concatenate([own, -own, origin]) for own in (one, other)]
-    turn = align(*both, np.ones(len(both[0])))[:3, :3]
+    first, second = (np.concatenate([own, -own, origin]) for own in (one, other))
+    turn = align(first, second, np.ones(len(first)))[:3, :3]
     return float(np.linalg.norm(one @ turn.T - other) / np.linalg.norm(other))
 
 
