@@ -83,8 +83,10 @@ FOLDS = 5
 WRITTEN_TO = 1e-5
 """m and rad to which poses of a controller are compared where no noise is stated: screens show a tenth of a millimetre,
 topics all digits, and no difference of a model that matters is smaller."""
-TURNS_TRIED = 4  # turns of the target on the tool from which a fit begins: the next of a cube may be its neighbour
-FEWEST_STANDS = 3  # without one of them two are left: from fewer a fit would not be held out, but another campaign
+TURNS_TRIED = 4
+"""Turns of the target on the tool from which a fit begins: the next of a cube may be the neighbour of the best."""
+FEWEST_STANDS = 3
+"""Stands from which on one at a time is held out: of fewer, what is left is another campaign."""
 BLOCKS = 20
 """Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""
 GROSS_LEVEL = 0.01

@@ -19,6 +19,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.kinematics import exp6
+from thermal_robot.observables import settings
 from thermal_robot.observables.observable import Artefact, Observable, Seen
 
 BOARD = ("board.x", "board.y", "board.z")
@@ -175,7 +176,7 @@ def _board(origins: Array, rays: Array, points: Array) -> Array:
     told = np.einsum("nij,nj->ni", across, origins)
     found = np.linalg.lstsq(design.reshape(-1, 12), told.ravel(), rcond=None)[0]
     linear = found[:9].reshape(3, 3)
-    if np.ptp(points[:, 2]) < 1e-9:  # a flat board tells two of its axes
+    if np.ptp(points[:, 2]) < settings.FLAT:  # a flat board tells two of its axes
         linear[:, 2] = np.cross(linear[:, 0], linear[:, 1])
     pose = _rigid(linear, found[9:])
     rest = told - np.einsum("nij,nj->ni", across, points @ pose[:3, :3].T)
@@ -191,7 +192,9 @@ def _camera(points: Array, rays: Array) -> Array:
     skew = np.cross(np.eye(3)[None], rays[:, None, :]).transpose(0, 2, 1)  # e_k × ray, column k
     design = np.einsum("nij,nk->nijk", skew, homogeneous).reshape(-1, 12)
     found = np.linalg.svd(design)[2][-1].reshape(3, 4)
-    found *= np.sign(np.linalg.det(found[:, :3])) * np.cbrt(1.0 / max(abs(np.linalg.det(found[:, :3])), 1e-12))
+    found *= np.sign(np.linalg.det(found[:, :3])) * np.cbrt(
+        1.0 / max(abs(np.linalg.det(found[:, :3])), settings.LEAST_VOLUME)
+    )
     inverse = _rigid(found[:, :3], found[:, 3] * size)
     pose = np.eye(4)
     pose[:3, :3] = inverse[:3, :3].T

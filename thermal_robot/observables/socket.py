@@ -18,9 +18,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.observables import settings
 from thermal_robot.observables.observable import Artefact, Observable, Seen
-
-ROUNDS = 8  # Newton steps that bring distances back to what is known: each squares a share of 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ class Stand:
     def held(self) -> Stand:
         """Return the stand with its known distances, by least movement of its points."""
         stand = self
-        for _ in range(ROUNDS if self.lengths else 0):
+        for _ in range(settings.HELD_ROUNDS if self.lengths else 0):
             far = [np.linalg.norm(stand.points[a] - stand.points[b]) - length for a, b, length in self.lengths]
             back = np.linalg.lstsq(stand._slopes, np.array(far), rcond=None)[0]
             stand = replace(stand, points=stand.points - back.reshape(-1, 3))
