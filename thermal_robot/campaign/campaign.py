@@ -352,7 +352,7 @@ class Campaign:
         own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
-        return Settings(**{**own, "gravity": as_vector(self.robot.gravity)})
+        return Settings(**{**own, "kind": "", "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
         """Return the campaign of some of the rows, without validating again.
