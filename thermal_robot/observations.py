@@ -7,7 +7,7 @@ displacements that are known so far, and the gap is there. Gauss-Newton re-obser
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 from weakref import ref
@@ -23,11 +23,11 @@ from thermal_robot.kinematics import (
     chain_frames,
     frame_jacobians,
     gravity_torques,
-    log3,
     placement_sensitivities,
     quaternion_to_rotation,
     segment_loads,
 )
+from thermal_robot.observables import Sight
 from thermal_robot.robot import Robot
 
 HELD_ROWS = 60_000
@@ -45,10 +45,13 @@ class Frames:
         (4, 4) pose of the root frame in the measurement frame.
     tool
         (4, 4) pose of the target in the tool frame.
+    artefacts
+        What rows share beside the robot, by name, such as where a stand has its sockets.
     """
 
     base: Array
     tool: Array
+    artefacts: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("base", "tool"):
@@ -180,29 +183,16 @@ class Observations:
 
     @cached_property
     def gap(self) -> Array:
-        """Gap (N, m), measured − predicted: displacement (m) and rotation vector (rad), in root frame axes."""
-        campaign, base = self.campaign, self.frames.base
-        if campaign.position is None:
+        """(N, m) measured − predicted: displacement (m) and rotation vector (rad), in the root frame's axes."""
+        if not self.campaign.measured:
             raise ValueError("these observations hold no measurements")
-        shift = campaign.position - self.predicted_position
-        if self.instrument is not None:
-            shift = shift - self.instrument
-        linear = shift @ base[:3, :3]
-        if campaign.orientation is None:
-            return linear
-        measured = base[:3, :3].T @ quaternion_to_rotation(campaign.orientation)
-        turn = log3(measured @ self.rotation.transpose(0, 2, 1))
-        return self._own_axes(np.hstack([linear, turn])[:, :, None])[:, :, 0]
+        return self.sight.gap
 
-    def _own_axes(self, twists: Array) -> Array:
-        """Twists (N, 6, K) with rotations about the target's own axes where several targets give its pose.
-
-        There the noise of the turn differs by these axes; else they stay about those of the root frame.
-        """
-        if self.campaign.targets is None:
-            return twists
-        turned = self.rotation.transpose(0, 2, 1) @ twists[:, 3:]
-        return np.concatenate([twists[:, :3], turned], axis=1)
+    @cached_property
+    def sight(self) -> Sight:
+        """What the rows say, each by its kind of measurement."""
+        pose, artefacts = (self.position, self.rotation), self.frames.artefacts
+        return Sight.of(self.campaign, pose, self.frames.base, self.instrument, artefacts)
 
     def in_root_axes(self, turns: Array) -> Array:
         """Rotation vectors (N, 3) of the gap, rad, in root frame axes."""
@@ -217,24 +207,24 @@ class Observations:
     def joint_sensitivity(self) -> Array:
         """Geometric Jacobian (N, 6, n) at the target, LOCAL_WORLD_ALIGNED."""
         found = frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
-        return self._own_axes(found)
+        return self.sight.sees(found)
 
     @cached_property
     def segment_sensitivity(self) -> Array:
         """Kinematic regressor (N, 6, S, 6): twist of the target per unit twist of each segment's placement."""
         found = placement_sensitivities(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
-        return self._own_axes(found.reshape(len(found), 6, -1)).reshape(found.shape)
+        return self.sight.sees(found.reshape(len(found), 6, -1)).reshape(found.shape)
 
     @cached_property
     def base_sensitivity(self) -> Array:
         """Twist (N, 6, 6) of the target per unit twist of the base, root frame."""
         point = self.chain.tool_position + self.lever
-        return self._own_axes(_twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point))
+        return self.sight.sees(_twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point))
 
     @cached_property
     def tool_sensitivity(self) -> Array:
-        """Twist (N, 6, 6) of the target per unit twist of the tool, tool frame."""
-        return self._own_axes(_twist_map(self.chain.tool_rotation, self.lever))
+        """(N, 6, 6) twist of the target a unit twist of the tool, tool frame."""
+        return self.sight.sees(_twist_map(self.chain.tool_rotation, self.lever))
 
 
 _HOLDING: list[ref[Observations]] = []
@@ -314,4 +304,7 @@ def observe(
     found = Observations(campaign, frames, position, rotation, instrument, displacement)
     _hold(found)
     vars(found)["chain"] = chain  # as the property would find it
+    own = found.sight.artefacts
+    if any(frames.artefacts.get(name) is not artefact for name, artefact in own.items()):
+        object.__setattr__(found, "frames", replace(frames, artefacts={**frames.artefacts, **own}))
     return found

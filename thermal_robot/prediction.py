@@ -174,8 +174,9 @@ def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
 
 
 def moves(names: Sequence[str]) -> NDArray[np.bool_]:
-    """Mask (f,) of the columns of the unknown frames that move the target: not its rotation on the tool."""
-    return np.array([name != "tool" or k < names.index("tool") + 3 for k, name in enumerate(names)], dtype=bool)
+    """(f,) which columns of the unknown frames move the target, by name: no turn on the tool, no artefact."""
+    place = [name == "base" or (name == "tool" and k < names.index("tool") + 3) for k, name in enumerate(names)]
+    return np.array(place, dtype=bool)
 
 
 def by_parameters(moved: Array, covariance: Array) -> Array:

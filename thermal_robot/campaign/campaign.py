@@ -26,6 +26,7 @@ from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_al
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
+from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
 
@@ -71,6 +72,7 @@ _WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simu
 """Figures in a row of each (N, k) array; of the commands as many as the chain has joints."""
 _PER_SAMPLE = (*_WIDE, "noise_of_rows", "rows")
 _BY_NAME = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_, "travelled": np.float64}
+_BY_NAME |= {"readings": np.float64}
 """Arrays (N,) by name, and their types."""
 
 
@@ -136,7 +138,12 @@ class Campaign:
     urdf
         The robot's reference as written in the campaign file.
     travelled
-        Internal: :attr:`since_turn` of rows taken from a larger campaign.
+        Of rows taken from a larger campaign: what :attr:`since_turn` was there. Leave it out.
+    readings
+        (N,) per column of measurements of other kinds, where :attr:`kinds` are not position or pose alone, SI; 0 in
+        rows of another kind. Their labels stand in ``labels``, the kind of each row in ``labels["kind"]``.
+    facts
+        What is known of the things that such rows share, by kind, SI.
 
     Raises
     ------
@@ -149,6 +156,8 @@ class Campaign:
     >>> campaign = tr.demo_campaign()
     >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels, campaign.relative_noise
     (120, 'position', 'tool0', None, None)
+    >>> campaign.kinds, campaign.measured, campaign.numbered
+    (('position',), True, {})
     >>> campaign.clock.shape, campaign.since_turn["joint_2"].shape, campaign.reach > 1.0
     ((120,), (120,), True)
     """
@@ -183,6 +192,8 @@ class Campaign:
     urdf: str = ""
     travelled: Mapping[str, Array] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
+    readings: Mapping[str, Array] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         file = f"<{self.name}>"
@@ -232,7 +243,7 @@ class Campaign:
 
     def __repr__(self) -> str:
         """One line; the arrays stay out of a notebook."""
-        what = "to predict" if self.position is None else f"of {self.measures}"
+        what = f"of {self.measures}" if self.measured else "to predict"
         return (
             f"<Campaign {self.name!r}: {self.samples} samples {what}, {self.robot.n} joints, "
             f"{len(self.covariates)} covariate{'' if len(self.covariates) == 1 else 's'}>"
@@ -271,18 +282,41 @@ class Campaign:
 
     @property
     def measures(self) -> str:
-        """Kind of measurement: ``"pose"`` with orientations, otherwise ``"position"``."""
-        return "position" if self.orientation is None else "pose"
+        """What the rows say: one of :attr:`kinds`, ``"position"`` and ``"pose"`` among them, or ``"mixed"``."""
+        return self.kinds[0] if len(self.kinds) == 1 else "mixed"
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of measurement of the rows, sorted; see :mod:`thermal_robot.observables`."""
+        if "kind" in self.labels:
+            return tuple(np.unique(self.labels["kind"]).tolist())
+        return ("position",) if self.orientation is None else ("pose",)
+
+    @cached_property
+    def numbered(self) -> Mapping[str, tuple[tuple[str, ...], NDArray[np.int64]]]:
+        """Of each label of a kind of measurement its values, sorted, and (N,) the number of that of each row."""
+        found = {}
+        for name in (name for name in names.OF_KINDS if name in self.labels):
+            values, number = np.unique(self.labels[name], return_inverse=True)
+            found[name] = tuple(values.tolist()), number.ravel()
+        return found
 
     @property
+    def measured(self) -> bool:
+        """Whether anything was measured: rows to predict say nothing."""
+        return self.position is not None or "kind" in self.labels
+
+    @cached_property
     def reach(self) -> float:
-        """Diagonal of the measured volume, m."""
-        return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
+        """Diagonal of the volume that was measured, or through which the tool was led, m."""
+        led = self.position if self.position is not None else tool_poses(self.robot, self.q)[:, :3, 3]
+        return float(np.linalg.norm(np.ptp(led, axis=0)))
 
     @cached_property
     def relative_noise(self) -> Array | None:
-        """Relative noise (N, m) of each component to that of all rows; see ``campaign.targets.relative_sigmas``."""
-        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
+        """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
+        turned = "pose" in self.kinds or "controller" in self.kinds
+        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, turned)
 
     @property
     def clock(self) -> Array | None:
@@ -318,7 +352,7 @@ class Campaign:
         own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
-        return Settings(**{**own, "gravity": as_vector(self.robot.gravity)})
+        return Settings(**{**own, "kind": "", "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
         """Subset of the rows, without a new validation.
@@ -401,6 +435,7 @@ def table_columns(campaign: Campaign) -> dict[str, Array]:
     ):
         if values is not None:
             columns |= dict(zip(group, values.T / scale, strict=True))
+    columns |= {name: v / names.reading_scale(name, units.length_scale) for name, v in campaign.readings.items()}
     if campaign.noise_of_rows is not None:
         columns[names.NOISE] = campaign.noise_of_rows / units.length_scale
     return columns | {name: v / covariate_scale(name, robot, units) for name, v in campaign.covariates.items()}
@@ -511,7 +546,7 @@ def appended(campaigns: Sequence[Campaign]) -> Campaign:
             changes[key] = np.concatenate(values)
     if any(one.targets is not None for one in campaigns):
         raise CampaignError(first.name, "has several targets of each pose: rows of another file cannot be put to them")
-    for key in ("covariates", "labels", "since_turn"):
+    for key in ("covariates", "labels", "readings", "since_turn"):
         by_name = [getattr(one, key) for one in campaigns]
         common = [name for name in by_name[0] if all(name in other for other in by_name)]
         changes[key] = {name: np.concatenate([own[name] for own in by_name]) for name in common}

@@ -11,6 +11,7 @@ from typing import Any
 
 from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import SMALLEST
+from thermal_robot.campaign.names import KINDS as NAMED_KINDS
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
@@ -44,6 +45,17 @@ def _vector(value: Any, path: str) -> Any:
         raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
 
 
+def _pairs(value: Any, path: str) -> Any:
+    """Take pairs of sockets with their distance."""
+    expected = 'pairs of sockets with their distance, as [["0", "1", 50.0]]'
+    if not isinstance(value, list) or not all(isinstance(own, list) and len(own) == 3 for own in value):
+        raise MisfitError(path, value, expected)
+    for one, other, length in value:
+        if str(one) == str(other) or not isinstance(length, (int, float)) or not length > 0.0:
+            raise MisfitError(path, [one, other, length], expected)
+    return value
+
+
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "robot": {
         "urdf": _named("the path of the robot's URDF file"),
@@ -58,12 +70,15 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "file": _named("the path of the table"),
         "angle_unit": kinds.ANGLE_UNIT,
         "length_unit": kinds.LENGTH_UNIT,
+        "kind": word(tuple(NAMED_KINDS), kinds.WORD),
     },
     "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
     "noise": {"position": _sigma, "orientation": _sigma},
     "payload": {"com": _vector},
     "priors": kinds.PRIORS,
     "gears": kinds.GEARS,
+    "socket": {"distances": _pairs},
+    "camera": kinds.CAMERAS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect

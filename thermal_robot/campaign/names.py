@@ -10,6 +10,24 @@ ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose", "path")
+KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "position": (POSITION, ()),
+    "pose": ((*POSITION, *ORIENTATION), ()),
+    "socket": ((), ("stand", "socket")),
+    "plane": ((), ("plane",)),
+    "distance": (("distance",), ("anchor",)),
+    "pixel": (("u", "v"), ("camera",)),
+    "controller": ((*POSITION, *ORIENTATION), ()),
+}
+"""Columns of each kind of measurement: its figures and its labels."""
+KIND = "kind"  # Column that says which kind each row is
+OPTIONAL = {
+    "plane": ("height",),
+    "pixel": ("board.x", "board.y", "board.z"),
+}
+"""Figures that rows of a kind may have, 0 where they have none."""
+OF_KINDS = tuple(dict.fromkeys(label for _, labels in KINDS.values() for label in labels))
+PIXELS = ("u", "v")
 NOISE = "noise"  # Column of the instrument's one sigma of each row
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
@@ -77,6 +95,17 @@ def target_of(column: str) -> tuple[str, int] | None:
 def axes_of(target: int) -> tuple[str, str, str]:
     """Position columns of one of several targets."""
     return f"x.{target}", f"y.{target}", f"z.{target}"
+
+
+def of_kinds() -> set[str]:
+    """Return the columns of all kinds of measurement."""
+    optional = {column for columns in OPTIONAL.values() for column in columns}
+    return optional | {column for groups in KINDS.values() for group in groups for column in group}
+
+
+def reading_scale(column: str, length: float) -> float:
+    """Return the SI size of one unit of a measured figure, lengths in a unit of ``length`` m."""
+    return 1.0 if column in (*ORIENTATION, *PIXELS) else length
 
 
 def split_name(column: str) -> tuple[str, str]:

@@ -141,6 +141,7 @@ def _originals(campaign: Campaign) -> NDArray[np.int64]:
     recorded = [values[:, None] for name, values in campaign.covariates.items() if name not in campaign.derived]
     labels = [np.unique(label, return_inverse=True)[1][:, None] for label in campaign.labels.values()]
     measured = [part for part in (campaign.position, campaign.orientation) if part is not None]
+    measured += [values[:, None] for values in campaign.readings.values()]
     table = np.hstack([campaign.q, *measured, *recorded, *labels])
     _, first, same = np.unique(table, axis=0, return_index=True, return_inverse=True)
     timed = any(name in campaign.covariates for name in CLOCK)

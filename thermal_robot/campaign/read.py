@@ -51,7 +51,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     """
     units = settings.units
     table = named(table, robot, units)
-    columns = recognise(table, robot, measured=measured)
+    columns = recognise(table, robot, measured=measured, kind=settings.kind)
     told: Posed | None = None
     left_out: list[str] = []
     if columns.targets:
@@ -59,9 +59,12 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         settings = replace(settings, tool_known=False)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
     q = _commands(table, robot, units)
-    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if measured and not told else None}
-    for key, group in (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION)):
-        poses[key] = _quaternions(table, group) if group in columns.groups else None
+    settings, columns = framed(settings, columns)
+    plain = measured and not told and columns.kinds in ((), ("controller",))
+    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
+    poses["readings"], labels = readings(table, columns, settings)
+    turns = (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION))
+    poses |= {key: _quaternions(table, group) if group in columns.groups else None for key, group in turns}
     simulated = names.SIMULATED_POSITION in columns.groups
     poses["simulated_position"] = _vectors(table, names.SIMULATED_POSITION, units) if simulated else None
     poses |= {"position": told.position, "orientation": told.orientation} if told else {}
@@ -72,7 +75,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         **poses,
         covariates=covariates,
         extra=columns.extra,
-        labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
+        labels=labels,
         **settings.of_rows(),
         priors=settings.priors,
         urdf=settings.urdf,
@@ -93,6 +96,48 @@ def arrived(campaign: Campaign) -> Campaign:
     joints, sessions = campaign.robot.joint_names, campaign.labels.get("session")
     found = arrivals(campaign.q, joints, campaign.covariates, sessions)
     return replace(campaign, covariates={**campaign.covariates, **found}, derived=tuple(found))
+
+
+def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
+    """Return what is declared of the frames where it follows from what was measured, and the columns that are read."""
+    if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
+        groups = (*columns.groups, names.ORIENTATION)
+        return replace(settings, base_known=True, tool_known=True), replace(columns, groups=groups)
+    # nothing but an instrument says where the base stands: without one it stands where the URDF has it
+    alone = bool(columns.kinds) and not {"position", "pose"} & {*columns.kinds}
+    return replace(settings, base_known=settings.base_known or alone), columns
+
+
+def readings(
+    table: Table, columns: Columns, settings: Settings
+) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
+    """Return by column what rows of other kinds than position and pose read, and all labels, the kinds among them."""
+    labels = {label: np.array(table.text(label), dtype=np.str_) for label in columns.labels}
+    if not columns.kinds:
+        return {}, labels
+    if columns.kinds == ("controller",):
+        return {}, labels | {names.KIND: np.full(len(table.rows), "controller")}
+    stated = table.text(names.KIND) if names.KIND in table.columns else [columns.kinds[0]] * len(table.rows)
+    kind, figures = np.array(stated, dtype=np.str_), dict[str, Array]()
+    for own in columns.kinds:
+        numeric, texts = names.KINDS[own]
+        here = kind == own
+        for column in numeric:
+            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
+            row = first_true(np.asarray(here & np.isnan(values)))
+            if row is not None:
+                raise table.error("a value is missing", column, row, found="an empty cell", expected="a number")
+            figures[column] = np.where(here, values, figures.get(column, 0.0))
+        for column in (name for name in names.OPTIONAL.get(own, ()) if name in table.columns):
+            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
+            figures[column] = np.where(here & ~np.isnan(values), values, 0.0)
+        for column in texts:
+            cells = np.array(table.text(column), dtype=np.str_)
+            row = first_true(np.asarray(here & (cells == "")))
+            if row is not None:
+                raise table.error("a value is missing", column, row, found="an empty cell", expected="a label")
+            labels[column] = cells
+    return figures, labels | {names.KIND: kind}
 
 
 def _commands(table: Table, robot: Robot, units: Units) -> Array:
@@ -167,7 +212,9 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
 
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
-    """Warn, or refuse without repeats, where rows cannot determine the unknown frames."""
+    """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
+    if campaign.position is None:  # what rows of other kinds share is counted with them
+        return []
     equations = 6 if campaign.measures == "pose" else 3
     # of the tool: the target's orientation is fitted where it is measured
     unknowns = {"base": 0 if campaign.base_known else 6, "tool": 0 if campaign.tool_known else equations}

@@ -201,10 +201,13 @@ class Columns:
     has_noise: bool  # whether the noise of each row is there
     targets: tuple[int, ...]  # numbers of several targets of one pose, in their order; empty where there is one
     warnings: tuple[str, ...]  # columns left out, and names that look like typing errors
+    kinds: tuple[str, ...] = ()  # of measurement; none where all rows are positions, or poses
 
 
-def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
-    """Classify a table's columns for a robot; ``measured`` requires positions, else measured columns are ignored.
+def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> Columns:
+    """Sort a table's columns for a robot; ``measured`` requires what each kind of measurement reads.
+
+    Rows are of the ``kind`` stated, unless a column says it. Without ``measured`` these columns are ignored.
 
     Raises
     ------
@@ -216,16 +219,23 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
     more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
     _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
-    targets, warnings = _targets(table, robot) if measured else ((), [])
-    if measured and not targets:
+    kinds = _kinds(table, kind) if measured else ()
+    plain = measured and not kinds
+    targets, warnings = _targets(table, robot) if plain else ((), [])
+    if plain and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
-    turned = [names.ORIENTATION] if measured and not targets else []
+    for own in kinds:
+        _require(table, [c for group in names.KINDS[own] for c in group], f"rows of the kind {own!r} need it")
+    turned = [names.ORIENTATION] if plain and not targets else []
     asked = (*turned, names.SIMULATED_POSITION, names.SIMULATED_ORIENTATION)
     groups = tuple(group for group in asked if _whole_group(table, group))
     if names.SIMULATED_ORIENTATION in groups and names.SIMULATED_POSITION not in groups:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
     has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
+    taken |= (
+        names.of_kinds() | {names.KIND} if kinds or kind or _by_columns(table) or names.KIND in table.columns else set()
+    )
     taken |= {names.NOISE} if has_noise or not measured else set()
     parts: dict[str, list[str]] = {_COVARIATE: [], _EXTRA: [], _IGNORED: []}
     for column in table.columns:
@@ -235,7 +245,30 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
             warnings += [doubt] if doubt else []
     labels = tuple(label for label in names.LABELS if label in table.columns)
     sorted_out = tuple(parts[_COVARIATE]), tuple(parts[_EXTRA])
-    return Columns(*sorted_out, labels, groups, has_noise, targets, tuple(warnings))
+    return Columns(*sorted_out, labels, groups, has_noise, targets, tuple(warnings), kinds)
+
+
+def _kinds(table: Table, stated: str) -> tuple[str, ...]:
+    """Return the kinds of measurement of the rows; none where all are positions or poses by the columns there."""
+    if not stated and names.KIND not in table.columns:
+        stated = _by_columns(table)
+    cells = table.text(names.KIND) if names.KIND in table.columns else [stated] * len(table.rows)
+    for row, cell in enumerate(cells):
+        if cell not in (*names.KINDS, ""):
+            expected = f"one of {', '.join(names.KINDS)}"
+            raise table.error("unknown kind of measurement", names.KIND, row, found=repr(cell), expected=expected)
+        if not cell and any(cells):
+            raise table.error("a value is missing", names.KIND, row, found="an empty cell", expected="a kind")
+    found = tuple(sorted({*cells} - {""}))
+    return () if set(found) <= {"position"} or set(found) == {"pose"} else found
+
+
+def _by_columns(table: Table) -> str:
+    """Return the one kind whose labels are there, in a table without measured positions; else none."""
+    if any(name in names.POSITION or names.target_of(name) for name in table.columns):
+        return ""
+    there = [k for k, (figures, labels) in names.KINDS.items() if labels and {*figures, *labels} <= {*table.columns}]
+    return there[0] if len(there) == 1 else ""
 
 
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:

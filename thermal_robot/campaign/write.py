@@ -17,6 +17,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, table_columns
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
+from thermal_robot.campaign.settings import facts_in
 from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
@@ -74,7 +75,7 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     require("write_campaign()", campaign, (Campaign,), "a campaign")
     require("write_campaign()", directory, (str, os.PathLike), "the path of a folder")
     folder = Path(directory)
-    if campaign.position is None:
+    if not campaign.measured:
         raise CampaignError(str(folder), "samples without measured positions are no campaign")
     file = _declare(campaign, folder, comments)
     write_table(campaign, folder / TABLE_NAME)
@@ -262,5 +263,6 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "payload": {"com": [value / scale for value in settings.payload_com]},
         "priors": dict(settings.priors),
         "gears": dict(settings.gears),
+        **facts_in(settings.facts, scale),
     }
     return {section: content for section, content in document.items() if content}

@@ -14,6 +14,7 @@ from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.data_checks import cautions
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
+from thermal_robot.diagnosis.gauges import unseen
 from thermal_robot.diagnosis.next_measurement import wanted
 from thermal_robot.diagnosis.residual_tests import Examined
 from thermal_robot.diagnosis.result import Diagnosis
@@ -33,6 +34,7 @@ from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.observables import components, kinds_of, of_model
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
 
@@ -44,7 +46,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
     outliers too, as the standard requires.
     """
     campaign = fit.campaign
-    if not repeats(campaign)[0]:
+    if campaign.position is None or not repeats(campaign)[0]:
         return None
     frames, left = fit.nominal.frames, shrinkage.left
     base = frames.base[:3, :3]
@@ -141,7 +143,8 @@ def answer(
     held = [effect.name for effect, _ in fit.effects]
     systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in laws}, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    found, harms = _no_surer(by_share(titled((*systematic, *chance), (*candidates, *random_effects()))), gap)
+    every = titled((*systematic, *chance), (*candidates, *random_effects()), of_model(campaign))
+    found, harms = _no_surer(by_share(every), gap)
     groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,
@@ -160,7 +163,7 @@ def answer(
         separates=groups,
         model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *cautions(fit, last.refused, sensitivity)),
+        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *_last_words(fit, last, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
@@ -169,7 +172,13 @@ def answer(
         wanted=wanted(fit, found, groups, remaining, last.unexplained, probability),
         misfit=last.misfit,
         performance=None if last.misfit else criteria(fit, shrinkage),
+        says=", ".join(kind.says for kind, _ in kinds_of(campaign)),
     )
+
+
+def _last_words(fit: Fit, last: Conclusion, sensitivity: Sensitivity) -> tuple[str, ...]:
+    """Return what the readings cannot see, and the cautions of the final fit."""
+    return (*unseen(fit), *cautions(fit, last.refused, sensitivity))
 
 
 def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:
@@ -220,7 +229,7 @@ def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
         settings=campaign.settings,
         frames=fit.corrected.frames,
         effects=registered(fit, [(gate.delivered(effect, fit.nominal), values) for effect, values in fit.effects]),
-        measures=campaign.measures,
+        measures="pose" if components(campaign) == 6 else "position",
         needs=needs,
         simulated=campaign.simulated_position is not None,
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),

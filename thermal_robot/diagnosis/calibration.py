@@ -24,6 +24,7 @@ from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit_named
+from thermal_robot.observables import components
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
@@ -204,14 +205,14 @@ def calibrate(
         campaign = read_campaign(campaign)
     if campaign.priors:
         check_priors(campaign, {*library(), *(effect.name for effect in chosen)})
-    if campaign.position is None or not campaign.samples:
+    if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
         fit = fit_named(as_counted(campaign), chosen, progress)
     campaign, e = fit.campaign, fit.explanation
     before, after = (seen.gap[~e.outliers] for seen in (fit.nominal, fit.corrected))
-    poses = campaign.measures == "pose"
+    poses = components(campaign) == 6
     return Calibration(
         campaign=campaign.name,
         robot=campaign.robot.name,

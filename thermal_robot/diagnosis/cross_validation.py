@@ -33,7 +33,7 @@ from thermal_robot.inference.algebra import equations_of, ridge, whitener
 from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import Labels, blocks, each, neighbourhoods
+from thermal_robot.inference.grouping import STAND, Labels, blocks, each, held_together, neighbourhoods
 from thermal_robot.inference.kernels import chunks
 from thermal_robot.inference.problem import Linear, Whitening
 
@@ -119,8 +119,39 @@ class Model:
             if smooth is not None:
                 which = np.flatnonzero(self._used)
                 products = products - smooth.taken(used[which], lambda n: self._white(which[n]), settings.UNHEARD)
+            hidden = np.flatnonzero(~self._touched[used].any(axis=0))  # a difference of sums leaves rounding there
+            products[:, hidden], products[:, :, hidden] = 0.0, 0.0
             self._known[key] = products
         return self._known[key]
+
+    @cached_property
+    def _touched(self) -> Rows:
+        """(N, flat) which rows have to do with which of the frames' columns."""
+        return np.asarray((self.linear.frames != 0.0).any(axis=1))
+
+    def alone(self, test: Rows) -> NDArray[np.int64]:
+        """Return the numbers of the frames' columns that only rows held out have to do with: their own artefacts."""
+        others = self._touched[~test & self._used].any(axis=0)
+        return np.flatnonzero(self._touched[test].any(axis=0) & ~others)
+
+    def judged(self, test: Rows) -> Array:
+        """(n, m, K + 1) columns and gap of rows held out, less what artefacts of theirs alone take up of each.
+
+        Where a stand stands is no property of the robot: of a stand held out, its rows are judged by how they spread.
+        """
+        key = test.tobytes()
+        if key not in self._told:
+            found, own = self.linear.stack[test], self.alone(test)
+            if len(own):
+                root = np.sqrt(self.whitening.weights[test])[:, None, None] / self.whitening.sigma(test)[:, :, None]
+                white = equations_of(found * root)
+                found = found - found[:, :, own] @ np.linalg.lstsq(white[:, own], white, rcond=settings.ALIAS)[0]
+            self._told[key] = found
+        return self._told[key]
+
+    @cached_property
+    def _told(self) -> dict[bytes, Array]:
+        return {}
 
     @cached_property
     def _of_all(self) -> Array:
@@ -147,9 +178,9 @@ class Model:
         return self.products(np.ones(len(self.block), dtype=bool))
 
     def determines(self, rows: Rows) -> bool:
-        """Whether some rows determine the frames with the same rank as all rows do."""
+        """Tell whether some rows determine as much of the frames as all rows do, but what the others alone share."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
-        return bool(some.shape[1] >= every.shape[1])
+        return bool(some.shape[1] + len(self.alone(~rows)) >= every.shape[1])
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
         """Numbers (k + 1,) of the columns of the frames, of some blocks and of the gap."""
@@ -162,7 +193,7 @@ class Model:
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
         whole = self.whole[own]
-        equations = max(int(self._used.sum()) * self.linear.measures, 1) / len(whole)
+        equations = max(int(self._used.sum()) * self.linear.measures - self.whitening.unseen, 1) / len(whole)
         # the gap of the nominal robot is what registration leaves
         variance = np.maximum(whole[:, -1, -1] / equations if self.apart else 0.0, np.full(len(whole), self.variance))
         for _ in range(settings.FOLD_ROUNDS):
@@ -209,17 +240,19 @@ class Walk:
         total = np.zeros(1 + len(own))
         for test, fit, resting in zip(self.tests, fits, shared, strict=True):
             judged = test & model.kept
-            left = model.linear.stack[judged, :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
+            left = (
+                model.judged(test)[judged[test], :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
+            )
             squares = (left**2).sum(axis=1)
             squares[np.arange(len(squares)), 1 + model.block[judged]] = 0.0
             total += squares.sum(axis=0)
         return total
 
     def residuals(self, chosen: Sequence[int]) -> Array:
-        """Held-out residuals (H, m) of a model with some of the blocks, fold after fold, m and rad."""
-        picked, stack = self.model.columns(chosen), self.model.linear.stack
+        """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
+        picked, stack = self.model.columns(chosen), self.model.judged
         fits = self.model.fits([~test for test in self.tests], chosen)
-        return np.concatenate([stack[test][:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
+        return np.concatenate([stack(test)[:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
 
     @property
     def numbers(self) -> NDArray[np.int64]:
@@ -292,16 +325,18 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     more. The intervals are those of fresh rows of the same kind under the saved model, noise included. Raises
     :class:`EstimationError` if all rows repeat one pose.
     """
-    block = blocks(fit.campaign)
+    block, scheme = held_together(fit.campaign)
     count = int(block.max()) + 1
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     progress(f"held out: {count} blocks, one at a time")
     before = replace(fit.before, blocks=tuple(columns(fit.nominal, effect) for effect, _ in fit.effects))
-    return shrinkage(fit.explanation, before, fit.families, block)
+    return shrinkage(fit.explanation, before, fit.families, block, scheme)
 
 
-def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> Shrinkage:
+def shrinkage(
+    explanation: Explanation, before: Linear, families: Sequence[str], block: Labels, scheme: str = "blocked"
+) -> Shrinkage:
     """Cross-validate an explanation, linearised at the corrected model; see :func:`held_out`.
 
     ``before`` is the problem at the nominal robot with the blocks of the best combination, in their order; rows of one
@@ -335,7 +370,7 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     )
     value, interval = share(none - squares(players), none)
     folds = int(block.max()) + 1
-    overall = HeldOut("blocked", folds, before_kept, after_kept, value, interval, before_all, after_all)
+    overall = HeldOut(scheme, folds, before_kept, after_kept, value, interval, before_all, after_all)
     far[~kept] = near[~kept] = np.nan
     return Shrinkage(overall, far, near, shares, after)
 
@@ -426,6 +461,8 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     session = campaign.labels.get("session")
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
+    if held_together(campaign)[1] == STAND:
+        yield STAND, "one stand after the other", each(held_together(campaign)[0])
     temperature = _temperature(campaign)
     if temperature is not None and np.ptp(temperature) > 0.0:
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)

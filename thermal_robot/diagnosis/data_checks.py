@@ -63,8 +63,8 @@ STRAIGHT = (
 
 
 def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out rows whose measured pose belongs to another row's command, with a sentence for each run of them."""
-    if campaign.samples <= faults.DRAWN:
+    """Leave out rows whose measured pose is that of another row's command, with a sentence for each run of them."""
+    if campaign.samples <= faults.DRAWN or campaign.position is None:
         return campaign, ()
     order = in_order(campaign)
     readings = Readings.of(campaign).take(order)

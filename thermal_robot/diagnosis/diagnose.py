@@ -27,6 +27,7 @@ from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit, require_enough
 from thermal_robot.inference.scatter import random_gap
+from thermal_robot.observables import of_model
 
 
 def diagnose(
@@ -83,7 +84,7 @@ def diagnose(
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    candidates = choose(only, without, effects)
+    candidates = _asked_of(campaign, choose(only, without, effects))
     # where nothing was left out the candidates are all; installed packages are looked up once
     everything = {effect.name for effect in (*effects, *candidates)}
     if only or without:
@@ -93,7 +94,7 @@ def diagnose(
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
 
-    if campaign.position is None or not campaign.samples:
+    if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     campaign, left = not_executed(campaign)
@@ -113,6 +114,11 @@ def diagnose(
         )
         prepare(diagnosis := told(found))
         return diagnosis
+
+
+def _asked_of(campaign: Campaign, effects: Sequence[Effect]) -> Sequence[Effect]:
+    """Return the effects that may be at work: where the rows are a model's word, those that a model holds."""
+    return [effect for effect in effects if effect.in_model] if of_model(campaign) else effects
 
 
 @contextmanager
@@ -156,7 +162,7 @@ def _concluded(
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
     fit = known
-    for number in range(1, settings.SELECTIONS):
+    for number in range(1, 1 if of_model(known.campaign) else settings.SELECTIONS):
         wider = grown(fit, number, progress)
         if wider is None:
             break

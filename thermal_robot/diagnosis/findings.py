@@ -241,11 +241,11 @@ def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...
     return unknown_frames(fit) if inside else ()
 
 
-def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Return the findings with their titles: that of the effect, or the name of a discovered law."""
+def titled(found: Sequence[Finding], effects: Iterable[Effect], model: bool = False) -> tuple[Finding, ...]:
+    """Return the findings with titles: of the effect, in another ``model`` or the robot, or of a discovered law."""
     known = {effect.name: effect for effect in effects}
     return tuple(
-        replace(f, title=known[f.name].title, random=known[f.name].random)
+        replace(f, title=known[f.name].in_model if model else known[f.name].title, random=known[f.name].random)
         if f.name in known
         else replace(f, title=f.title or f.describes or "")
         for f in found

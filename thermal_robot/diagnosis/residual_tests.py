@@ -55,7 +55,10 @@ class Residual:
         m = self.white.shape[1]
         basis, _ = np.linalg.qr(self.target.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
         white = without(self.white[drawn].ravel(), basis)
-        return Residual(self.rows[drawn], Target(white, self.target.root[drawn], basis))
+        return Residual(
+            self.rows[drawn],
+            Target(white, self.target.root[drawn], basis, round(self.target.unseen * count / len(self.rows))),
+        )
 
 
 def residual(fit: Fit) -> Residual:
@@ -69,7 +72,8 @@ def residual(fit: Fit) -> Residual:
     basis = orthonormal(design.reshape(root.size, design.shape[2]))
     # of the exact model, not the linear one: where effects are large and noise is small they differ
     gap = (fit.corrected.gap[rows] * root).ravel()
-    return Residual(rows, Target(without(gap, basis), root, basis))
+    unseen = 0 if e.whitening.seen is None else int((3 - e.whitening.seen[rows]).sum())
+    return Residual(rows, Target(without(gap, basis), root, basis, unseen))
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,8 @@ class Diagnosis:
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     performance
         Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
+    says
+        What its rows say, for a reader.
 
     Examples
     --------
@@ -155,6 +157,7 @@ class Diagnosis:
     fit: Fit | None = None
     misfit: Misfit | None = None
     performance: Performance | None = None
+    says: str = ""
 
     @property
     def usable(self) -> bool:

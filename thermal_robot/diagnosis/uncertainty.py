@@ -222,10 +222,11 @@ def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Ef
         return tuple(held)
     model, names = _model(fit), frame_columns(fit.corrected)[1]
     gram, flat = model.whole[0], model.flat
-    places = [k if name == "base" else 6 + k - names.index("tool") for k, name in enumerate(names)]
+    numbers = [k for k, name in enumerate(names) if name in ("base", "tool")]
+    places = [k if names[k] == "base" else 6 + k - names.index("tool") for k in numbers]
     twists = np.zeros((12, gram.shape[1] - 1 - flat))
     known = whitener(gram[:flat, :flat], diagnosis_settings.LEAST_SEEN)
-    twists[places] = known @ (known.T @ gram[:flat, flat:-1])
+    twists[places] = (known @ (known.T @ gram[:flat, flat:-1]))[numbers]
     found: list[tuple[Effect, Array]] = []
     for (effect, values), own in zip(fading, model.spans, strict=True):
         kept = {p.name: twists[:, k] for p, k in zip(gate.checked(effect, fit.nominal), own - flat, strict=True)}

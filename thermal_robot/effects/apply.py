@@ -13,6 +13,7 @@ from thermal_robot.effects import gate
 from thermal_robot.effects.effect import Channel, Effect, Parameter, Response
 from thermal_robot.errors import EffectError, ThermalRobotError
 from thermal_robot.kinematics import Displacement
+from thermal_robot.observables import instrument_rows
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -35,7 +36,7 @@ def sensitivity(observations: Observations, channel: Channel, index: int) -> Arr
     if channel == "tool":
         return observations.tool_sensitivity
     shifts = np.zeros((observations.campaign.samples, 6, 3))
-    shifts[:, :3] = observations.frames.base[:3, :3].T
+    shifts[instrument_rows(observations.campaign), :3] = observations.frames.base[:3, :3].T
     return shifts
 
 

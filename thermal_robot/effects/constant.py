@@ -22,6 +22,8 @@ from thermal_robot.effects.effect import (
     at_tool,
 )
 from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.effects.settings import IN_MODEL
+from thermal_robot.observables import components, instrument_rows
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -47,6 +49,7 @@ class Geometric(Effect):
 
     name: ClassVar[str] = "geometric"
     title: ClassVar[str] = "geometric errors of the links"
+    in_model: ClassVar[str] = "a calibration of this one arm, or another variant, in the controller"
     size_spread: ClassVar[float] = 1.0
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -127,6 +130,7 @@ class JointOffset(Effect):
 
     name: ClassVar[str] = "joint_offset"
     title: ClassVar[str] = "joint zero offsets"
+    in_model: ClassVar[str] = "other joint zeros in the controller"
     singular: ClassVar[str] = "a zero offset"
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
@@ -159,6 +163,8 @@ class BaseFrame(Effect):
 
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
+    in_model: ClassVar[str] = "a base frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
@@ -199,6 +205,8 @@ class ToolFrame(Effect):
 
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
+    in_model: ClassVar[str] = "a tool or flange frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
 
     @property
@@ -218,7 +226,7 @@ class ToolFrame(Effect):
         return (own, *(replace(own, alone=component) for component, _ in TWIST))
 
     def _turns(self, observations: Observations) -> bool:
-        return observations.campaign.measures == "pose" if self.turns is None else self.turns
+        return components(observations.campaign) == 6 if self.turns is None else self.turns
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Twist of the tool in the tool frame: m, and rad where orientation is measured."""
@@ -242,6 +250,10 @@ class InstrumentScale(Effect):
     title: ClassVar[str] = "a scale error of the instrument"
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return what would make it testable: an instrument."""
+        return () if instrument_rows(observations.campaign).any() else ("rows of kind position or pose",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""

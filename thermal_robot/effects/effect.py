@@ -207,6 +207,11 @@ class Effect(ABC):
     """By which it is asked for and reported."""
     title: ClassVar[str] = ""
     """Plain words for a sentence; the name with spaces where a class states none."""
+    in_model: ClassVar[str] = ""
+    """What it is where another model of the same robot says its pose, such as the controller's; empty for what no model
+    holds, such as wear."""
+    in_model_times: ClassVar[float] = 1.0
+    """Times of its expected size that it has there."""
     singular: ClassVar[str] = ""
     """The same of a single joint; the title where a class states none."""
     sided_by: ClassVar[tuple[str, ...]] = ()

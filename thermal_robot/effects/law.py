@@ -134,11 +134,11 @@ class Discovered(Fading):
         campaign = observations.campaign
         if self.shape == "constant":
             return np.zeros(campaign.samples)
-        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
+        if self.labels and (self.quantity in campaign.labels or not campaign.measured):
             number = {label: float(k) for k, label in enumerate(self.labels)}
             rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
             return np.array([number.get(label, np.nan) for label in rows])
-        if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
+        if self.quantity == "order" and self.quantity not in observations.covariates and not campaign.measured:
             return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
         return quantity(observations, self.quantity)
 

@@ -16,7 +16,8 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
-from thermal_robot.observations import Observations
+from thermal_robot.observables import components, of_model, tool_width
+from thermal_robot.observations import Observations, observe
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,8 @@ def block(observations: Observations, effect: Effect) -> Block:
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])
+    if of_model(campaign):
+        sizes = sizes * effect.in_model_times
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
@@ -79,7 +82,7 @@ def block(observations: Observations, effect: Effect) -> Block:
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:
     """Return the derivative (N, m, P) of the gap by each of P parameters, root frame axes."""
     campaign = observations.campaign
-    measures = 6 if campaign.measures == "pose" else 3
+    measures = components(campaign)
     columns = np.zeros((campaign.samples, measures, len(parameters)))
     for p, parameter in enumerate(parameters):
         for response in parameter.responses:
@@ -88,25 +91,36 @@ def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Arr
 
 
 def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
-    """Return the derivative (N, m, f) of the gap by the unknown frames, and the name of each column.
+    """(N, m, f) derivative of the gap by the unknown frames and artefacts, and what each column is.
 
-    Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
-    measured. With a simulator's prediction, which includes the tool, the tool is not fitted.
+    Base: twist in the root frame, of rows that an instrument measured. Tool: translation of the target in the tool
+    frame, and its turn where orientation is measured. Artefacts: what rows share beside the robot, by their names.
+    Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
     """
-    campaign, names = observations.campaign, unknown_frames(observations.campaign)
-    measures = 6 if campaign.measures == "pose" else 3
+    campaign, names = observations.campaign, _unknown(observations.campaign)
+    measures = components(campaign)
     parts = []
     if "base" in names:
         parts.append(observations.base_sensitivity[:, :measures, :])
     if "tool" in names:
-        parts.append(observations.tool_sensitivity[:, :measures, :measures])
+        parts.append(observations.tool_sensitivity[:, :measures, : tool_width(campaign)])
+    shared, artefacts = observations.sight.columns()
+    if artefacts:
+        parts.append(shared)
     if not parts:
         return np.zeros((campaign.samples, measures, 0)), ()
-    return np.concatenate(parts, axis=2), names
+    return np.concatenate(parts, axis=2), (*names, *artefacts)
 
 
 def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
-    """Frame, ``base`` or ``tool``, of each column of the unknown frames."""
+    """Return to which frame, ``base`` or ``tool``, or artefact each of the columns of the unknown frames belongs."""
+    known = _unknown(campaign)
+    if campaign.position is not None or not campaign.measured:
+        return known
+    return (*known, *observe(campaign).sight.columns()[1])
+
+
+def _unknown(campaign: Campaign) -> tuple[str, ...]:
     base = 0 if campaign.base_known else 6
     fixed = campaign.tool_known or campaign.simulated_position is not None
-    return ("base",) * base + ("tool",) * (0 if fixed else 6 if campaign.measures == "pose" else 3)
+    return ("base",) * base + ("tool",) * (0 if fixed else tool_width(campaign))

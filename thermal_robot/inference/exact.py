@@ -179,7 +179,9 @@ def heard(explanation: Explanation) -> Whitening:
         return whitening
     noise = whitening.sigma() * explanation.best.noise
     distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
-    return replace(whitening, weights=np.where(aside, tail_weight(distance2, noise.shape[1]), whitening.weights))
+    return replace(
+        whitening, weights=np.where(aside, tail_weight(distance2, whitening.figures(noise.shape[1])), whitening.weights)
+    )
 
 
 def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:

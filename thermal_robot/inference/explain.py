@@ -460,7 +460,7 @@ class Explanation:
         """Outliers (N,) among the given rows."""
         beyond = self.whitening.sigma() * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
         distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
-        return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
+        return np.asarray(rows & (distance2 > distance_limit(self.whitening.figures(self.linear.measures), len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
         """Posterior probability that any of the blocks is in the model."""

@@ -27,6 +27,7 @@ from thermal_robot.inference.problem import Linear, Products, frame_step, gram, 
 from thermal_robot.inference.registration import found_frames, frames_known, moved, refined_frames, register
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.weights import Noise, first_whitening, reweigh
+from thermal_robot.observables import components
 from thermal_robot.observations import Frames, Observations, observe
 
 
@@ -142,8 +143,8 @@ def require_enough(campaign: Campaign) -> None:
     """Refuse a campaign with too few rows for the frames, the effects and a held-out fold."""
     still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
     poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
-    unknown, measures = len(unknown_frames(campaign)), campaign.orientation is not None
-    fewest = -(-(unknown + settings.SPARE_EQUATIONS) // (6 if measures else 3)) + 2
+    unknown = len(unknown_frames(campaign))
+    fewest = -(-(unknown + settings.SPARE_EQUATIONS) // components(campaign)) + 2
     if poses < fewest:
         raise EstimationError(
             f"{poses} different poses are too few: {unknown} unknowns of the frames need at least {fewest} of them, "

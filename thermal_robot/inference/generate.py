@@ -43,6 +43,7 @@ from thermal_robot.inference.screening import (
     scan,
     shaped,
 )
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
@@ -139,7 +140,7 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations, order = fit.corrected, in_order(fit.campaign)
-    turns, joints = fit.campaign.measures == "pose", fit.campaign.robot.joint_names
+    turns, joints = components(fit.campaign) == 6, fit.campaign.robot.joint_names
     plain = Discovered(quantity="none", shape="constant", turns=turns)
     where = [("base", "base"), ("tool", "tool"), *(("joint", joint) for joint in joints)]
     places = [replace(plain, kind=kind, place=place) for kind, place in where]
@@ -168,7 +169,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
 
     def target(some: Iterable[int], trusted: Rows) -> Target:
         design = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in some)], axis=2)
-        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise)
+        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise, seen=e.whitening.seen)
 
     yield target(blocks, ~single), 0.0
     yield target(blocks, e.outliers & ~single), 0.0
@@ -439,8 +440,9 @@ class _Pursuit:
         return block(self.observations, _ripple(found)).sizes ** -2.0
 
     def _target(self, found: Sequence[_Wave], like: Target | None = None) -> Target:
-        relative = self.observations.campaign.relative_noise
-        return Target.of(self.gap, self._columns(found), self.changed, relative, like)
+        campaign = self.observations.campaign
+        relative, seen = campaign.relative_noise, seen_components(campaign)
+        return Target.of(self.gap, self._columns(found), self.changed, relative, like, seen)
 
     def _moves(self, joint: str) -> tuple[Array, Array]:
         """Positions (N,) of a joint, and its displacement (N, m, 1) of the target per unit."""

@@ -95,6 +95,19 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
     return np.unique(block, return_inverse=True)[1].astype(np.int64)
 
 
+STAND = "stand"  # Label of what stays in one place while the robot is brought to it
+
+
+def held_together(campaign: Campaign) -> tuple[Labels, str]:
+    """(N,) label of the rows that are held out at a time, and what they are: stands, or blocks where these are few."""
+    stands = campaign.labels.get(STAND)
+    if stands is not None and campaign.position is None:
+        number = np.unique(stands, return_inverse=True)[1].ravel()
+        if number.max() + 1 >= settings.FEWEST_STANDS:
+            return number.astype(np.int64), STAND
+    return blocks(campaign), "blocked"
+
+
 def each(labels: Labels) -> list[NDArray[np.bool_]]:
     """Mask (N,) of the rows of each label, in order."""
     return [labels == label for label in np.unique(labels)]

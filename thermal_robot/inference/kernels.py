@@ -30,6 +30,7 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.grouping import repeated_poses
+from thermal_robot.observables import components
 from thermal_robot.observations import Observations
 
 Numbers = NDArray[np.int64]
@@ -540,8 +541,8 @@ def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
 
 
 def forms(observations: Observations) -> tuple[Form, ...]:
-    """Kernels of the discrepancy that a campaign allows."""
-    measures = 6 if observations.campaign.measures == "pose" else 3
+    """Return the forms of the discrepancy that a campaign allows."""
+    measures = components(observations.campaign)
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
     found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]

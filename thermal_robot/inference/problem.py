@@ -67,7 +67,8 @@ class Whitening:
     """Row weights (N,), 0 where not used, else up to 1, and noise (m,) of each component, m and rad.
 
     ``held``: degrees of freedom of the noise's prior, 0 where none is stated. ``smooth``: the correlated part of the
-    rows' covariance. ``relative`` (N, m): noise of each figure over that of its component.
+    rows' covariance. ``relative`` (N, m): noise of each figure over that of its component. ``seen`` (N, m/3): how many
+    components of its place and turn a row sees, ``None`` for all in all rows.
     """
 
     weights: Array
@@ -75,6 +76,16 @@ class Whitening:
     held: float
     smooth: Smooth | None = None
     relative: Array | None = None
+    seen: NDArray[np.int64] | None = None
+
+    @property
+    def unseen(self) -> int:
+        """How many components the rows in use do not see: they are no equations."""
+        return 0 if self.seen is None else int((3 - self.seen[self.weights > 0]).sum())
+
+    def figures(self, measures: int) -> NDArray[np.int64] | int:
+        """Return how many figures a row has: (N,) where rows differ."""
+        return measures if self.seen is None else np.maximum(self.seen.sum(axis=1), 1)
 
     def sigma(self, rows: NDArray[Any] | slice = slice(None)) -> Array:
         """One sigma (n, m) of each component of some rows, m and rad; (1, m) where all rows are alike."""
@@ -122,7 +133,7 @@ def normal_equations(
         _positive(linear, bases),
         ranks,
         np.array([b.spread for b in linear.blocks]),
-        equations - known.shape[1],
+        equations - whitening.unseen - known.shape[1],
         whitening.held,
         -0.5 * (log_det + (whitening.smooth.log_det if whitening.smooth else 0.0)),
         np.array([b.largest_scale for b in linear.blocks]),

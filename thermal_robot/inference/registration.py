@@ -6,6 +6,8 @@ Starts run side by side, each until its own median distance converges, independe
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import permutations, product
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,13 +15,23 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.names import POSITION
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
-from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
+from thermal_robot.observables import instrument_rows, tool_width
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
+
+CUBE = [
+    np.asarray(turn)
+    for axes in permutations(np.eye(3))
+    for signs in product((1.0, -1.0), repeat=3)
+    if np.linalg.det(turn := np.array(axes) * np.array(signs)[:, None]) > 0.0
+]
+"""The 24 turns of a cube: no turn is farther than 63° from the next of them."""
 
 
 class Placed(NamedTuple):
@@ -176,25 +188,66 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
 
 
 def frames_known(campaign: Campaign) -> bool:
-    """Whether no frame has to be fitted: both are declared, or a simulator includes the tool."""
+    """Tell whether nothing has to be fitted: both frames are declared, or a simulator holds the tool."""
+    if campaign.position is None and campaign.measured and unknown_frames(campaign):
+        return False
     return campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None)
 
 
 def found_frames(campaign: Campaign) -> Frames:
     """Return the initial registration, close enough to linearise; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
+    if campaign.position is None:
+        return _turned(campaign, _found_by_instrument(campaign, frames))
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     some = np.linspace(0, rows - 1, min(rows, settings.START_ROWS)).astype(np.int64)
     return Frames(*alternate(campaign, frames, frames.tool[:3, 3] + starts(campaign), some=some)[1])
 
 
+def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
+    """Find the base by those rows that an instrument measured; where there are none it stands as declared."""
+    rows = np.flatnonzero(instrument_rows(campaign))
+    if campaign.base_known or len(rows) < 3:
+        return frames
+    some, places = campaign.take(rows), np.column_stack([campaign.readings[axis][rows] for axis in POSITION])
+    found = found_frames(replace(some, position=places, readings={}))
+    return found if not campaign.tool_known else replace(found, tool=frames.tool)
+
+
+def _turned(campaign: Campaign, frames: Frames) -> Frames:
+    """Find how the target is turned on the tool, where that matters: by the turn of a cube that leaves least."""
+    if campaign.tool_known or tool_width(campaign) == 3:
+        return frames
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
+    some, found = campaign.take(rows), list[tuple[float, Frames]]()
+    for turn in CUBE:
+        tool = frames.tool.copy()
+        tool[:3, :3] = turn
+        begun = replace(frames, tool=tool)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found.append((_away(some, begun), begun))
+    nearest = sorted(found, key=lambda one: one[0])[: settings.TURNS_TRIED]
+    tried = [refined_frames(some, begun, robust=True) for _, begun in nearest]
+    best = min(tried, key=lambda one: _away(some, one))
+    return replace(best, artefacts={})
+
+
+def _away(campaign: Campaign, frames: Frames) -> float:
+    """Return the median distance that frames leave, m; infinite where it is no number."""
+    distance = float(np.median(np.linalg.norm(observe(campaign, frames).gap, axis=1)))
+    return distance if np.isfinite(distance) else np.inf
+
+
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
-    """Frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
-    base_step, tool_step = (step[np.array(names, dtype=object) == name] for name in ("base", "tool"))
+    """Return the frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
+    own = np.array(names, dtype=object)
+    base_step, tool_step = (step[own == name] for name in ("base", "tool"))
+    shared = {name: each for name, each in frames.artefacts.items() if name in names}
+    artefacts = {name: each.moved(step[own == name]) for name, each in shared.items()}
     base = frames.base @ exp6(base_step) if base_step.size else frames.base
     turn = exp6(np.concatenate([tool_step, np.zeros(6 - tool_step.size)])) if tool_step.size else np.eye(4)
-    return Frames(base, turn @ frames.tool)
+    return Frames(base, turn @ frames.tool, {**frames.artefacts, **artefacts})
 
 
 def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
@@ -211,7 +264,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
-        frames = moved(frames, step, names)
+        frames = moved(observations.frames, step, names)
         if np.abs(step).max() < settings.ROUNDING:
             break
     return frames

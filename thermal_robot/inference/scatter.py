@@ -26,6 +26,7 @@ from thermal_robot.inference.grouping import repeated_poses
 from thermal_robot.inference.problem import Linear, generalised
 from thermal_robot.inference.screening import Target, smooth_columns
 from thermal_robot.inference.weights import distance_limit
+from thermal_robot.observables import of_model
 
 Component = tuple[str, int]
 """Anew at each ``visit`` or once a commanded ``pose``, and the number of a joint."""
@@ -705,6 +706,9 @@ def random_gap(fit: Fit) -> RandomGap:
     If a joint's errors follow a smooth law of a recorded quantity, they are no scatter. Errors of an encoder are a
     sawtooth of the command with the period √12 σ; without repeats only that separates its steps from wear.
     """
+    # what rows do not see would count as no scatter, and a model scatters nothing
+    if fit.explanation.whitening.seen is not None or of_model(fit.campaign):
+        return nothing_random(fit)
     e, observed, even = fit.explanation, fit.corrected, _even(fit)
     m = even.shape[1]
     gap, sensitivity = observed.gap / even, observed.joint_sensitivity[:, :m] / even[:, :, None]

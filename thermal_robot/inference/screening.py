@@ -30,6 +30,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import robust_noise
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 
@@ -65,12 +66,14 @@ def gained(total: Array | float, explained: Array | float, rank: Array | float, 
 class Target:
     """Residual to be explained: ``white`` (N·m,), the gap with a design projected out, in units of the noise.
 
-    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design;
+    ``unseen``: how many of the N·m components no row sees.
     """
 
     white: Array
     root: Array
     basis: Array
+    unseen: int = 0
 
     @classmethod
     def of(
@@ -80,24 +83,25 @@ class Target:
         trusted: NDArray[np.bool_] | None = None,
         relative: Array | None = None,
         like: Target | None = None,
+        seen: NDArray[np.int64] | None = None,
     ) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), with Cauchy weights of the rows.
 
         Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
-        differs, ``relative`` (N, m) says how. Weights are found by iteration, or at once from those of a target that is
-        nearly ``like`` this one.
+        differs, ``relative`` (N, m) says how; where rows see fewer components, ``seen`` (N, m/3). Weights
+        are found by iteration, or at once from those of a target that is nearly ``like`` this one.
         """
         if relative is not None:
             like = None if like is None else replace(like, root=like.root * relative)
-            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like)
-            return cls(even.white, even.root / relative, even.basis)
-        found = _weighed(gap, design, gap if like is None else like.left, first=like is None)
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like, seen=seen)
+            return replace(even, root=even.root / relative)
+        found = _weighed(gap, design, gap if like is None else like.left, seen, first=like is None)
         for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
-            found = _weighed(gap, design, found.left)
+            found = _weighed(gap, design, found.left, seen)
         if trusted is not None and trusted.any():
-            noise = np.repeat(robust_noise(found.left), 3)
+            noise = np.repeat(robust_noise(found.left, seen=seen), 3)
             found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
-        return found
+        return found if seen is None else replace(found, unseen=int((3 - seen).sum()))
 
     @property
     def left(self) -> Array:
@@ -107,7 +111,7 @@ class Target:
     @property
     def freedom(self) -> int:
         """Residual degrees of freedom: equations less the rank of the design."""
-        return max(int(len(self.white) - self.basis.shape[1]), 1)
+        return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
     def worth(self, columns: Array) -> Worth:
         """Score of further columns (N, m, K); zero where they leave too few degrees of freedom."""
@@ -141,10 +145,13 @@ class Target:
         )
 
 
-def _weighed(gap: Array, design: Array, left: Array, first: bool = False) -> Target:
-    """Target with Cauchy weights from its residual; equal weights in the ``first`` iteration."""
-    noise = np.repeat(robust_noise(left), 3)
-    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * left.shape[1])
+def _weighed(
+    gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
+) -> Target:
+    """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
+    noise = np.repeat(robust_noise(left, seen=seen), 3)
+    figures = left.shape[1] if seen is None else np.maximum(seen.sum(axis=1), 1)
+    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * figures)
     return _projected(gap, design, 1.0 / np.sqrt(1.0 + np.broadcast_to(far2, len(gap)))[:, None] / noise)
 
 
@@ -236,8 +243,8 @@ __all__ = [
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
-    """Smooth laws of each quantity at each place of the given kinds; at a segment also constant ones."""
-    turns = observations.campaign.measures == "pose"
+    """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
+    turns = components(observations.campaign) == 6
     robot = observations.robot
     places = {
         "joint": robot.joint_names,
@@ -517,13 +524,13 @@ class Thin:
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
-        relative = self.observations.campaign.relative_noise
-        first = Target.of(self.linear.gap, design, self.changed, relative)
+        relative, seen = self.observations.campaign.relative_noise, seen_components(self.observations.campaign)
+        first = Target.of(self.linear.gap, design, self.changed, relative, seen=seen)
         if not sound:
             return first
         distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
         near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
-        return Target.of(self.linear.gap, design, near | self.changed, relative)
+        return Target.of(self.linear.gap, design, near | self.changed, relative, seen=seen)
 
 
 def conditions(observations: Observations, joint: str = "") -> list[str]:
@@ -584,7 +591,7 @@ def _rows(parameter: Parameter) -> Iterator[Response]:
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
     """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
-    turns = observations.campaign.measures == "pose"
+    turns = components(observations.campaign) == 6
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
     follow = {
         name: Discovered(

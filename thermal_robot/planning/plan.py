@@ -191,6 +191,38 @@ def expectations(columns: Columns) -> tuple[Expected, ...]:
     return tuple(found)
 
 
+def foreseen(campaign: Campaign, effects: str | Iterable[str] | None = None) -> tuple[Expected, ...]:
+    """Return how well effects would be known from the rows of a campaign, whatever these measure (Fisher).
+
+    Parameters
+    ----------
+    campaign
+        Rows of any kind, as :func:`~thermal_robot.simulate` makes them; of its readings only the noise that it states
+        counts.
+    effects
+        Names of those that are asked for; all that can be tested where absent.
+
+    Raises
+    ------
+    CampaignError
+        The campaign states no noise.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning.plan import foreseen
+    >>> rows = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=60, measures="distance", noise=5e-5)
+    >>> [known.name for known in foreseen(rows, "joint_offset")]
+    ['joint_offset']
+    """
+    if campaign.noise_position is None:
+        raise CampaignError(campaign.name, "states no noise", column="noise.position", expected="one sigma per axis")
+    seen = observe(campaign)
+    names = [effects] if isinstance(effects, str) else effects
+    kinds = [kind for kind in choose(tuple(names or ())) if not gate.missing(kind, seen)]
+    return expectations(Columns.of(seen, [gate.variants(kind, seen)[0] for kind in kinds]))
+
+
 def _left(precision: Array, which: NDArray[np.int64]) -> Array:
     """Return the standard deviations (k,) over the expected sizes, without other parameters."""
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision[np.ix_(which, which)]))))

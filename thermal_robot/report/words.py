@@ -334,8 +334,8 @@ def _rows(rows: Sequence[int]) -> str:
 
 
 def facts(diagnosis: Diagnosis) -> dict[str, str]:
-    """Facts at the top of a report by heading: verdict, campaign, rows and effects used."""
-    what = "position and orientation" if diagnosis.measures == "pose" else "position"
+    """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
+    what = diagnosis.says or ("position and orientation" if diagnosis.measures == "pose" else "position")
     name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
     rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
     campaign = f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"

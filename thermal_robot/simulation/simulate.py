@@ -28,6 +28,7 @@ from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.robot import ENDS, Robot, joint_range, load_robot
 from thermal_robot.schema import LARGEST, MisfitError, boolean, fitted, matrix, number, optional, shown, whole, word
 from thermal_robot.simulation import schedule
+from thermal_robot.simulation.brought import TOUCHED, as_kind, touched
 
 if TYPE_CHECKING:
     from thermal_robot.urdf_text import WritesUrdf
@@ -255,20 +256,21 @@ def _number(effect: Effect, place: Parameter, value: Any) -> float:
         raise EffectError(str(error)) from None
 
 
-_MEASURES = ("position", "pose")
+_MEASURES = ("position", "pose", "socket", "plane", "distance", "controller")
+_TURNED = ("pose", "controller")
 _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 """Quaternion wxyz of no turn: it tells effects that orientations will be measured."""
 
 
-def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[bool, float, float]:
-    """Whether orientations are measured, and one sigma per axis, m and rad."""
+def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[str, float, float]:
+    """Return what is measured, and one sigma per axis, m and rad."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
-    if turn > 0.0 and what != "pose":
+    if turn > 0.0 and what not in _TURNED:
         expected = 'measures="pose", or no noise of orientations'
         raise CampaignError(CALL, "only positions are measured", column="noise_orientation", expected=expected)
-    return what == "pose", shift, turn
+    return str(what), shift, turn
 
 
 _RIGID = 1e-6
@@ -418,7 +420,10 @@ def simulate(
         ``temperature``). Directions of approach follow from the order of the rows where none are given.
     measures
         ``"position"``, or ``"pose"`` for orientations, too; by default what the campaign in ``commands`` has, or
-        positions.
+        positions. ``"distance"`` to four points about the robot, whose places and common zero nobody knows;
+        ``"controller"``, the pose that the controller has of it. ``"socket"``, two on each of three stands, and
+        ``"plane"``, three at right angles that are touched: the postures are led there from those drawn, by the robot
+        that is simulated.
     noise, noise_orientation
         One sigma per axis of the instrument, m and rad, normal; the campaign states it.
     base
@@ -462,13 +467,16 @@ def simulate(
     seed = fitted(whole(0), seed, CALL, "seed")
     poses, joints, readings = (np.random.default_rng([seed, part]) for part in (_POSES, _JOINTS, _INSTRUMENT))
     given = commands.measures if measures is None and isinstance(commands, Campaign) else measures
-    turns, *noises = _instrument(given, noise, noise_orientation)
+    what, *noises = _instrument(given, noise, noise_orientation)
     plan = _commanded(robot, rows, repeats, commands, conditions, poses)
-    plan = replace(plan, orientation=np.tile(_ALIGNED, (plan.samples, 1)) if turns else None)
+    plan = replace(plan, orientation=np.tile(_ALIGNED, (plan.samples, 1)) if what in _TURNED else None)
     plan, frames = _placed(plan, base, tool, base_known, tool_known)
     seen = observe(plan, frames)
     at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
-    return _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings)
+    if what in TOUCHED:
+        systematic = [(effect, values) for effect, values in at_work if not isinstance(effect, RandomEffect)]
+        return touched(what, plan, frames, systematic, noises[0], readings)
+    return as_kind(what, _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings))
 
 
 def _loaded(robot: Any, tool_frame: str) -> Robot:

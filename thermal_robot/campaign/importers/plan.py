@@ -246,7 +246,7 @@ _LAID_OUT: Mapping[str, Kind] = {
 }
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     **OF_CAMPAIGN,
-    "measurements": {"angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
+    "measurements": {"angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT, "kind": word(tuple(names.KINDS))},
     "table": {**_LAID_OUT, **dict.fromkeys(JOINING, _NAME)},
     "commands": _LAID_OUT,
     "columns": columns_kind,
@@ -369,7 +369,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     settings = plan.settings(robot)
     columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
-    measured = np.zeros(len(table.rows), dtype=bool)
+    measured = np.full(len(table.rows), not places)  # rows of other kinds are measured without a position
     for axis in places:
         measured |= ~np.isnan(columns[axis].numbers(table))
     notes = [*source.notes, f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
@@ -406,7 +406,13 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    known = {*names.RESERVED, *robot.joint_names, *names.conditions(robot.joint_names, robot.urdf_links)}
+    known = {
+        *names.RESERVED,
+        names.KIND,
+        *names.of_kinds(),
+        *robot.joint_names,
+        *names.conditions(robot.joint_names, robot.urdf_links),
+    }
     own = {name: name for name in table.columns if name in known or names.target_of(name) is not None}
     own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
     found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
@@ -432,7 +438,7 @@ def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, 
     whole = [name for name in (*robot.joint_names, *names.POSITION) if name in columns]
     cells: dict[str, Cells] = {}
     for name in dict.fromkeys([*whole, *columns]):
-        if name in names.LABELS:
+        if name in (*names.LABELS, names.KIND, *names.OF_KINDS):
             cells[name] = columns[name].text(table)
         else:
             cells[name] = columns[name].complete(table, name) if name in whole else columns[name].numbers(table)
