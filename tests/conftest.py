@@ -86,6 +86,8 @@ ARMS = {
     "pr2": ("example-robot-data:pr2", "l_gripper_tool_frame", "base_link"),
 }
 """Arms on which a law must hold."""
+QUICK = ("rv_m2", "awkward-from-base", "coupled", "parallelogram", "ur10", "panda")
+"""Those of every commit: the paper's, one with all that is awkward, mimics, six joints and seven; others are slow."""
 
 
 def load_arm(name):
@@ -95,7 +97,9 @@ def load_arm(name):
     return load_robot(source, tool, root_frame=root)
 
 
-@pytest.fixture(scope="session", params=list(ARMS))
+@pytest.fixture(
+    scope="session", params=[name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in ARMS]
+)
 def arm(request):
     """Each arm in turn."""
     return load_arm(request.param)

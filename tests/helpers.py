@@ -8,7 +8,8 @@ from simulate import commands, simulate
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects.apply import displacement
-from thermal_robot.kinematics import tool_poses
+from thermal_robot.inference.registration import register
+from thermal_robot.kinematics import Displacement, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot
 
@@ -55,6 +56,21 @@ def with_law(robot, law, values, seed, samples=120, fresh=100):
     rest = np.setdiff1d(np.arange(samples + fresh), mine)
     data = replace(whole.take(mine), rows=np.arange(2, samples + 2))
     return data, replace(whole.take(rest), position=None), true[rest]
+
+
+def erring(campaign, seed, noise=NOISE, **twists):
+    """The campaign measured anew in its declared frames, with displacements of joints, base or tool at work."""
+    displaced = observe(campaign, Frames.declared(campaign), displacement=Displacement(**twists))
+    drawn = np.random.default_rng(seed).normal(size=displaced.predicted_position.shape)
+    return replace(campaign, position=displaced.predicted_position + noise * drawn)
+
+
+def disturbed(campaign, effects=(), **twists):
+    """The campaign with more at work: what effects, or displacements, add to its positions."""
+    here = observe(campaign, register(campaign))
+    moved = displacement(here, effects)[0] if effects else Displacement(**twists)
+    there = observe(campaign, here.frames, displacement=moved)
+    return replace(campaign, position=campaign.position + there.predicted_position - here.predicted_position)
 
 
 def numbers(value):

@@ -5,6 +5,7 @@ import ast
 import importlib
 import pkgutil
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -209,3 +210,34 @@ def test_every_message_that_is_explained_is_one_of_the_program():
     texts = {text.replace("`", "") for text in said_in_the_program()}
     patterns = {message: ".+".join(map(re.escape, message.split("…"))) for message in messages}
     assert [said for said, pattern in patterns.items() if not any(re.search(pattern, text) for text in texts)] == []
+
+
+# ---- the site
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Build the site as `mkdocs build -f .mkdocs.yml --strict` does; its folder."""
+    pytest.importorskip("mkdocs", reason="mkdocs is not installed: the extra docs")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "-f", str(ROOT / ".mkdocs.yml"), "--strict", "-d", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return folder
+
+
+def test_every_page_is_in_it(site):
+    for page in (ROOT / "docs").glob("*.md"):
+        named = page.stem if page.stem != "index" else ""
+        assert (site / "docs" / named / "index.html").is_file(), page.name
+
+
+def test_the_reference_tells_arguments_and_errors(site):
+    shown = (site / "docs" / "reference" / "index.html").read_text(encoding="utf-8")
+    assert "CampaignError" in shown
+    assert "held_out" in shown or "joint_names" in shown
+
+
+def test_nothing_is_fetched_from_elsewhere(site):
+    start = (site / "index.html").read_text(encoding="utf-8")
+    assert "fonts.googleapis.com" not in start

@@ -51,17 +51,6 @@ def test_text_is_taken_as_it_is_and_a_file_tells_its_name(rv_m2, tmp_path):
     assert str(file) in source
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252", "unknown"])
-def test_a_file_is_read_in_its_own_encoding(encoding, rv_m2, tmp_path):
-    body = rv_m2.urdf.split("?>", 1)[-1].lstrip().replace("</robot>", "<!-- ü --></robot>")
-    head = f'<?xml version="1.0" encoding="{encoding}"?>' if encoding in ("latin-1", "unknown") else ""
-    file = tmp_path / "arm.urdf"
-    file.write_bytes((head + body).encode("latin-1" if encoding == "unknown" else encoding))
-    text = urdf_text(file)[0]
-    assert "<robot" in text
-    assert ("ü" in text) == (encoding != "unknown")
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

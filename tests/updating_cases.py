@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.sequential import Rows
+from thermal_robot.diagnosis.sequential import WeightedRows
 
 OLD, ALL, NOISE = 900, 1100, 2e-5
 EFFECTS = {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}}
@@ -32,7 +32,7 @@ def measured(rows, seed=0, gross=0.0, effects=None, **how):
 
 def in_full(campaign):
     """Rows as they come, before they are weighed."""
-    return Rows(campaign, np.ones(campaign.samples), np.zeros(campaign.samples, dtype=bool))
+    return WeightedRows(campaign, np.ones(campaign.samples), np.zeros(campaign.samples, dtype=bool))
 
 
 def far(one, other):

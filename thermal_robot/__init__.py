@@ -1,4 +1,4 @@
-"""Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks.
+"""Diagnose the gap between a robot and its model: where it enters, which effect causes it, how far it shrinks.
 
 Nothing is loaded before it is used: neither Pinocchio nor SciPy by ``import thermal_robot`` alone.
 """

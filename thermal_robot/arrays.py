@@ -1,4 +1,4 @@
-"""Type of an array of floating-point numbers, which every module writes in its signatures."""
+"""Type alias of floating-point arrays."""
 
 from __future__ import annotations
 

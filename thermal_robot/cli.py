@@ -29,20 +29,20 @@ _CHOICE = re.compile(r"invalid choice: '(?P<found>[^']*)' \(choose from (?P<know
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line that proposes what was meant, and whose texts keep their lines."""
+    """Argument parser with one-line errors that suggest what was meant."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and what was probably meant."""
+        """Exit with one line: what is wrong, and what was probably meant."""
         message = " ".join(message.split())
         meant = _CHOICE.search(message)
         meant_by = did_you_mean(meant["found"], re.findall(r"[\w-]+", meant["known"])) if meant else ""
         self.exit(BAD_INPUT, f"{self.prog}: {message}{meant_by}; see {self.prog} --help\n")
 
     def bare(self, commands: Iterable[str]) -> NoReturn:
-        """Answer a command line that says nothing."""
+        """Answer an empty command line."""
         usage = f"usage: {self.prog} COMMAND ...\nCOMMAND is one of {', '.join(commands)}.\n"
         self.exit(BAD_INPUT, f"{usage}Begin with `{self.prog} demo`; `{self.prog} --help` says more.\n")
 
@@ -95,7 +95,7 @@ def _complain(sentence: str, status: int) -> int:
 
 
 def _let_go() -> None:
-    """Let nothing more be printed: what waits for a reader that left, or for a full disk, would fail once more."""
+    """Close standard output quietly after a broken pipe or a full disk."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

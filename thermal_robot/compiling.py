@@ -1,4 +1,4 @@
-"""Loops compiled by numba, the extra ``fast``: how they are compiled, whether they can be, and who runs them."""
+"""Numba compilation of loops (the extra ``fast``), and their execution in threads."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_UNKEPT = 50
 
 
 def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"})) -> Any:
-    """Compile a function when it is first called, and keep it on disk where that can be written.
+    """Compile a function on its first call, and cache it on disk where possible.
 
     Products and sums may be contracted to one rounding, unless more or less is ``loosened``; in any case what is no
     number stays none.
@@ -37,7 +37,7 @@ def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset
 
 @cache
 def loads(kernels: str) -> bool:
-    """Whether numba is there and a module of compiled functions can be loaded; the first call loads it."""
+    """Whether numba is installed and a module of compiled functions can be loaded; the first call loads it."""
     if find_spec("numba") is None:
         return False
     try:
@@ -54,7 +54,7 @@ def loads(kernels: str) -> bool:
 
 
 def threads() -> int:
-    """How many threads work on a batch."""
+    """Return the number of threads for a batch."""
     if THREADS:
         return THREADS
     allowed = getattr(os, "sched_getaffinity", None)
@@ -62,12 +62,12 @@ def threads() -> int:
 
 
 def rows_at_once() -> int:
-    """How many rows all threads work on at a time."""
+    """Return the number of rows that all threads together process at a time."""
     return PIECE * threads()
 
 
 def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Any, ...]) -> None:
-    """Call a kernel for pieces of so many rows, in threads: with constants, first and last row, and where to write."""
+    """Run a kernel over slices of rows in threads, with its constants, first and last row, and output array."""
     count = max(1, rows // PIECE)
     workers = min(threads(), count)
     count = -(-count // workers) * workers  # as many for each, so that none waits for another

@@ -1,4 +1,4 @@
-"""What is told beside the result, on stderr: the stages of long work, and notes; as much of it as was asked for."""
+"""Messages on stderr beside the result: progress and notes, as many as were asked for."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Counted = Callable[[str, int, int], None]
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: str) -> None:
-    """Define ``-q`` and ``-v``; of several the last one counts."""
+    """Define the options ``-q`` and ``-v``; the last one given counts."""
     told = {QUIET: "print the result alone: no progress, no notes; of a diagnosis its one sentence"}
     told[VERBOSE] = "print each stage with the seconds that have passed, and what libraries warn of, on stderr"
     for loudness, text in told.items():
@@ -35,14 +35,14 @@ def add_loudness(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def note(text: str, loudness: str) -> None:
-    """Tell something that is no error, in one line."""
+    """Print a note in one line."""
     if loudness != QUIET:
         print(f"thermal-robot: note: {' '.join(text.split())}", file=sys.stderr, flush=True)
 
 
 @contextmanager
 def heard(loudness: str) -> Iterator[None]:
-    """Make notes of warnings: of the program's own, each once; of what libraries say where it is asked for."""
+    """Print warnings as notes: the program's own, each once; those of libraries only if asked for."""
     told = set()
 
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -65,7 +65,7 @@ def heard(loudness: str) -> Iterator[None]:
 
 @contextmanager
 def stages(loudness: str) -> Iterator[Callable[[str], None]]:
-    """Show the stages of work whose length nobody knows beforehand.
+    """Progress display of stages of unknown length.
 
     A terminal shows stage and time once it has lasted, without a bar. Where it is asked for, each stage is a line.
 
@@ -101,7 +101,7 @@ def stages(loudness: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def counted(loudness: str) -> Iterator[Counted]:
-    """Show how far work is whose parts are counted, and what time is left.
+    """Progress display of counted parts, with the remaining time.
 
     Bars on a terminal, elsewhere a line for every tenth.
 
@@ -127,7 +127,7 @@ def counted(loudness: str) -> Iterator[Counted]:
 
 
 def _progress(*kinds: str) -> Any:
-    """Return a display on stderr that leaves nothing behind, of columns of rich; names of stages are not markup."""
+    """Transient progress display on stderr with the given columns."""
     from rich import progress
     from rich.console import Console
 
@@ -153,7 +153,7 @@ def _tenths() -> Counted:
 
 
 def _span(seconds: float) -> str:
-    """Write a time as it is said: ``40 s``, ``12 min``, ``3.5 h``."""
+    """Format a duration: ``40 s``, ``12 min``, ``3.5 h``."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"

@@ -1,4 +1,4 @@
-"""Everything the program raises on purpose: one root, and each error carries the data that offended."""
+"""Errors that the program raises on purpose: one root class, each carrying the offending data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _LONGEST = 1000  # characters of a message: a terminal shows it on a dozen lines
 
 
 class ThermalRobotError(Exception):
-    """Root of the errors that are the user's to mend; each prints as one line that a person can read.
+    """Root of the errors that a user can fix; each prints as one line.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class CampaignError(ThermalRobotError):
     key
         Path of a value in a file that is no table, such as ``effects[2].values[3]``.
     found, expected
-        What stands there and what should.
+        Value found, and value expected.
 
     Examples
     --------
@@ -132,18 +132,18 @@ class EffectError(ThermalRobotError):
 
 
 class OwnEffectError(EffectError):
-    """An effect of the program itself that breaks its contract, which no campaign may bring about: exit status 1."""
+    """Breach of contract by one of the program's own effects; exit status 1."""
 
     def __init__(self, message: str) -> None:
         super().__init__(ours(message))
 
 
 class UnknownEffectError(EffectError, KeyError):
-    """A name that no effect of an answer has, asked for as a key is."""
+    """A name that no effect of an answer has."""
 
 
 class EstimationError(ThermalRobotError):
-    """Data that do not determine what was asked of them.
+    """Data that do not determine the estimate.
 
     Examples
     --------
@@ -157,7 +157,7 @@ class EstimationError(ThermalRobotError):
 
 
 def ours(what: str) -> str:
-    """Return what is told of a fault of the program: whose it is, and what helps to mend it."""
+    """Message on a fault of the program itself, and what helps to fix it."""
     from importlib.metadata import version
 
     program = f"thermal_robot {version('thermal-robot')}"
@@ -168,15 +168,15 @@ def ours(what: str) -> str:
 
 
 class SealError(ThermalRobotError):
-    """Sealed answers that are not those that were sealed."""
+    """Sealed answers that do not match their commitment."""
 
 
 class Note(UserWarning):
-    """Something that was left out, which is no error; the command line tells it in one line."""
+    """Warning about something that was left out; the command line prints it in one line."""
 
 
 def require(call: str, given: object, kinds: tuple[Any, ...], expected: str) -> None:
-    """Refuse an argument of a wrong kind by what is wanted instead.
+    """Refuse an argument of a wrong type, naming the expected one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all: written beside their place, flushed to the disk, then moved there at once."""
+"""Atomic file writes: written beside their place, flushed to disk, then renamed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _BESIDE = ".thermal-robot-"
 
 @contextmanager
 def whole(path: str | Path) -> Iterator[Path]:
-    """Give a place to write to, which takes the place of ``path`` at once when all is written: an atomic replace.
+    """Yield a temporary path that replaces ``path`` at the end: an atomic replace.
 
     Whoever reads ``path`` sees the file as it was or as it became, whatever happens in between. What is no file, such
     as ``/dev/stdout`` or a pipe, is written to directly; a link stays a link, and a file keeps its permissions.
@@ -60,33 +60,33 @@ def whole(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8, whole or not at all; raises as :func:`whole`."""
+    """Write UTF-8 text by an atomic replace; raises as :func:`whole`."""
     with whole(path) as place:
         place.write_text(text, encoding="utf-8")
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write bytes, whole or not at all; raises as :func:`whole`."""
+    """Write bytes by an atomic replace; raises as :func:`whole`."""
     with whole(path) as place:
         place.write_bytes(content)
 
 
 def is_file(path: Path) -> bool:
-    """Return whether there is such a file; a name that is too long, or holds a NUL, is none of a file."""
+    """Whether the file exists; a name that is too long, or holds a NUL, does not."""
     with suppress(OSError, ValueError):
         return path.is_file()
     return False
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether there is such a folder, as :func:`is_file`."""
+    """Whether the folder exists, as :func:`is_file`."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
 
 
 def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = ()) -> None:
-    """Refuse, before anything is computed, a file that could not be written, that is read from, or is named twice.
+    """Refuse beforehand an output that cannot be written, that is also an input, or that is named twice.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = (
 
 
 def written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> dict[str, str]:
-    """Write each output that was asked for, whatever becomes of the others; return what went wrong by file."""
+    """Write all requested outputs even if some fail; return the errors by file."""
     failed = {}
     for target, write in outputs:
         try:
@@ -130,5 +130,5 @@ def write_one(target: str, write: Callable[[Path], object]) -> None:
 
 
 def checksum(path: Path) -> str:
-    """Return the SHA-256 of a file's content, in hexadecimal digits."""
+    """SHA-256 of a file's content, in hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

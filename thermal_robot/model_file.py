@@ -1,4 +1,4 @@
-"""The file of a corrected model: what stands under each key, and how a damaged one is told.
+"""File format of a corrected model: schema of each key, and messages on a damaged file.
 
 A key is a field of :class:`thermal_robot.correction.CorrectedModel`. A new one is a line of :data:`PARTS`.
 """
@@ -81,7 +81,7 @@ class Part:
 
 
 def _pose(value: Any, path: str) -> Array:
-    """Take a homogeneous matrix with a proper rotation."""
+    """Validate a homogeneous matrix with a proper rotation."""
     pose: Array = matrix((4, 4))(value, path)
     turn = pose[:3, :3]
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
@@ -101,7 +101,7 @@ def _frames(value: Any, path: str) -> Frames:
 
 
 def _urdf(value: Any, path: str) -> str:
-    """Take the text of a URDF, never the name of a file."""
+    """Validate URDF text; names of files are refused."""
     urdf: str = text("the text of a URDF")(value, path)
     if not urdf.lstrip("\ufeff \t\r\n").startswith("<"):
         raise MisfitError(path, value, "the text of a URDF")
@@ -125,7 +125,7 @@ def _ends(value: Any, path: str) -> tuple[float, float]:
 
 
 def _covariance(value: Any, path: str) -> Array:
-    """Take a covariance: symmetric, and no variance negative."""
+    """Validate a covariance: symmetric, without negative variances."""
     covariance: Array = matrix()(value, path)
     size = float(np.abs(covariance).max(initial=0.0))
     if not size:
@@ -138,7 +138,7 @@ def _covariance(value: Any, path: str) -> Array:
 
 
 def _spread(value: Any, path: str) -> Spread:
-    """Take what makes a prediction uncertain."""
+    """Validate the predictive uncertainty."""
     three = listed(NOT_NEGATIVE, 3, "three standard deviations")
     known = {"covariance": _covariance, "beyond": three, "noise": three, "ranges": mapping(_ends)}
     more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE), "between": three}
@@ -185,20 +185,20 @@ PARTS: dict[str, Part] = {
 
 
 def written(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a model's fields as plain values, with the version and the checksum."""
+    """Fields of a model as plain values, with version and checksum."""
     body = {key: part.write(fields[key]) for key, part in PARTS.items() if not (part.optional and fields[key] is None)}
     found = {"schema": f"{SCHEMA}{VERSION}", **body}
     return {"schema": found["schema"], "checksum": checksum(found), **body}
 
 
 def checksum(document: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of all but the checksum itself, however the text is laid out and numbers are spelt."""
+    """SHA-256 of all but the checksum itself, independent of layout and number format."""
     rest = {key: value for key, value in document.items() if key != "checksum"}
     return hashlib.sha256(json.dumps(_spelt(rest), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def _spelt(value: Any) -> Any:
-    """Return plain values with all numbers as floats, so that 1 and 1.0 are the same."""
+    """Plain values with all numbers as floats, so that 1 and 1.0 have one checksum."""
     if isinstance(value, Mapping):
         return {key: _spelt(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
@@ -208,7 +208,7 @@ def _spelt(value: Any) -> Any:
 
 
 def fields_of(document: Any, own: Sequence[Effect], file: str) -> dict[str, Any]:
-    """Return the fields of a model from what :func:`written` returned.
+    """Fields of a model from the output of :func:`written`.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def _version(document: Any, file: str) -> int:
 
 
 def _restored(entries: Sequence[dict[str, Any]], own: Sequence[Effect], file: str) -> tuple[tuple[Effect, Array], ...]:
-    """Return the effects of a file with their values."""
+    """Effects of a file with their values."""
     known = {**library(), **{effect.name: effect for effect in own}}
     held = []
     for k, entry in enumerate(entries):
@@ -273,7 +273,7 @@ def _restored(entries: Sequence[dict[str, Any]], own: Sequence[Effect], file: st
 
 
 def _require_fit(fields: Mapping[str, Any], file: str) -> None:
-    """Refuse values that fit the schema and not each other."""
+    """Refuse values that match the schema but not each other."""
     robot, settings = fields["robot"], fields["settings"]
     for joint in settings.gears:
         if joint not in robot.joint_names:
@@ -309,7 +309,7 @@ def _require_fit(fields: Mapping[str, Any], file: str) -> None:
 
 
 def _any_rows(fields: Mapping[str, Any]) -> Campaign:
-    """Return three rows with the columns that a model needs: how many parameters an effect has depends on no more."""
+    """Three dummy rows with the columns that a model needs, to count the parameters of its effects."""
     robot, settings = fields["robot"], fields["settings"]
     lower, upper = np.maximum(robot.lower, -1.0), np.minimum(robot.upper, 1.0)
     rows = {name: np.arange(3.0) - (split_name(name)[0] == "approach") for name in fields["needs"]}
@@ -329,7 +329,7 @@ def _any_rows(fields: Mapping[str, Any]) -> Campaign:
 
 
 def read(path: Path) -> Any:
-    """Return the JSON of a file.
+    """JSON of a file.
 
     Raises
     ------
@@ -361,7 +361,7 @@ def read(path: Path) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object that has every key once."""
+    """Object without duplicate keys."""
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
@@ -371,5 +371,5 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _whole(digits: str) -> float:
-    """Return a whole number; one of hundreds of digits as it is refused later, with its place."""
+    """Whole number; one of hundreds of digits is refused later, with its path."""
     return int(digits) if len(digits) < 300 else float(digits)

@@ -1,4 +1,4 @@
-"""Robot meets campaign, once: everything that an effect may read and inference needs, frozen.
+"""Observations: a campaign with its forward kinematics, frozen; the input of effects and inference.
 
 An :class:`Observations` means "kinematics have been run": the chain is evaluated at the commands, with the frames and
 displacements that are known so far, and the gap is there. Gauss-Newton re-observes with the corrected model.
@@ -7,7 +7,7 @@ displacements that are known so far, and the gap is there. Gauss-Newton re-obser
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 from weakref import ref
@@ -23,11 +23,11 @@ from thermal_robot.kinematics import (
     chain_frames,
     frame_jacobians,
     gravity_torques,
-    log3,
     placement_sensitivities,
     quaternion_to_rotation,
     segment_loads,
 )
+from thermal_robot.observables import Sight
 from thermal_robot.robot import Robot
 
 HELD_ROWS = 60_000
@@ -37,7 +37,7 @@ its rows; what those that were not asked lately held is computed again in less t
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Where the robot stands and where the target sits.
+    """Poses of the robot's base and of the target.
 
     Attributes
     ----------
@@ -45,10 +45,13 @@ class Frames:
         (4, 4) pose of the root frame in the measurement frame.
     tool
         (4, 4) pose of the target in the tool frame.
+    artefacts
+        What rows share beside the robot, by name, such as where a stand has its sockets.
     """
 
     base: Array
     tool: Array
+    artefacts: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("base", "tool"):
@@ -60,7 +63,7 @@ class Frames:
 
     @classmethod
     def declared(cls, campaign: Campaign) -> Frames:
-        """Return the frames as the file declares them: identity base, target without turning."""
+        """Frames as the campaign declares them: identity base, target without rotation."""
         tool = np.eye(4)
         tool[:3, 3] = campaign.target
         return cls(np.eye(4), tool)
@@ -123,34 +126,34 @@ class Observations:
         return self.campaign.clock
 
     def temperature(self, link: str) -> Array | None:
-        """Return the (N,) temperature of a link, °C: its own or the robot's; ``None`` where unrecorded."""
+        """Temperature (N,) of a link, °C, or else the robot's; ``None`` where unrecorded."""
         return self.covariates.get(f"temperature.{link}", self.covariates.get("temperature"))
 
     def varies(self, column: str) -> bool:
-        """Tell whether a covariate was recorded and takes more than one value."""
+        """Whether a covariate was recorded and takes more than one value."""
         values = self.covariates.get(column)
         return values is not None and len(values) > 0 and bool(np.ptp(values) > 0)
 
     def forget(self) -> None:
-        """Free what was computed from the fields; it is computed again when it is asked for."""
+        """Free the cached kinematics; they are recomputed on demand."""
         for name in [name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)]:
             vars(self).pop(name, None)
         self.parameters.clear()
 
     @cached_property
     def chain(self) -> ChainFrames:
-        """Frames along the chain, root frame, displaced by what is known so far."""
+        """Frames along the displaced chain, root frame."""
         _hold(self)
         return chain_frames(self.robot, self.q, self.displacement)
 
     @cached_property
     def commanded(self) -> ChainFrames:
-        """The chain as it was commanded, nothing displaced: what effects follow must not depend on the effects."""
+        """Frames along the nominal chain, on which the drivers of effects depend."""
         return self.chain if self.displacement is None else chain_frames(self.robot, self.q)
 
     @cached_property
     def torque(self) -> Array | None:
-        """(N, n) joint torque in N·m: as the robot reports it where it does, else what holds the chain against gravity.
+        """Joint torque (N, n), N·m: as reported by the robot, else the holding torque against gravity.
 
         ``None`` where neither masses, nor payload, nor a torque column are there.
         """
@@ -167,81 +170,68 @@ class Observations:
 
     @cached_property
     def segment_load(self) -> Array:
-        """(N, S, 6) force (N) and moment (N·m) of gravity on each segment's far end, in the segment's own frame."""
+        """Gravity force (N) and moment (N·m), (N, S, 6), on each segment's far end, in the segment's own frame."""
         return segment_loads(
             self.robot, self.q, payload=self.covariates.get("payload"), payload_com=self.campaign.payload_com
         )
 
     @cached_property
     def predicted_position(self) -> Array:
-        """(N, 3) predicted position of the target in the measurement frame, before the instrument's own error, m."""
+        """Predicted target (N, 3), measurement frame, before the instrument's own error, m."""
         base = self.frames.base
         return self.position @ base[:3, :3].T + base[:3, 3]
 
     @cached_property
     def gap(self) -> Array:
         """(N, m) measured − predicted: displacement (m) and rotation vector (rad), in the root frame's axes."""
-        campaign, base = self.campaign, self.frames.base
-        if campaign.position is None:
+        if not self.campaign.measured:
             raise ValueError("these observations hold no measurements")
-        shift = campaign.position - self.predicted_position
-        if self.instrument is not None:
-            shift = shift - self.instrument
-        linear = shift @ base[:3, :3]
-        if campaign.orientation is None:
-            return linear
-        measured = base[:3, :3].T @ quaternion_to_rotation(campaign.orientation)
-        turn = log3(measured @ self.rotation.transpose(0, 2, 1))
-        return self._own_axes(np.hstack([linear, turn])[:, :, None])[:, :, 0]
+        return self.sight.gap
 
-    def _own_axes(self, twists: Array) -> Array:
-        """(N, 6, K) twists whose turns are about the target's own axes where several targets tell its pose.
-
-        There the noise of the turn differs by these axes; else they stay about those of the root frame.
-        """
-        if self.campaign.targets is None:
-            return twists
-        turned = self.rotation.transpose(0, 2, 1) @ twists[:, 3:]
-        return np.concatenate([twists[:, :3], turned], axis=1)
+    @cached_property
+    def sight(self) -> Sight:
+        """What the rows say, each by its kind of measurement."""
+        pose, artefacts = (self.position, self.rotation), self.frames.artefacts
+        return Sight.of(self.campaign, pose, self.frames.base, self.instrument, artefacts)
 
     def in_root_axes(self, turns: Array) -> Array:
-        """(N, 3) turns as the gap has them, rotation vectors in rad, about the axes of the root frame."""
+        """Rotation vectors (N, 3) of the gap, rad, in root frame axes."""
         return turns if self.campaign.targets is None else np.einsum("nij,nj->ni", self.rotation, turns)
 
     @cached_property
     def lever(self) -> Array:
-        """(N, 3) from the tool frame's origin to the target, root frame axes, m."""
+        """Lever arm (N, 3) from the tool frame's origin to the target, root frame axes, m."""
         return self.chain.tool_rotation @ self.frames.tool[:3, 3]
 
     @cached_property
     def joint_sensitivity(self) -> Array:
-        """(N, 6, n) LOCAL_WORLD_ALIGNED Jacobian at the target."""
+        """Geometric Jacobian (N, 6, n) at the target, LOCAL_WORLD_ALIGNED."""
         found = frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
-        return self._own_axes(found)
+        return self.sight.sees(found)
 
     @cached_property
     def segment_sensitivity(self) -> Array:
-        """(N, 6, S, 6) twist of the target (LOCAL_WORLD_ALIGNED) a unit twist of each segment's placement."""
+        """Kinematic regressor (N, 6, S, 6): twist of the target per unit twist of each segment's placement."""
         found = placement_sensitivities(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
-        return self._own_axes(found.reshape(len(found), 6, -1)).reshape(found.shape)
+        return self.sight.sees(found.reshape(len(found), 6, -1)).reshape(found.shape)
 
     @cached_property
     def base_sensitivity(self) -> Array:
-        """(N, 6, 6) twist of the target a unit twist of the base, root frame."""
+        """Twist (N, 6, 6) of the target per unit twist of the base, root frame."""
         point = self.chain.tool_position + self.lever
-        return self._own_axes(_twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point))
+        return self.sight.sees(_twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point))
 
     @cached_property
     def tool_sensitivity(self) -> Array:
         """(N, 6, 6) twist of the target a unit twist of the tool, tool frame."""
-        return self._own_axes(_twist_map(self.chain.tool_rotation, self.lever))
+        return self.sight.sees(_twist_map(self.chain.tool_rotation, self.lever))
 
 
 _HOLDING: list[ref[Observations]] = []
 
 
 def _hold(observations: Observations) -> None:
-    """Let those that ran their kinematics longest ago forget them, until all together hold few enough rows."""
+    """Free the least recently used kinematics until all together hold few enough rows."""
     holding = [found for each in _HOLDING if (found := each()) is not None and "chain" in vars(found)]
     rows = observations.campaign.samples + sum(found.campaign.samples for found in holding)
     while holding and rows > HELD_ROWS:
@@ -251,7 +241,7 @@ def _hold(observations: Observations) -> None:
 
 
 def _twist_map(axes: Array, arm: Array) -> Array:
-    """Twist at a point ``arm`` away from a frame with the given axes: [[R, −[arm]× R], [0, R]] in rows of 6."""
+    """Adjoint map of twists to a point ``arm`` away: [[R, −[arm]× R], [0, R]] in rows of 6."""
     mapped = np.zeros((len(arm), 6, 6))
     mapped[:, :3, :3] = axes
     mapped[:, 3:, 3:] = axes
@@ -267,7 +257,7 @@ def observe(
     displacement: Displacement | None = None,
     instrument: Array | None = None,
 ) -> Observations:
-    """Run the kinematics of a campaign.
+    """Run the forward kinematics of a campaign.
 
     Parameters
     ----------
@@ -314,4 +304,7 @@ def observe(
     found = Observations(campaign, frames, position, rotation, instrument, displacement)
     _hold(found)
     vars(found)["chain"] = chain  # as the property would find it
+    own = found.sight.artefacts
+    if any(frames.artefacts.get(name) is not artefact for name, artefact in own.items()):
+        object.__setattr__(found, "frames", replace(frames, artefacts={**frames.artefacts, **own}))
     return found

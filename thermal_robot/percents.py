@@ -10,7 +10,7 @@ _MOST = 4  # decimals: a share that is still rounded to all with them is told as
 
 
 def percent(share: float | None, decimals: int = 1) -> str:
-    """Write a share in per cent, as ``96.0 %``; what is not all is never rounded to 100 %.
+    """Format a share in per cent, as ``96.0 %``; less than 1 never rounds to 100 %.
 
     Parameters
     ----------

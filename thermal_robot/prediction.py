@@ -1,4 +1,4 @@
-"""How far a prediction may be off: parameters that are not exactly known, what no effect tells, the instrument."""
+"""Predictive uncertainty: parameters, residual and instrument."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from thermal_robot.observations import Observations
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """What makes a prediction uncertain, and where the model was measured.
+    """Predictive uncertainty of a model, and the range in which it was measured.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Spread:
     between: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return lists and numbers, ready for JSON."""
+        """Plain values, ready for JSON."""
         arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
         more = {"wider": self.wider, "prior": self.prior, "between": self.between}
         told = {name: values.tolist() for name, values in more.items() if values is not None}
@@ -68,20 +68,20 @@ class Spread:
         outside: Sequence[tuple[str, ...]],
         noise: bool,
     ) -> Array:
-        """(N, 3) one standard deviation per axis of a prediction, measurement frame, m.
+        """Return the standard deviation (N, 3) per axis of a prediction, measurement frame, m.
 
         NaN where the covariance is of other effects.
 
         Parameters
         ----------
         observations
-            Of the corrected model.
+            Observations of the corrected model.
         effects
             Its effects with their (P,) values.
         outside
-            Of the same rows, as :meth:`outside` tells it.
+            Extrapolation of the same rows, as :meth:`outside` returns it.
         noise
-            Whether the instrument's noise counts: what a measurement may differ by, or where the target is.
+            Whether to include the instrument's noise.
         """
         moved = sensitivity(observations, [effect for effect, _ in effects])
         if moved.shape[2] != len(self.covariance):
@@ -105,7 +105,7 @@ class Spread:
         return np.asarray(np.sqrt(variance))
 
     def _apart(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], label: str) -> Array:
-        """(N, 3) variance per axis of what the effects, and what they leave, do at the levels of a label, m²."""
+        """Variance (N, 3) per axis of differences between levels of a label, m²."""
         campaign, moved = observations.campaign, []
         for level in self.levels[label]:
             labels = {**campaign.labels, label: np.full(campaign.samples, level)}
@@ -116,9 +116,9 @@ class Spread:
         return np.asarray(np.var(moved, axis=0, ddof=1) + left**2)
 
     def outside(self, samples: Campaign, effects: Sequence[tuple[Effect, Array]] = ()) -> tuple[tuple[str, ...], ...]:
-        """Return for each row the joints, columns and labels in which it leaves what was measured.
+        """Joints, columns and labels in which each row leaves the measured range (extrapolation).
 
-        Rows without a label stand at no level of it: that counts where one of the effects follows it.
+        A row without a label counts as outside if one of the effects follows that label.
         """
         followed = {effect.quantity for effect, _ in effects if isinstance(effect, Discovered) and effect.labels}
         joints = samples.robot.joint_names
@@ -138,7 +138,7 @@ class Spread:
 
 
 class Prediction(NamedTuple):
-    """What the instrument would measure, and how sure that is.
+    """Predicted measurement with its standard deviation.
 
     Attributes
     ----------
@@ -174,8 +174,9 @@ def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
 
 
 def moves(names: Sequence[str]) -> NDArray[np.bool_]:
-    """(f,) which columns of the unknown frames, by their names, move the target: not those of its turn on the tool."""
-    return np.array([name != "tool" or k < names.index("tool") + 3 for k, name in enumerate(names)], dtype=bool)
+    """(f,) which columns of the unknown frames move the target, by name: no turn on the tool, no artefact."""
+    place = [name == "base" or (name == "tool" and k < names.index("tool") + 3) for k, name in enumerate(names)]
+    return np.array(place, dtype=bool)
 
 
 def by_parameters(moved: Array, covariance: Array) -> Array:

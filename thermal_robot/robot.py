@@ -1,4 +1,4 @@
-"""The robot: one chain of a URDF, from a root frame to a tool frame, with the segments that can grow."""
+"""Robot model: one chain of a URDF, from a root frame to a tool frame, with the segments that can grow."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ENDS = ("tool_frame", "root_frame")
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """The placement of a movable joint, or of a fixed frame with a length: where a link may be bent or grow.
+    """Placement of a movable joint, or of a fixed frame with a length: where a link may bend or grow.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Segment:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot:
-    """One kinematic chain with n joints that can be driven and S segments; made by :func:`load_robot`, then unchanged.
+    """Kinematic chain with n driven joints and S segments; made by :func:`load_robot`, immutable.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Robot:
     urdf_links, urdf_joints
         Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     folder
-        Of the URDF's file, from which its meshes are named; ``None`` where it came as text.
+        Folder of the URDF's file, to which mesh paths are relative; ``None`` where it came as text.
 
     Examples
     --------
@@ -125,12 +125,12 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Number of joints that can be driven."""
+        """Number of driven joints."""
         return len(self.joint_names)
 
     @property
     def mass(self) -> float:
-        """Of all that the joints carry, kg; 0 where the URDF gives none."""
+        """Moving mass, kg; 0 where the URDF gives none."""
         return float(np.sum(self.chain.masses))
 
     def __repr__(self) -> str:
@@ -145,7 +145,7 @@ class Robot:
         return html_table(rows, head=("joint", "type", "lower limit", "upper limit"), heading=heading)
 
     def forward(self, q: ArrayLike) -> Array:
-        """Return the pose of the tool frame in the root frame.
+        """Forward kinematics: pose of the tool frame in the root frame.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Robot:
         return self._at(tool_poses, q)
 
     def jacobian(self, q: ArrayLike) -> Array:
-        """Return the Jacobian of the tool frame: velocity of its origin, then angular velocity, in root frame axes.
+        """Geometric Jacobian of the tool frame: linear, then angular velocity, in root frame axes.
 
         Pinocchio calls it ``LOCAL_WORLD_ALIGNED``.
 
@@ -205,7 +205,7 @@ class Robot:
         return self._at(frame_jacobians, q)
 
     def _at(self, function: Callable[[Robot, Array], Array], q: ArrayLike) -> Array:
-        """Return what a function of many configurations says of these, or of this one."""
+        """Apply a batch function to many configurations, or to a single one."""
         rows = self._configurations(q)
         found = function(self, np.atleast_2d(rows))
         return found if rows.ndim == 2 else np.asarray(found[0])
@@ -297,7 +297,7 @@ def load_robot(
 
 
 def joint_range(robot: Robot) -> tuple[Array, Array]:
-    """(n,) and (n,): the limits, rad or m, and 2.4 rad for a joint that can turn once round; infinite where none."""
+    """Joint ranges (n,) and (n,): limits, rad or m, 2.4 rad for a joint of a full turn; infinite where unlimited."""
     turns = np.array([kind != "prismatic" for kind in robot.joint_types])
     round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
     low = np.where(round_, np.maximum(robot.lower, -WIDE), robot.lower)

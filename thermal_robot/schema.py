@@ -1,4 +1,4 @@
-"""What a plain value must be, as JSON, TOML or a caller gives it: its type, its shape, its range.
+"""Validation of plain values from JSON, TOML or a caller: type, shape, range.
 
 A kind is a function of a value and its path that returns the value as the program wants it, or raises
 :class:`MisfitError` with the path. Kinds are put together: ``record({"noise": optional(number(least=0.0))})``. Who
@@ -26,7 +26,7 @@ _MOST_SHOWN = 60
 
 
 class MisfitError(ValueError):
-    """A value that is not of its kind: where, what stands there, what is expected, and in words what is wrong."""
+    """A value that does not match its schema: path, value, expectation, and reason."""
 
     def __init__(self, path: str, value: Any, expected: str, problem: str = "") -> None:
         super().__init__(f"{path}: {problem or shown(value)}, expected {expected}")
@@ -34,7 +34,7 @@ class MisfitError(ValueError):
 
 
 def fitted(kind: Kind, value: Any, file: str, path: str = "") -> Any:
-    """Return a value of a file as its kind wants it.
+    """Validate a value of a file against its schema.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def fitted(kind: Kind, value: Any, file: str, path: str = "") -> Any:
 
 
 def shown(value: Any) -> str:
-    """Return a value as a file writes it, shortened."""
+    """Write a value as in a file, shortened."""
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     if value is None or isinstance(value, bool):
@@ -62,7 +62,7 @@ def shown(value: Any) -> str:
 
 
 def text(expected: str = "text", *, empty: bool = False) -> Kind:
-    """Take text that can be written in UTF-8, not empty unless that is said, without NUL."""
+    """Return a validator of UTF-8 text without NUL, not empty unless stated."""
 
     def kind(value: Any, path: str) -> str:
         if not isinstance(value, str) or not (empty or value.strip()) or "\0" in value:
@@ -77,7 +77,7 @@ def text(expected: str = "text", *, empty: bool = False) -> Kind:
 
 
 def word(allowed: Iterable[str], problem: str = "") -> Kind:
-    """Take one of some words."""
+    """Return a validator of one of some words."""
     words = tuple(allowed)
     expected = alternatives(words)
 
@@ -90,12 +90,12 @@ def word(allowed: Iterable[str], problem: str = "") -> Kind:
 
 
 def alternatives(words: Iterable[str]) -> str:
-    """Say which words are allowed."""
+    """List of the allowed words, for a message."""
     return " or ".join(f'"{word}"' for word in words)
 
 
 def boolean(value: Any, path: str) -> bool:
-    """Take true or false."""
+    """Validate true or false."""
     if not isinstance(value, (bool, np.bool_)):
         raise MisfitError(path, value, "true or false")
     return bool(value)
@@ -109,7 +109,7 @@ def number(
     expected: str = "a finite number",
     problem: str = "",
 ) -> Kind:
-    """Take a finite number in a range; ``problem`` is said of one outside it."""
+    """Return a validator of a finite number in a range; ``problem`` is the message for one outside it."""
 
     def kind(value: Any, path: str) -> float:
         try:
@@ -130,7 +130,7 @@ POSITIVE = number(above=0.0, expected="a number above 0")
 
 
 def whole(least: int) -> Kind:
-    """Take a whole number from ``least`` on."""
+    """Return a validator of a whole number of at least ``least``."""
 
     def kind(value: Any, path: str) -> int:
         if not isinstance(value, Integral) or value is True or value is False or not least <= int(value) <= LARGEST:
@@ -141,7 +141,7 @@ def whole(least: int) -> Kind:
 
 
 def listed(item: Kind, count: int | None = None, expected: str = "") -> Kind:
-    """Take a list of values of one kind, as many as ``count`` where that is given; a tuple is returned."""
+    """Return a validator of a list, ``count`` items where given; it returns a tuple."""
     expected = expected or (f"a list of {count} values" if count is not None else "a list")
 
     def kind(value: Any, path: str) -> tuple[Any, ...]:
@@ -154,7 +154,7 @@ def listed(item: Kind, count: int | None = None, expected: str = "") -> Kind:
 
 
 def matrix(shape: tuple[int | None, int | None] = (None, None)) -> Kind:
-    """Take rows of equal length, of finite numbers; an array is returned."""
+    """Return a validator of rows of finite numbers of equal length; it returns an array."""
     rows, columns = shape
 
     def kind(value: Any, path: str) -> Any:
@@ -168,7 +168,7 @@ def matrix(shape: tuple[int | None, int | None] = (None, None)) -> Kind:
 
 
 def increasing(item: Kind) -> Kind:
-    """Take a list of numbers, each above the one before."""
+    """Return a validator of a strictly increasing list of numbers."""
 
     def kind(value: Any, path: str) -> tuple[float, ...]:
         found: tuple[float, ...] = listed(item)(value, path)
@@ -181,7 +181,7 @@ def increasing(item: Kind) -> Kind:
 
 
 def optional(item: Kind) -> Kind:
-    """Take a value, or null."""
+    """Return a validator of a value, or null."""
 
     def kind(value: Any, path: str) -> Any:
         return None if value is None else item(value, path)
@@ -190,7 +190,7 @@ def optional(item: Kind) -> Kind:
 
 
 def either(one: Kind, lists: Kind) -> Kind:
-    """Take a list of one kind, or something that is no list, of the other."""
+    """Return a validator that uses ``lists`` for lists, ``one`` for other values."""
 
     def kind(value: Any, path: str) -> Any:
         return (lists if isinstance(value, (list, tuple)) else one)(value, path)
@@ -199,7 +199,7 @@ def either(one: Kind, lists: Kind) -> Kind:
 
 
 def mapping(item: Kind) -> Kind:
-    """Take values of one kind under keys of the user's own."""
+    """Return a validator of an object with arbitrary keys and values of one kind."""
 
     def kind(value: Any, path: str) -> dict[str, Any]:
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
@@ -210,7 +210,7 @@ def mapping(item: Kind) -> Kind:
 
 
 def record(known: Mapping[str, Kind], may_lack: Iterable[str] = ()) -> Kind:
-    """Take values under known keys: no other key, and none lacks but those that may."""
+    """Return a validator of an object with known keys; all are required but those that ``may_lack``."""
     spare = frozenset(may_lack)
 
     def kind(value: Any, path: str) -> dict[str, Any]:
@@ -228,7 +228,7 @@ def record(known: Mapping[str, Kind], may_lack: Iterable[str] = ()) -> Kind:
 
 
 def plain(value: Any, path: str) -> Any:
-    """Take anything that JSON holds, its numbers finite; lists become tuples."""
+    """Validate any JSON value with finite numbers; lists become tuples."""
     if isinstance(value, Mapping):
         return mapping(plain)(value, path)
     if isinstance(value, (list, tuple)):
@@ -242,5 +242,5 @@ def plain(value: Any, path: str) -> Any:
 
 
 def below(path: str, key: str) -> str:
-    """Return the path of a key of an object, as ``effects[2].arguments.span``."""
+    """Path of a key inside an object, as ``effects[2].arguments.span``."""
     return f"{path}.{key}".lstrip(".") if key.isidentifier() else f"{path}[{key!r}]"

@@ -1,4 +1,4 @@
-"""What a robot looks like: the visual shapes of its URDF, as they are and as coarse convex hulls, in its postures."""
+"""Visual geometry of a URDF: meshes, and coarse convex hulls posed by forward kinematics."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CORNERS = 80
 
 
 def find_mesh(named: str, folder: Path) -> Path | None:
-    """Return the file of a mesh, ``None`` where there is none; nothing is fetched from another machine.
+    """File of a mesh, ``None`` where it is missing; nothing is downloaded.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _places(named: str, folder: Path) -> Iterator[Path]:
 
 
 def parsed(urdf: str) -> Any:
-    """Return the robot that a URDF's text describes, as a ``yourdfpy.Robot``, without its meshes.
+    """URDF text parsed to a ``yourdfpy.Robot``, without its meshes.
 
     Raises
     ------
@@ -86,14 +86,14 @@ def parsed(urdf: str) -> Any:
 
 
 def visuals(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
-    """Return by link its visual shapes, and the names of meshes that cannot be read.
+    """Visual shapes by link, and the names of unreadable meshes.
 
     Parameters
     ----------
     robot
         As :func:`parsed` returns it.
     folder
-        From which paths of meshes start.
+        Folder to which mesh paths are relative.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def visuals(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, l
 
 
 def _shape(geometry: Any, folder: Path) -> Any:
-    """Return the shape of one visual in its own frame; ``None`` where there is none, or no file that can be read."""
+    """Geometry of one visual in its own frame; ``None`` without one, or without a readable file."""
     import trimesh
 
     if geometry.box is not None:
@@ -137,12 +137,12 @@ def _shape(geometry: Any, folder: Path) -> Any:
 
 
 def placement(origin: Any) -> Array:
-    """Return an origin as (4, 4); the identity where a URDF gives none."""
+    """Origin as a (4, 4) pose; identity where a URDF gives none."""
     return np.eye(4) if origin is None else np.asarray(origin, dtype=float)
 
 
 def hulls(robot: Robot) -> list[tuple[str, Any]]:
-    """Return the coarse convex hulls of the visual shapes between root frame and tool frame.
+    """Coarse convex hulls of the visual shapes between root frame and tool frame.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def hulls(robot: Robot) -> list[tuple[str, Any]]:
 
 
 def hull(points: Array) -> Any:
-    """Return the convex hull of (P, 3) points, coarsened, as a ``trimesh.Trimesh``; ``None`` where it is flat.
+    """Coarse convex hull of (P, 3) points as a ``trimesh.Trimesh``; ``None`` where it is flat.
 
     Of many points those are kept that lie farthest in directions spread evenly over a sphere, the golden spiral.
     """
@@ -187,7 +187,7 @@ def hull(points: Array) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """L links of a chain in R postures, with the shares 0..1 of the gap's mean square that enter at each place.
+    """Poses of L links in R postures, and the share 0..1 of the gap's mean square by place.
 
     ``links`` are named from the root frame to the tool frame; ``poses`` (R, L, 4, 4) stand in the root frame, m, as the
     model has them at what was commanded; ``joints`` are the J movable ones, those that mimic another too; ``moves``
@@ -208,7 +208,7 @@ class Arm:
 
 
 def arm(robot: Robot, q: ArrayLike, shares: Mapping[tuple[str, str], float]) -> Arm:
-    """Return the arm in (R, n) joint positions, rad or m, with the ``shares`` of its places by kind and name."""
+    """Forward kinematics of all links at (R, n) joint positions, rad or m, with the ``shares`` of their places."""
     chain = robot.chain
     links = (*chain.parent_links, robot.tool_frame)
     joints = [chain.names[k] for k in chain.movable]

@@ -1,4 +1,4 @@
-"""``-`` for standard input and output: made a file at the edge, so that nothing else need know of streams."""
+"""``-`` for standard input and output, copied to and from temporary files at the command line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 @contextmanager
 def piped(options: argparse.Namespace) -> Iterator[None]:
-    """Let a command read a file that holds standard input, and print the file that it wrote for standard output.
+    """Replace ``-`` among a command's files by temporary ones, fed from standard input or copied to standard output.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def piped(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> str:
-    """Return the option that stands for a stream, or nothing."""
+    """Option whose file is a stream; empty without one."""
     found = [name for name in names if getattr(options, name) == "-"]
     if len(found) > 1:
         said = f"- as {' and as '.join(found)}"
@@ -65,7 +65,7 @@ def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> st
 
 
 def _read() -> bytes:
-    """Read all of standard input, within bounds."""
+    """Read all of standard input, up to a size limit."""
     source = "text from a file or another program"
     if sys.stdin is None or sys.stdin.closed:
         raise CampaignError(STDIN, "is closed", expected=source)
@@ -86,7 +86,7 @@ def _read() -> bytes:
 
 
 def _print(content: bytes) -> None:
-    """Print bytes as they are; as text where there is no stream of bytes beneath."""
+    """Write bytes to standard output; as text where there is no binary stream."""
     sys.stdout.flush()
     if hasattr(sys.stdout, "buffer"):
         sys.stdout.buffer.write(content)

@@ -1,4 +1,4 @@
-"""Rows of text as a table: HTML of a notebook, or lines of a terminal."""
+"""Tables of text: HTML for a notebook, aligned lines for a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _CELL = 'style="text-align: left; vertical-align: top"'
 
 
 def html_table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), heading: str = "") -> str:
-    """Return rows as an HTML table that takes its looks from the notebook around it.
+    """HTML table of rows, styled by the surrounding notebook.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def _row(cells: Sequence[str], wide: int, tag: str) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
-    """Return rows as lines whose columns stand below each other, those numbered ``left`` to the left."""
+    """Lines of aligned columns, those numbered ``left`` flush left."""
     wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
     padded = [
         [cell.ljust(w) if k in left else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, wide, strict=True))]

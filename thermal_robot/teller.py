@@ -1,4 +1,4 @@
-"""The port through which results are put into words and drawn: who does so is registered here, and loaded late."""
+"""Registry of the renderer that puts results into words and figures, imported on first use."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 
 class Teller(Protocol):
-    """Who puts results into words and draws them: a module, or an object, with these functions of one result.
+    """Renderer: a module, or an object, with these functions of one result.
 
     A headline and an advice are one plain sentence, a text is all of it, a fragment is HTML without a page around it.
     """
@@ -34,12 +34,12 @@ _tellers: list[Teller] = []
 
 
 def told_by(teller: Any) -> None:
-    """Register who puts every result into words and figures from now on: see :class:`Teller`."""
+    """Register the renderer of all results: see :class:`Teller`."""
     _tellers[:] = [teller]
 
 
 def registered() -> Teller:
-    """Return who was registered last.
+    """Return the renderer that was registered last.
 
     Raises
     ------

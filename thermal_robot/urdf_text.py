@@ -1,4 +1,4 @@
-"""Where the text of a robot comes from: a file, the package, example-robot-data, or what can write itself as URDF."""
+"""Sources of URDF text: a file, the package, example-robot-data, or an object that exports URDF."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}
 
 @runtime_checkable
 class WritesUrdf(Protocol):
-    """Anything that can write itself as URDF, such as a ``yourdfpy.URDF``."""
+    """Protocol of objects that export URDF, such as a ``yourdfpy.URDF``."""
 
     def write_xml_string(self) -> bytes | str:
-        """Return the XML text."""
+        """XML text."""
 
 
 class Source(NamedTuple):
-    """XML text, what to call it in an error, and the folder that its meshes are named from; ``None`` without a file."""
+    """URDF text, its name in errors, and the folder to which mesh paths are relative; ``None`` without a file."""
 
     text: str
     called: str
@@ -40,7 +40,7 @@ class Source(NamedTuple):
 
 
 def urdf_text(urdf: str | Path | WritesUrdf) -> Source:
-    """Return the text of a robot and where it comes from; see :func:`~thermal_robot.robot.load_robot` for errors."""
+    """URDF text of a robot and its source; errors as :func:`~thermal_robot.robot.load_robot`."""
     if isinstance(urdf, str):
         text = urdf.lstrip("\ufeff \t\r\n")
         if not text or text.startswith("<"):
@@ -58,7 +58,7 @@ def urdf_text(urdf: str | Path | WritesUrdf) -> Source:
 
 
 def _written(urdf: WritesUrdf) -> str:
-    """Text of a robot that writes itself, with the mimic tags that yourdfpy (to 0.0.60) reads but does not write."""
+    """Return the exported text of a robot, with the mimic tags that yourdfpy (to 0.0.60) reads but does not write."""
     written = urdf.write_xml_string()
     text = written.decode() if isinstance(written, bytes) else written
     joints = getattr(getattr(urdf, "robot", None), "joints", ())
@@ -93,7 +93,7 @@ def _read(path: Path) -> Source:
 
 
 def _decoded(content: bytes) -> str:
-    """Text of a file, whatever it says of its encoding; bytes that are none become marks."""
+    """Text of a file, whatever encoding it declares; invalid bytes become replacement characters."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", errors="replace")
     try:
@@ -107,7 +107,7 @@ def _decoded(content: bytes) -> str:
 
 
 def shipped() -> Iterator[str]:
-    """Yield the names of the robots of the package and of example-robot-data, where that is installed."""
+    """Yield the names of the robots of the package and, where installed, of example-robot-data."""
     yield from (BUILTIN + path.stem for path in sorted(_builtin_folder().glob("*.urdf")))
     try:
         from example_robot_data.robots_loader import ROBOTS
@@ -155,6 +155,6 @@ def _example_path(name: str) -> Path:
 
 
 def unknown(name: str, known: list[str], what: str) -> RobotError:
-    """Return the error of a name that does not exist, with the nearest ones that do."""
+    """Error for an unknown name, with the nearest known ones."""
     near = tuple(difflib.get_close_matches(name, known, n=5, cutoff=0.3)) or tuple(known)
     return RobotError(f"there is no {what} {name!r}; nearest: {', '.join(near)}", name=name, candidates=near)

@@ -138,15 +138,6 @@ def test_sensitivity_is_the_displacement_for_a_kelvin_in_one_segment(arm, config
     np.testing.assert_allclose(per_kelvin[:, :, 0], np.tile(per_kelvin[:1, :, 0], (6, 1)), atol=1e-18)
 
 
-def test_the_first_joint_turns_the_displacement(rv_m2):
-    turned = Q[:1] + np.array([[0.0], [0.4], [-1.7]]) * np.eye(5)[0]
-    moved = displacement(rv_m2, turned, PAPER)
-    np.testing.assert_allclose(moved[:, 2], moved[0, 2], atol=1e-18)
-    np.testing.assert_allclose(np.hypot(*moved[:, :2].T), np.hypot(*moved[0, :2]), rtol=1e-13)
-    # q1 counts from +y towards +x.
-    np.testing.assert_allclose(np.tan(turned[:, 0]), moved[:, 0] / moved[:, 1], rtol=1e-12)
-
-
 def test_the_papers_u_and_what_it_could_have_missed():
     found = mean_shift_test(MEANS, STATIC, SIGMA, n=100)
     np.testing.assert_allclose(found.u, [[-0.71, 1.11, 1.18], [1.30, 0.00, 1.11]], atol=0.005)

@@ -20,31 +20,23 @@ from thermal_robot.inference.columns import moved_by
 
 UNKNOWN = {"base": np.eye(4), "tool": np.eye(4)}
 NOISE = 2e-5
+RV_M2 = ("builtin:rv_m2", "tool0")
+WORN = {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}}
+UR10 = ("example-robot-data:ur10", "tool0")
+DRIFTING = {"joint_gain": {"elbow_joint": 5e-4}, "drift": np.array([1e-4, 0.0, 2e-4, 0.0, 0.0, 0.0])}
 CASES = {
-    "zeros and play, RV-M2": (
-        ("builtin:rv_m2", "tool0"),
-        {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}},
-        {},
-    ),
-    "zeros and play, poses": (
-        ("builtin:rv_m2", "tool0"),
-        {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}},
-        {"measures": "pose", "noise_orientation": 3e-5},
-    ),
+    "zeros and play, RV-M2": (RV_M2, WORN, {}),
+    "zeros and play, poses": (RV_M2, WORN, {"measures": "pose", "noise_orientation": 3e-5}),
     "warming links, UR5": (("example-robot-data:ur5", "tool0"), {"thermal_elongation": 1.5e-5}, {}),
-    "gains and drift, UR10": (
-        ("example-robot-data:ur10", "tool0"),
-        {"joint_gain": {"elbow_joint": 5e-4}, "drift": np.array([1e-4, 0.0, 2e-4, 0.0, 0.0, 0.0])},
-        {},
-    ),
-    "compliance, UR10": (("example-robot-data:ur10", "tool0"), {"joint_compliance": 2e-6}, {}),
+    "gains and drift, UR10": (UR10, DRIFTING, {}),
+    "compliance, UR10": (UR10, {"joint_compliance": 2e-6}, {}),
 }
 """Robot, effects at work, and what is measured."""
 
 
-def measured(case, rows, seed, noise_known=True, gross=0.0):
+def measured(case, rows, seed, noise_known=True, gross=0.0, effects=None):
     """Return a campaign of a case, its temperature and payload going up and down; some rows are gross errors."""
-    robot, effects, how = CASES[case]
+    robot, own, how = CASES[case]
     rng = np.random.default_rng([3, seed])
     clock = np.arange(float(rows))
     conditions = {
@@ -52,17 +44,8 @@ def measured(case, rows, seed, noise_known=True, gross=0.0):
         "temperature": 24.0 + 4.0 * np.sin(clock / 37.0) + 0.1 * rng.normal(size=rows),
         "payload": rng.choice([0.0, 2.0, 4.0], rows),
     }
-    found = tr.simulate(
-        robot[0],
-        effects,
-        tool_frame=robot[1],
-        rows=rows,
-        noise=NOISE,
-        seed=seed,
-        conditions=conditions,
-        **UNKNOWN,
-        **how,
-    )
+    how = {**UNKNOWN, **how, "rows": rows, "noise": NOISE, "seed": seed, "conditions": conditions}
+    found = tr.simulate(robot[0], effects or own, tool_frame=robot[1], **how)
     place = found.position + (rng.uniform(size=rows) < gross)[:, None] * 1e-3 * rng.normal(size=(rows, 3))
     return replace(found, position=place, noise_position=found.noise_position if noise_known else None)
 
@@ -165,17 +148,12 @@ def false(seeds, old=300, batches=20, more=50):
 def change(seeds, old=300, more=100):
     """Count how often the choice falls where play begins in another joint with the new rows."""
     case, found_at = "zeros and play, RV-M2", {}
-    robot, effects, how = CASES[case]
     for seed in range(seeds):
         whole = measured(case, old, 2000 + seed)
         found = tr.diagnose(whole)
         for size in (0.5e-4, 1e-4, 2e-4, 3e-4):
-            changed = {**effects, "backlash": {**effects["backlash"], "joint_4": size}}
-            kept = CASES[case]
-            CASES[case] = (robot, changed, how)
-            new = measured(case, more, 3000 + seed)
-            CASES[case] = kept
-            updated = found.update(new)
+            changed = {**WORN, "backlash": {**WORN["backlash"], "joint_4": size}}
+            updated = found.update(measured(case, more, 3000 + seed, effects=changed))
             found_at.setdefault(size, []).append((not updated.choice_stands, "joint_4" in updated.reason))
         print(seed, {s: np.mean(v, axis=0).tolist() for s, v in found_at.items()}, flush=True)
 

@@ -11,22 +11,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Effort:
-    """How much time may be spent on a figure.
+    """How much time may be spent on a figure."""
 
-    Attributes
-    ----------
-    long_enough
-        Seconds that one measurement lasts at least: short calls are made several times.
-    turns, budget
-        Turns at most, and seconds after which no further one begins once there are three.
-    largest
-        Configurations, covariances, rows or places at most.
-    """
-
-    long_enough: float
-    turns: int
-    budget: float
-    largest: int
+    long_enough: float  # seconds that one measurement lasts at least: short calls are made several times
+    turns: int  # at most
+    budget: float  # seconds after which no further turn begins once there are three
+    largest: int  # configurations, covariances, rows or places at most
 
 
 FEWEST = 3

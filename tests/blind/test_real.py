@@ -15,8 +15,8 @@ from thermal_robot import diagnose
 from thermal_robot.blind import real as faults
 from thermal_robot.blind.real import REMAINDERS, RealCase, judged, real_cases
 from thermal_robot.campaign import read_campaign, read_samples
-from thermal_robot.kinematics import exp6, placement_sensitivities
-from thermal_robot.observations import Frames, observe
+from thermal_robot.kinematics import placement_sensitivities
+from thermal_robot.observations import observe
 
 UM = 1e-6
 
@@ -304,20 +304,6 @@ def own(rv_m2):
     return simulate(rv_m2, samples=40, seed=3)[0]
 
 
-def test_a_joint_error_moves_the_prediction_as_the_joint_would(own):
-    frames = Frames.declared(own)
-    error = np.linspace(-2e-3, 1e-3, 40)
-    changed = faults.with_joint_error(own, 2, error)
-    assert np.array_equal(changed.position, own.position)
-    assert np.array_equal(np.delete(changed.q, 2, axis=1), np.delete(own.q, 2, axis=1))
-    # what the robot did is what the table says and the error
-    change = observe(own, frames).joint_sensitivity[:, :3, 2] * error[:, None] @ frames.base[:3, :3].T
-    moved = observe(own, frames).predicted_position - observe(changed, frames).predicted_position
-    # to first order: the second is the lever times half the square of the angle
-    assert moved == pytest.approx(change, abs=2e-6)
-    assert np.abs(change).max() > 100e-6
-
-
 def test_what_frames_can_do_leaves_nothing(own):
     seen = observe(own, faults.registered(own))
     columns = faults.frame_columns(seen)
@@ -326,15 +312,6 @@ def test_what_frames_can_do_leaves_nothing(own):
     one_row[7, 1] = 1e-3
     # never more than there was, and of one row alone nearly all of it
     assert 0.7 * 1e-3 / np.sqrt(40.0) < faults.leaves(seen, one_row) <= 1e-3 / np.sqrt(40.0)
-
-
-def test_registration_finds_frames_that_were_moved(own):
-    frames = Frames.declared(own)
-    true = Frames(frames.base @ exp6(np.array([0.2, -0.1, 0.3, 0.5, -1.0, 2.0])), frames.tool.copy())
-    true.tool[:3, 3] += [5e-3, -8e-3, 12e-3]
-    found = faults.registered(replace(own, position=observe(own, true).predicted_position))
-    assert found.base == pytest.approx(true.base, abs=1e-8)
-    assert found.tool[:3, 3] == pytest.approx(true.tool[:3, 3], abs=1e-8)
 
 
 def test_frames_are_fitted_to_the_best(ur5):
@@ -383,14 +360,6 @@ def with_lost_motion(campaign):
 
 BESIDE = ["geometric", "transmission_error", "backlash", "drift"]
 """Effects that are looked for: all would take minutes, and the trial itself does look for all."""
-
-
-@pytest.mark.slow
-def test_lost_motion_among_a_hundred_rows_of_a_real_arm_is_named_and_measured(ur5):
-    campaign = with_lost_motion(ur5.take(np.arange(100)))
-    found = diagnose(campaign, only=["geometric", "backlash"]).to_dict()
-    answer = judged("backlash", {"said": found, "truth": LOST}, None, 1e-4)
-    assert answer[0], answer[1]
 
 
 @pytest.mark.slow

@@ -35,11 +35,6 @@ def test_wilsons_interval_is_that_of_the_textbook(successes, trials, low, high):
     assert rate(0, 0) == {"successes": 0, "trials": 0, "value": None, "interval": None}
 
 
-def test_a_hundred_times_the_trials_tell_ten_times_as_much():
-    few, many = (rate(30 * k, 100 * k)["interval"] for k in (1, 100))
-    assert few[1] - few[0] == pytest.approx(10.0 * (many[1] - many[0]), rel=0.05)
-
-
 # ---- the whole
 
 
@@ -168,21 +163,6 @@ def test_calibration_counts_what_is_clearly_there_or_clearly_not():
     assert found["doubtful"]["error"] == pytest.approx((0.4 + 0.2 + 0.3) / 3)
     assert found["all"]["error"] == pytest.approx((0.4 + 0.2 + 0.3 + 0.03) / 4)
     assert score([record("null", said())])["calibration"]["all"]["error"] is None
-
-
-def test_who_says_what_is_so_has_no_error_and_who_boasts_has_his_boast():
-    rng = np.random.default_rng(0)
-    p = rng.random(20000)
-    there, mixed = rng.random(20000) < p, rng.permutation(20000)
-    honest, other = reliability(p, there), reliability(p[mixed], there[mixed])
-    # ten bins of 2000: what is left is their counting error, 1 % and less
-    assert honest["error"] < 0.015
-    assert honest["error"] == pytest.approx(other["error"], abs=1e-12)
-    assert sum(b["present"]["trials"] for b in honest["bins"]) == honest["trials"] == 20000
-    assert all(b["low"] <= b["mean"] <= b["high"] for b in honest["bins"])
-    boast = reliability(np.full(20000, 0.95), rng.random(20000) < 0.5)
-    assert boast["error"] == pytest.approx(0.45, abs=0.02)
-    assert boast["bins"][-1]["present"]["trials"] == 20000
 
 
 def law(number, p, place=J1, quantity="time"):
@@ -358,19 +338,6 @@ def test_separable_cases_do_not_diverge():
     assert 0.0 < curve["ratio"] < 30.0
     assert all(np.isfinite(curve["std"]))
     assert curve["over_ratio"][0]["chance"][0] < 0.1 < 0.9 < curve["over_ratio"][0]["chance"][-1]
-
-
-def test_the_curve_does_not_depend_on_the_unit_of_the_size():
-    size, rows, rng = drawn(400, 4)
-    hit = np.log(size) + 0.5 * np.log(rows) + rng.logistic(0.0, 0.5, 400) > 2.5
-    one, other = logistic(size, rows, hit), logistic(10.0 * size, rows, hit)
-    assert (other["ratio"], other["samples"]) == pytest.approx((one["ratio"], one["samples"]), rel=1e-4)
-    assert other["std"][1:] == pytest.approx(one["std"][1:], rel=1e-4)
-    for a, b in zip(one["over_samples"], other["over_samples"], strict=True):
-        assert b["other"] == pytest.approx(10.0 * a["other"])
-        assert b["chance"] == pytest.approx(a["chance"], abs=1e-4)
-    # more of either finds more
-    assert all(np.all(np.diff(line["chance"]) > 0.0) for line in (*one["over_ratio"], *one["over_samples"]))
 
 
 def test_no_number_of_rows_is_told_where_more_rows_find_less():

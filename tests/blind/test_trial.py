@@ -308,17 +308,6 @@ def test_who_stops_asking_has_nobody_else_started(fake, monkeypatch):
     assert set(asked(fake)) <= {"c0", "c1"}
 
 
-def test_ending_an_examinee_twice_does_no_harm(fake):
-    examinee = supervise.Examinee(fake.parent)
-    examinee.start()
-    examinee.end()
-    examinee.end()
-    with pytest.raises(supervise.Lost, match="the process ended with status"):
-        examinee.ask({}, 1.0)
-    examinee.close()
-    examinee.close()
-
-
 def test_an_examinee_is_given_no_more_of_the_environment_than_it_needs(monkeypatch, tmp_path):
     monkeypatch.setenv("ANSWERS", "backlash")
     monkeypatch.setenv("PYTHONPATH", "elsewhere")

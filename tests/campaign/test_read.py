@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -73,16 +75,6 @@ def test_path_of_file_or_directory_gives_the_same(tmp_path: Path, monkeypatch: p
     np.testing.assert_array_equal(by_file.q, here.q)
     (folder / "campaign.toml").rename(folder / "monday.toml")
     assert read_campaign(folder / "monday.toml").name == "monday"
-
-
-def test_a_builtin_robot_is_not_a_path(tmp_path: Path) -> None:
-    builtin = load_robot("builtin:rv_m2", "tool0")
-    table = pd.DataFrame(np.random.default_rng(0).uniform(-0.5, 0.5, (9, builtin.n)), columns=builtin.joint_names)
-    table[["x", "y", "z"]] = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
-    table.to_csv(tmp_path / "measurements.csv", index=False)
-    toml = PLAIN_TOML.replace("robot.urdf", "builtin:rv_m2").replace('"tool"', '"tool0"').replace("lift = 101", "")
-    (tmp_path / "campaign.toml").write_text(toml)
-    assert read_campaign(tmp_path).robot.joint_names == builtin.joint_names
 
 
 def test_robot_errors_name_the_campaign(tmp_path: Path) -> None:
@@ -294,6 +286,8 @@ def test_a_campaign_from_a_frame_is_that_from_files(robot: Robot) -> None:
     assert other.labels["pose"].tolist() == ["1", "2", "3"]
     np.testing.assert_allclose(other.orientation, campaign.orientation)
     assert other.rows.tolist() == [0, 1, 2]
+    none = campaign_from_table(robot, frame, angle_unit="deg", tool="known", noise_position=0.0, noise_orientation=0.0)
+    assert (none.noise_position, none.noise_orientation) == (None, None)
     frame = frame.iloc[[2, 0, 1]]
     assert campaign_from_table(robot, frame, angle_unit="deg", tool="known").rows.tolist() == [2, 0, 1]
     frame.index = pd.Index(["a", "b", "c"])
@@ -333,23 +327,6 @@ def test_arguments_are_checked(robot: Robot, arguments: dict[str, object], colum
     assert (caught.value.file, caught.value.column) == ("<table>", column)
 
 
-@pytest.mark.parametrize(
-    ("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6), ("inch", 1 / 0.0254), ("ft", 1 / 0.3048)]
-)
-def test_one_campaign_in_any_unit(robot: Robot, unit: str, per_metre: float) -> None:
-    rng = np.random.default_rng(1)
-    q = pd.DataFrame(rng.uniform(0.1, 0.4, (5, 4)), columns=list(robot.joint_names))
-    place = rng.uniform(-1, 1, (5, 3))
-    frame = q.assign(slide=q["slide"] * per_metre)
-    frame[["x", "y", "z"]] = place * per_metre
-    campaign = campaign_from_table(robot, frame, length_unit=unit, noise_position=1e-5 * per_metre)
-    np.testing.assert_allclose(campaign.q, q, rtol=1e-14)
-    np.testing.assert_allclose(campaign.position, place, rtol=1e-14)
-    assert campaign.noise_position == pytest.approx(1e-5)
-    none = campaign_from_table(robot, frame, noise_position=0.0, noise_orientation=0.0)
-    assert (none.noise_position, none.noise_orientation) == (None, None)
-
-
 def test_cells_of_a_frame_are_checked_and_samples_need_no_position(robot: Robot) -> None:
     frame = pd.DataFrame({"turn": [0.1, None], "lift": 0.1, "slide": 0.1, "roll": 0.1})
     with pytest.raises(CampaignError, match="row 1, column 'turn': a value is missing; found an empty cell"):
@@ -357,3 +334,90 @@ def test_cells_of_a_frame_are_checked_and_samples_need_no_position(robot: Robot)
     assert campaign_from_table(robot, frame.iloc[:1], measured=False).position is None
     with pytest.raises(CampaignError, match="column 'x'"):
         campaign_from_table(robot, frame.iloc[:1])
+
+
+# ---- what check prints
+
+
+def test_says_what_a_metrologist_asks() -> None:
+    text = _squeezed(describe(full()))
+    for line in (
+        "Campaign hall_3",
+        "robot                  arm, chain from base to tool, 4 movable joints",
+        "lengths hold at        22.5 °C",
+        "measurements           3, position and orientation, in mm",
+        "base frame unknown: measured in the instrument's own frame, place and direction are fitted",
+        "target                 known: (1, 2, 80) mm on tool",
+        "noise of position      0.02 mm per axis (one sigma)",
+        "noise of orientation   3e-05 rad per axis (one sigma)",
+        "slide   prismatic    30 .. 90     0 .. 500",
+        "roll    continuous   -40 .. 400   none",
+        "temperature        20.1 .. 21.3",
+        "humidity           not defined by the format   40 .. 43",
+        "sessions             2: a (2 rows), b (1 row)",
+        "Warnings\n  none",
+    ):
+        assert _squeezed(line) in text, f"{line!r} is not in\n{text}"
+
+
+def test_bare_campaign(tmp_path: Path) -> None:
+    folder = put(tmp_path / "c", ROWS + ROWS.splitlines()[1] + "\n")
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().split("[noise]")[0].replace('tool = "known"', 'tool = "unknown"'))
+    text = _squeezed(describe(read_campaign(folder)))
+    assert "noise of position not given: estimated from the data" in text
+    assert "target unknown: fitted, starting from (1, 2, 80) mm on tool" in text
+    assert "Conditions recorded\n none\n not recorded: time, order, temperature, payload" in text
+    assert "identical commands 1 pose repeated, 2 rows in all" in text
+    assert "no label: taken as one run" in text
+
+
+def test_gaps_and_warnings(tmp_path: Path) -> None:
+    table = add(ROWS, payload="1 _ 1", temperature="290 291 292")
+    text = _squeezed(describe(read_campaign(put(tmp_path / "c", table))))
+    assert "payload 1, does not vary kg 1 filled" in text
+    assert " - column 'payload' is empty in 1 of 3 rows: the previous row's value held" in text
+    assert "are these kelvin?" in text
+
+
+def test_samples_are_to_be_predicted_and_columns_are_aligned() -> None:
+    samples = dataclasses.replace(full(), position=None, orientation=None)
+    assert "samples 3, to be predicted" in _squeezed(describe(samples))
+    lines = describe(full()).split("Joints\n")[1].split("\n\n")[0].splitlines()
+    assert len({line.index(cell) for line, cell in zip(lines[1:], ("rev", "rev", "pri", "con"), strict=True)}) == 1
+
+
+def _squeezed(text: str) -> str:
+    return re.sub(" +", " ", text)
+
+
+def test_every_condition_has_its_unit() -> None:
+    block = describe(full()).split("Conditions recorded\n")[1].split("\n\n")[0]
+    units = {tuple(line.split()[:2]): line for line in block.splitlines()}
+    for words, unit in (
+        (("velocity", "lift"), "deg/s"),
+        (("velocity", "slide"), "mm/s"),
+        (("acceleration", "roll"), "deg/s²"),
+        (("encoder", "slide"), "mm"),
+        (("torque", "lift"), "N·m"),
+    ):
+        assert f" {unit} " in units[words]
+    for name, unit in (("time", "s"), ("payload", "kg"), ("speed", "0..1"), ("temperature.beam", "°C")):
+        (line,) = (line for line in block.splitlines() if line.split()[0] == name)
+        assert f" {unit} " in line
+    assert "as given" in next(line for line in block.splitlines() if "humidity" in line)
+
+
+def test_ranges_are_those_of_the_file_in_any_unit() -> None:
+    text = _squeezed(describe(dataclasses.replace(full(), units=Units("rad", "um"))))
+    assert "slide prismatic 30000 .. 90000 0 .. 500000 um 12 %" in text
+    assert "lift revolute -0.785398 .. 0.349066 -2 .. 2 rad 28 %" in text
+
+
+def test_many_sessions_and_the_noise_of_each_row_are_told(tmp_path: Path) -> None:
+    rows = "".join(f"{i},20,30,40,{1000 + i},0,500,day {i:02d}\n" for i in range(12))
+    text = describe(read_campaign(put(tmp_path / "c", ROWS.split("\n")[0] + ",session\n" + rows)))
+    assert "12: day 00 (1 row)" in text
+    assert "day 07 (1 row) and 4 more" in text
+    text = _squeezed(describe(read_campaign(put(tmp_path / "c", add(ROWS, noise="0.02 0.5 0.03")))))
+    assert "noise of position 0.02 .. 0.5 mm per axis (one sigma), of each row" in text

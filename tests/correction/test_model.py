@@ -10,7 +10,6 @@ from readers import model_of
 from simulate import simulate
 
 from thermal_robot import CampaignError, CorrectedModel, diagnose, read_samples
-from thermal_robot.campaign import write_campaign
 from thermal_robot.campaign.write import write_table
 from thermal_robot.effects import Drift, ThermalElongation
 from thermal_robot.kinematics import exp3, log3, quaternion_to_rotation
@@ -46,21 +45,6 @@ def test_predictions_are_within_half_a_noise_of_the_truth(arm):
         assert orientation is None
         misses[name] = np.sqrt(((predicted - place) ** 2).mean()) / NOISE
     assert max(misses.values()) < 0.5, misses
-
-
-@pytest.mark.parametrize(("mixture", "turning"), [("hall", None), ("hand", None), ("morning", TURNING)])
-def test_a_saved_model_predicts_the_same(rv_m2, tmp_path, mixture, turning):
-    _, model, fresh, _ = corrected(rv_m2, MIXTURES[mixture], turning=turning)
-    model.save(tmp_path / "model.json")
-    again = CorrectedModel.load(tmp_path / "model.json")
-    (position, orientation), (place, direction) = again.predict(fresh), model.predict(fresh)
-    np.testing.assert_allclose(position, place, rtol=0, atol=1e-12)
-    assert (orientation is None) == (direction is None) == (turning is None)
-    if turning is not None:
-        np.testing.assert_allclose(orientation, direction, rtol=0, atol=1e-12)
-    assert again.to_dict() == model.to_dict()
-    assert again.needs == model.needs
-    assert [e for e, _ in again.effects] == [e for e, _ in model.effects]
 
 
 @pytest.mark.parametrize(
@@ -227,12 +211,6 @@ def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
     assert np.sqrt(((found.model.predict(both["fresh"])[0] - place) ** 2).mean()) < 0.5 * NOISE
     with pytest.raises(CampaignError, match=r"column 'sim\.x': the model corrects the prediction of your simulator"):
         found.model.predict(fresh)
-
-
-def test_a_campaign_that_is_written_and_read_gives_the_same_model(hall, tmp_path):
-    campaign, model, fresh, _ = hall
-    again = diagnose(write_campaign(campaign, tmp_path)).model
-    np.testing.assert_allclose(again.predict(fresh)[0], model.predict(fresh)[0], rtol=0, atol=1e-9)
 
 
 def test_more_columns_than_the_campaign_had_change_no_prediction():

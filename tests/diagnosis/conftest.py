@@ -4,8 +4,6 @@ import pytest
 from conftest import load_arm
 from simulate import simulate
 
-from thermal_robot import diagnose
-
 
 @pytest.fixture(scope="session")
 def clean():
@@ -14,6 +12,6 @@ def clean():
 
 
 @pytest.fixture(scope="session")
-def hall(rv_m2):
+def hall(rv_m2, diagnosed_once):
     """A diagnosis of links that grow and joints with play, some rows spoilt."""
-    return diagnose(simulate(rv_m2, ["thermal_elongation", "backlash"], seed=1, outliers=0.03)[0])
+    return diagnosed_once(simulate(rv_m2, ["thermal_elongation", "backlash"], seed=1, outliers=0.03)[0])

@@ -1,10 +1,8 @@
 """The parts of an answer, put together from the last explanation."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from helpers import with_law
+from helpers import disturbed, with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
@@ -13,14 +11,13 @@ from thermal_robot.diagnosis.answer import numbered, prior_sensitivity
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.values import FoldScheme
 from thermal_robot.effects import RANDOM, choose, library
-from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit, refit
 from thermal_robot.inference.generate import discovered
-from thermal_robot.observations import Frames, observe
 
 
 def test_the_parts_agree_with_each_other(hall):
+    # the parts agree with each other
     assert set(hall.verdict) == {"thermal_elongation", "backlash"}
     assert hall.verdict == tuple(f.name for f in hall.effects if f.status == "found")
     assert sum(hall.where.axes.values()) == pytest.approx(1.0)
@@ -34,16 +31,12 @@ def test_the_parts_agree_with_each_other(hall):
     assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach", "range"}
     assert hall.remaining is hall.unexplained or hall.remaining == hall.unexplained
     assert hall.reach == pytest.approx(np.linalg.norm(np.ptp(hall.fit.campaign.position, axis=0)))
-
-
-def test_every_quantity_and_joint_has_its_unit(hall):
+    # every quantity and joint has its unit
     assert set(hall.rows.units) == {*hall.rows.covariates, *hall.joint_names}
     assert hall.rows.units["temperature"] == "°C"
     assert hall.rows.units["joint_1"] == "rad"
     assert hall.rows.units["time"] == "s"
-
-
-def test_rows_were_held_out_once_unless_set_aside(hall):
+    # rows were held out once unless set aside
     rows = hall.rows
     assert (np.isnan(rows.held_out_after) <= rows.outliers).all()
     kept = ~np.isnan(rows.held_out_after)
@@ -94,41 +87,27 @@ GONE = Discovered("discovered.1", "joint", "joint_4", "payload", "ramp", (), 3.0
 @pytest.fixture(scope="module")
 def found(rv_m2):
     """Two laws at work, found second and third, and one that did not last."""
-    data = with_law(rv_m2, LARGE, [-8e-4, 8e-4], seed=4)[0]
-    here = observe(data, Frames.declared(data))
-    moved, _ = displacement(here, [(SMALL, np.array([-2e-4, 2e-4]))])
-    shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
-    known = fit(replace(data, position=data.position + shift), choose(("drift",), (), ()))
+    data = disturbed(with_law(rv_m2, LARGE, [-8e-4, 8e-4], seed=4)[0], [(SMALL, np.array([-2e-4, 2e-4]))])
+    known = fit(data, choose(("drift",), (), ()))
     return refit(known, {law.name: (law,) for law in (GONE, SMALL, LARGE)}, [[SMALL, LARGE]])
 
 
-def test_the_largest_share_is_the_first(found):
+def test_the_largest_share_is_the_first_and_names_agree_wherever_they_stand(found):
     assert {effect.name for effect, _ in found.effects} == {"discovered.2", "discovered.3"}
     before = held_out(found)
     again, shrinkage, laws = numbered(found, before, discovered(found))
     places = {effect.name: effect.place for effect, _ in again.effects}
     assert places == {"discovered.1": LARGE.place, "discovered.2": SMALL.place}
     assert {d.law.name: d.law.place for d in laws} == places
-    assert shrinkage.shares["discovered.1"] == before.shares["discovered.3"]
-    assert shrinkage.shares["discovered.2"] == before.shares["discovered.2"]
-    assert shrinkage.shares["drift"] == before.shares["drift"]
-
-
-def test_names_agree_wherever_they_stand(found):
-    again, _, _ = numbered(found, held_out(found), discovered(found))
+    renamed = {"discovered.1": "discovered.3", "discovered.2": "discovered.2", "drift": "drift"}
+    assert {new: shrinkage.shares[new] for new in renamed} == {n: before.shares[old] for n, old in renamed.items()}
     assert [b.effect.name for b in again.explanation.linear.blocks] == list(again.families)
     assert set(again.variants) == set(again.families)
     assert all({effect.name for effect in own} == {name} for name, own in again.variants.items())
-    # the law that did not last comes after those that did
+    # the law that did not last comes after those that did; where there is none nothing is renamed
     assert again.variants["discovered.3"][0].place == GONE.place
-
-
-def test_without_laws_nothing_is_renamed(rv_m2):
-    known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
-    again, _, laws = numbered(known, held_out(known), ())
-    assert laws == ()
-    assert again.families == known.families
-    assert again.variants == known.variants
+    without = refit(found, {law.name: () for law in (GONE, SMALL, LARGE)})
+    assert numbered(without, held_out(without), ())[0].families == without.families
 
 
 RIVALS = choose(("joint_offset", "joint_gain", "backlash", "drift"), (), ())
@@ -155,23 +134,19 @@ def test_noise_alone_is_less_certain_where_effects_may_be_smaller(rv_m2):
     assert 0.3 < weighed.smaller < weighed.larger < 1.0
 
 
-@pytest.mark.parametrize("times", [0.3, 0.5, 0.8, 1.5])
-def test_it_is_a_probability(rv_m2, times):
-    weighed = prior_sensitivity(fitted(rv_m2, times))
-    assert 0.0 <= weighed.smaller <= 1.0
-    assert 0.0 <= weighed.larger <= 1.0
-
-
-def test_at_the_stated_sizes_it_is_the_probability_itself(rv_m2, monkeypatch):
+@pytest.mark.parametrize("times", [0.3, 0.5, 1.5])
+def test_at_the_stated_sizes_it_is_the_probability_itself(rv_m2, monkeypatch, times):
     """Among the explanations that are compared again."""
-    known = fitted(rv_m2, 0.5)
-    monkeypatch.setattr(settings, "PRIOR_FACTOR", 1.0)
+    known = fitted(rv_m2, times)
     weighed = prior_sensitivity(known)
+    assert 0.0 <= min(weighed.smaller, weighed.larger) <= max(weighed.smaller, weighed.larger) <= 1.0
+    monkeypatch.setattr(settings, "PRIOR_FACTOR", 1.0)
+    weighed, e = prior_sensitivity(known), known.explanation
     assert weighed.smaller == weighed.larger
-    e = known.explanation
-    assert e.discrepancy.form is None  # the same noise alone
     chosen = {effect.name for effect, _ in known.effects}
     compared = e.combinations[: settings.COMPARED]
     same = [{known.families[b] for b in c.blocks} == chosen for c in compared]
     p = e.probabilities[: len(compared)]
-    assert weighed.smaller == pytest.approx(p[np.array(same)].sum() / p.sum(), abs=1e-3)
+    assert e.discrepancy.form is None or times != 0.5
+    if e.discrepancy.form is None:  # the same noise alone
+        assert weighed.smaller == pytest.approx(p[np.array(same)].sum() / p.sum(), abs=1e-3)

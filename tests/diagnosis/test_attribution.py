@@ -20,12 +20,22 @@ def located(robot, name, share=1.0, **how):
     return (*locate(fitted, {name: share}), truth["parts"][name]["values"], fitted)
 
 
-def test_an_effect_in_one_joint_sits_there(rv_m2):
+def test_an_effect_sits_in_its_place_and_rows_set_aside_count_nowhere(rv_m2):
+    # an effect in one joint sits there
     where, locations, _, _ = located(rv_m2, "backlash", places=["joint_3"])
     assert locations["backlash"][0].name == "joint_3"
     assert locations["backlash"][0].share > 0.95
     assert max(where.joints, key=where.joints.get) == "joint_3"
     assert where.links == {}
+    # rows that were set aside count nowhere
+    campaign, _, _ = simulate(rv_m2, ["backlash"], samples=80, seed=2, ratio=(5.0, 6.0), places=["joint_3"])
+    spoilt = campaign.position.copy()
+    spoilt[11] += [0.0, 0.0, 0.05]
+    plain, dirty = (fit(replace(campaign, position=p), choose("backlash")) for p in (campaign.position, spoilt))
+    assert dirty.explanation.outliers[11]
+    clean, seen = (locate(f, {"backlash": 1.0})[0].axes for f in (plain, dirty))
+    for axis in "xyz":
+        assert seen[axis] == pytest.approx(clean[axis], abs=0.05)
 
 
 def test_places_divide_an_effects_share_among_them(rv_m2):
@@ -76,17 +86,6 @@ def test_places_are_all_there_are_largest_first():
     where = Where({}, {"a": 0.1}, {"b": 0.5}, {}, {"base": 0.2, "tool": 0.05})
     shares = {("link", "b"): 0.5, ("base", "base"): 0.2, ("joint", "a"): 0.1, ("tool", "tool"): 0.05}
     assert list(where.places.items()) == list(shares.items())
-
-
-def test_rows_that_were_set_aside_count_nowhere(rv_m2):
-    campaign, _, _ = simulate(rv_m2, ["backlash"], samples=80, seed=2, ratio=(5.0, 6.0), places=["joint_3"])
-    spoilt = campaign.position.copy()
-    spoilt[11] += [0.0, 0.0, 0.05]
-    plain, dirty = (fit(replace(campaign, position=p), choose("backlash")) for p in (campaign.position, spoilt))
-    assert dirty.explanation.outliers[11]
-    clean, seen = (locate(f, {"backlash": 1.0})[0].axes for f in (plain, dirty))
-    for axis in "xyz":
-        assert seen[axis] == pytest.approx(clean[axis], abs=0.05)
 
 
 def test_what_the_known_effects_leave_has_what_the_laws_take_in_it(rv_m2):

@@ -21,41 +21,37 @@ def campaign():
     )  # fmt: skip
 
 
-def test_zeros_are_told_inside_the_geometry_and_as_they_are(campaign):
-    found = tr.calibrate(campaign)
-    assert [(effect.name, effect.inside) for effect in found.effects] == [
-        ("joint_offset", "geometric"),
-        ("geometric", "geometric"),
-    ]
-    told = found.parameters.loc["joint_offset"]
+@pytest.fixture(scope="module")
+def poses(campaign):
+    return tr.calibrate(campaign)
+
+
+def test_zeros_are_told_inside_the_geometry_as_they_are_and_known_better_alone(campaign, poses):
+    told = [(effect.name, effect.inside) for effect in poses.effects]
+    assert told == [("joint_offset", "geometric"), ("geometric", "geometric")]
+    own, alone = (found.parameters.loc["joint_offset"] for found in (poses, tr.calibrate(campaign, "joint_offset")))
     for joint, true in OFF.items():
-        one = told.loc[f"zero offset, {joint}"]
+        one = own.loc[f"zero offset, {joint}"]
         assert one.value == pytest.approx(true, abs=4.0 * one["std"])
-    assert "zero offset, joint_1" in found.effects[0].unseen  # the base does the same
-
-
-def test_alone_they_are_known_better(campaign):
-    both, alone = tr.calibrate(campaign).parameters, tr.calibrate(campaign, "joint_offset").parameters
-    shared = both.loc["joint_offset"].index.intersection(alone.loc["joint_offset"].index)
+    assert "zero offset, joint_1" in poses.effects[0].unseen  # the base does the same
+    shared = own.index.intersection(alone.index)
     assert len(shared) >= 2
-    assert (alone.loc["joint_offset"].loc[shared, "std"] <= both.loc["joint_offset"].loc[shared, "std"]).all()
+    assert (alone.loc[shared, "std"] <= own.loc[shared, "std"]).all()
 
 
-def test_turns_shrink_as_places_do(campaign):
-    found = tr.calibrate(campaign)
-    assert found.turned_after < found.turned_before
-    assert found.turned_after == pytest.approx(np.sqrt(3.0) * 1e-4, rel=0.2)
-    assert found.rms_after == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.2)
+def test_turns_shrink_as_places_do_and_its_model_leaves_what_it_says(campaign, poses):
+    assert poses.turned_after < poses.turned_before
+    assert poses.turned_after == pytest.approx(np.sqrt(3.0) * 1e-4, rel=0.2)
+    assert poses.rms_after == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.2)
     positions = tr.calibrate(tr.simulate("builtin:rv_m2", rows=40, noise=NOISE, tool_frame="tool0"), "backlash")
     assert positions.turned_before is positions.turned_after is None
-
-
-def test_its_model_leaves_what_it_says(campaign):
-    found = tr.calibrate(campaign)
-    left = found.model.predict(campaign)[0] - campaign.position
-    assert np.sqrt((left**2).sum(axis=1).mean()) == pytest.approx(found.rms_after, rel=1e-6)
-    assert found.model.frames is found.fit.corrected.frames
-    assert list(found.frames.index) == ["base", "tool"]
+    left = poses.model.predict(campaign)[0] - campaign.position
+    assert np.sqrt((left**2).sum(axis=1).mean()) == pytest.approx(poses.rms_after, rel=1e-6)
+    assert poses.model.frames is poses.fit.corrected.frames
+    assert list(poses.frames.index) == ["base", "tool"]
+    assert repr(poses) == "Calibration('simulated': joint_offset, geometric)"
+    with pytest.raises(FrozenInstanceError):
+        poses.noise = 1.0
 
 
 def test_a_remainder_that_is_no_noise_is_said_and_widens_deviations():
@@ -70,13 +66,6 @@ def test_a_remainder_that_is_no_noise_is_said_and_widens_deviations():
     assert (told.to_numpy() > 1.05 * narrow[: len(told)]).any()
 
 
-def test_it_is_frozen_and_short_in_a_list(campaign):
-    found = tr.calibrate(campaign)
-    assert repr(found) == "Calibration('simulated': joint_offset, geometric)"
-    with pytest.raises(FrozenInstanceError):
-        found.noise = 1.0
-
-
 TRACKER = 5e-5
 ROBOT = tr.load_robot("builtin:rv_m2", "tool0")
 
@@ -87,11 +76,11 @@ def off(seed):
     return np.random.default_rng(seed).normal(0.0, 5e-4, count)
 
 
-def measured(seed, rows=50, noise=TRACKER, **further):
+def measured(seed, rows=50, noise=TRACKER, times=1.0, **further):
     """A tracker metres away, a target beside the tool."""
     base, tool = np.eye(4), np.eye(4)
     base[:3, 3], tool[:3, 3] = [1.0, 2.0, 0.3], [0.05, 0.02, 0.1]
-    effects = {"geometric": off(seed)}
+    effects = {"geometric": times * off(seed)}
     return tr.simulate(ROBOT, effects, rows=rows, noise=noise, base=base, tool=tool, seed=seed, **further)
 
 
@@ -146,20 +135,24 @@ def test_one_effect_may_be_named_and_ones_own_too():
         assert told.value == pytest.approx(2e-3, abs=4.0 * told["std"])
 
 
-def test_names_that_cannot_be_calibrated_are_refused():
+@pytest.mark.parametrize(
+    ("effects", "error", "says"),
+    [
+        ("joint_ofset", EffectError, "'joint_ofset'; did you mean 'joint_offset'"),
+        (["geometric", Geometric()], EffectError, "'geometric' is named twice"),
+        ("excess_repeatability", EffectError, "'excess_repeatability' scatters: no calibration removes it"),
+        ([], EffectError, "names no effect, expected at least one"),
+        ("tracking_lag", EffectError, "which lacks velocity"),
+        (3, CampaignError, r"calibrate\(\), effects"),
+    ],
+)
+def test_names_that_cannot_be_calibrated_are_refused(effects, error, says):
+    with pytest.raises(error, match=says):
+        tr.calibrate(measured(0), effects)
+
+
+def test_nothing_is_calibrated_where_nothing_was_measured():
     campaign = measured(0)
-    with pytest.raises(EffectError, match="'joint_ofset'; did you mean 'joint_offset'"):
-        tr.calibrate(campaign, "joint_ofset")
-    with pytest.raises(EffectError, match="'geometric' is named twice"):
-        tr.calibrate(campaign, ["geometric", Geometric()])
-    with pytest.raises(EffectError, match="'excess_repeatability' scatters: no calibration removes it"):
-        tr.calibrate(campaign, "excess_repeatability")
-    with pytest.raises(EffectError, match="names no effect, expected at least one"):
-        tr.calibrate(campaign, [])
-    with pytest.raises(EffectError, match="which lacks velocity"):
-        tr.calibrate(campaign, "tracking_lag")
-    with pytest.raises(CampaignError, match=r"calibrate\(\), effects"):
-        tr.calibrate(campaign, 3)
     with pytest.raises(CampaignError, match="nothing was measured"):
         tr.calibrate(tr.read_samples(campaign.to_frame().drop(columns=["x", "y", "z"]), campaign))
 
@@ -174,9 +167,7 @@ def test_the_kinematic_effects_are_the_default(found):
 
 @pytest.mark.parametrize("times", [10.0, 40.0])
 def test_an_arm_far_off_with_gross_errors_is_calibrated_as_well(times):
-    base, tool = np.eye(4), np.eye(4)
-    base[:3, 3], tool[:3, 3] = [1.0, 2.0, 0.3], [0.05, 0.02, 0.1]
-    far = tr.simulate(ROBOT, {"geometric": times * off(5)}, rows=60, noise=TRACKER, base=base, tool=tool, seed=5)
+    far = measured(5, rows=60, times=times)
     position, struck = far.position.copy(), [3, 30, 50]
     position[struck] += 0.02
     found = tr.calibrate(replace(far, position=position))

@@ -57,13 +57,12 @@ def test_text_and_json_have_it(repeated, found):
     assert "\n\nISO 9283\n" in text(found)
 
 
-def test_a_table_that_does_not_fit_the_robot_has_none(repeated):
+def test_a_table_that_does_not_fit_or_without_repeats_has_none(repeated):
+    # a table that does not fit the robot has none
     spoilt = diagnose(replace(repeated, position=repeated.position[:, [1, 0, 2]]), only=["joint_offset"])
     assert not spoilt.usable
     assert spoilt.performance is None
-
-
-def test_without_repeats_there_is_none(repeated):
+    # without repeats there is none
     once = diagnose(repeated.take(np.arange(60)), only=["joint_offset"])
     assert once.performance is None
     assert "performance" not in once.to_dict()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.simulated import WIDTHS, drawn, explained, forced, on_fresh
+from diagnosis.simulated import WIDTHS, drawn, explained, forced, on_fresh, some
 from helpers import NOISE
 from simulate import simulate
 
@@ -26,7 +26,7 @@ from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.grouping import blocks, each
+from thermal_robot.inference.grouping import each
 from thermal_robot.inference.kernels import Form, Smooth, Spectrum
 from thermal_robot.inference.problem import Linear
 from thermal_robot.kinematics import exp6
@@ -60,15 +60,6 @@ def test_rows_held_out_are_predicted_by_a_fit_to_the_others():
             right = fitted(known.linear, chosen, known.whitening.weights, ~test)[test]
             np.testing.assert_allclose(left[test[walk.numbers]], right, atol=1e-6)
         assert walk.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
-
-
-def test_a_row_has_no_part_in_its_own_prediction():
-    known = model()
-    test = known.block == 7
-    moved = np.where(test[:, None], 40.0, 0.0)
-    other = replace(known, linear=replace(known.linear, gap=known.linear.gap + moved))
-    left = [Walk.over(m, [test]).residuals((0, 2)) for m in (known, other)]
-    np.testing.assert_allclose(left[1] - left[0], 40.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("tests", ["blocks", "regions"])
@@ -115,21 +106,12 @@ def test_rows_that_are_alike_count_by_their_own_covariance():
 def test_a_fold_that_leaves_the_frames_open_is_left_out():
     known = model()
     alone = known.linear.frames.copy()
-    alone[known.block != 4, :, 0] = 0.0
+    alone[known.block != 4, :, 0] = alone[known.block != 4, :, 1]
     short = replace(known, linear=replace(known.linear, frames=alone))
     walk = Walk.over(short, each(short.block))
     assert len(walk.tests) == 19
     assert not (walk.numbers == np.flatnonzero(short.block == 4)[0]).any()
     assert list(walk.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
-
-
-def test_rows_set_aside_do_not_judge():
-    known = model()
-    kept = np.arange(ROWS) % 10 != 0
-    walk = Walk.over(replace(known, kept=kept), each(known.block))
-    assert walk.counts[0] == kept.sum()
-    left = walk.residuals((0,))[kept[walk.numbers]]
-    assert walk.squares((0,))[0] == pytest.approx((left**2).sum(), rel=1e-9)
 
 
 def test_what_a_model_leaves_out_counts_as_noise_against_priors():
@@ -175,7 +157,7 @@ def test_an_interval_is_wider_where_one_block_makes_up_the_spread():
     assert wide[1] > 1.5 * wide[0]
 
 
-on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+on_arms = pytest.mark.parametrize("arm", some(("rv_m2", "ur10", "panda"), 3), indirect=True)
 
 
 @on_arms
@@ -203,14 +185,16 @@ def noise_alone(robot):
     yield replace(campaign, noise_position=None), truth, None
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
+@pytest.mark.parametrize("arm", some(("rv_m2", "panda"), 2), indirect=True)
 def test_noise_is_not_explained_and_does_not_shrink(arm):
-    named, flagged, shrinkage = [], [], []
+    named, flagged, shrinkage, gains = [], [], [], []
     for campaign, truth, _ in noise_alone(arm):
         found = diagnose(campaign)
         named.append(found.verdict)
         flagged.append(found.unexplained.flagged)
         shrinkage.append(found.gap.held_out.shrinkage)
+        # in thirty rows an effect may shrink by chance what was held out
+        gains += [f.shrinkage for f in found.effects if f.status == "not_found" and campaign.samples > 30]
         kept = campaign.samples - len(found.outliers)
         assert set(found.outliers) >= {row for row in truth["outliers"] if far(campaign, found, row)}
         assert found.gap.rms_before / found.gap.noise_floor == pytest.approx(1.0, abs=4.0 / np.sqrt(3 * kept) + 0.2)
@@ -220,8 +204,13 @@ def test_noise_is_not_explained_and_does_not_shrink(arm):
         else:
             assert "noise" in found.summary
     assert sum(bool(n) for n in named) + sum(flagged) <= 1, named
+    assert not any(name.startswith("discovered.") for verdict in named for name in verdict)
     assert np.median(shrinkage) < 0.005
     assert max(shrinkage) < 0.05
+    # nor would anything else have shrunk rows held out
+    assert len(gains) >= 48
+    assert np.mean(gains) < 0.005
+    assert max(gains) < 0.05
 
 
 def far(campaign, found, row):
@@ -265,18 +254,6 @@ def test_the_gap_of_rows_held_out_is_that_of_the_registered_robot(rv_m2):
         registered = np.sqrt((known.before.gap[kept, :3] ** 2).sum(axis=1).mean())
         # nine to twelve unknowns of the frames in 360 equations
         assert held_out(known).overall.rms_before == pytest.approx(registered, rel=0.12)
-
-
-def test_parts_are_fitted_at_the_nominal_robot(rv_m2):
-    """What the frames alone leave does not depend on what the corrected robot looks like."""
-    known = fit(simulate(rv_m2, ["geometric", "backlash"], seed=1, ratio=(20.0, 30.0))[0], choose((), (), ()))
-    model = Model.of(known.explanation, blocks(known.campaign))
-    nominal = replace(known.before, blocks=tuple(block(known.nominal, effect) for effect, _ in known.effects))
-    values = [known.explanation.values[b][0] for b in known.explanation.best.blocks]
-    part = Walk.over(model.partial(nominal, values), each(model.block)).squares(())
-    bare = Walk.over(model.partial(known.before), each(model.block)).squares(())
-    assert len(values) == 2
-    np.testing.assert_allclose(part, bare, rtol=1e-9)
 
 
 def test_without_effects_nothing_shrinks(rv_m2):
@@ -376,14 +353,13 @@ def warm(rv_m2):
     return found
 
 
-def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate(warm):
+def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate_and_the_right_one_does_not(warm):
+    # a correction that interpolates leaves more where it must extrapolate
     for name, factor in (("session", 1.2), ("temperature", 1.15)):
         ratio = [wrong[name].rms_after / wrong["time"].rms_after for _, wrong in warm]
         assert np.mean(ratio) > factor, name
         assert np.mean(np.array(ratio) > 1.0) > 0.75, name
-
-
-def test_the_right_explanation_leaves_the_same_whatever_is_held_out(warm):
+    # the right explanation leaves the same whatever is held out
     apart = []
     for right, _ in warm:
         blocked = right["time"]
@@ -394,9 +370,7 @@ def test_the_right_explanation_leaves_the_same_whatever_is_held_out(warm):
     assert np.max(np.abs(apart)) < 4.0
     for right, _ in warm:
         assert all(0.8 < s.rms_after / (np.sqrt(3.0) * NOISE) < 1.5 for s in right.values())
-
-
-def test_schemes_come_in_order_and_say_what_they_are(warm):
+    # schemes come in order and say what they are
     for pair in warm:
         for schemes in pair:
             after = [s.rms_after for s in schemes.values()]
@@ -408,15 +382,14 @@ def test_schemes_come_in_order_and_say_what_they_are(warm):
             assert schemes["reach"].rows == pytest.approx(0.2 * schemes["time"].rows, abs=1)
 
 
-def test_the_hardest_is_told_where_it_leaves_clearly_more_than_the_average():
+def test_the_hardest_and_what_harms_other_sessions_and_regions_are_told():
+    # the hardest is told where it leaves clearly more than the average
     average = HeldOut("blocked", 5, 4e-4, 1e-4, 0.94, (0.9, 0.96))
     found = [FoldScheme(name, name, 2, 40, 4e-4, left, 0.9, 1e-6) for name, left in (("reach", 1.5e-4), ("time", 1e-4))]
     assert hardest(found, average).name == "reach"
     assert hardest(found, replace(average, rms_after=1.3e-4)) is None
     assert hardest((), average) is None
-
-
-def test_harm_to_other_sessions_and_regions_is_told_and_no_other():
+    # harm to other sessions and regions is told and no other
     found = [FoldScheme(name, name, 2, 40, 1e-4, 2e-4, -3.0, 1e-6) for name in ("reach", "temperature", "region")]
     assert harmed(found).name == "region"
     assert harmed(found[:2]) is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from diagnosis.simulated import some
 from simulate import simulate
 
 import thermal_robot as tr
@@ -99,9 +100,6 @@ def test_a_verdict_that_hangs_on_the_stated_sizes_says_so(rv_m2):
     assert len(cautions(known, sensitivity=Sensitivity(4e-5, 1e-9))) == 2
 
 
-ARMS = ("rv_m2", "panda", "ur10")
-
-
 def gravity_up(campaign):
     robot = campaign.robot
     return replace(campaign, robot=load_robot(robot.urdf, robot.tool_frame, gravity=-robot.gravity))
@@ -126,7 +124,7 @@ SPOILT = {
 }
 
 
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("arm", some(("rv_m2", "panda", "ur10"), 3))
 @pytest.mark.parametrize("quantity", SPOILT)
 def test_what_counts_the_other_way_is_read_with_the_other_sign(quantity, arm):
     effect, spoil = SPOILT[quantity]
@@ -141,7 +139,7 @@ def test_what_counts_the_other_way_is_read_with_the_other_sign(quantity, arm):
     assert [e.name for e, _ in fit(read, choose([effect], (), ())).effects] == [effect]
 
 
-@pytest.mark.parametrize(("arm", "seed"), [("rv_m2", 3), ("panda", 8), ("ur10", 3)])
+@pytest.mark.parametrize(("arm", "seed"), some([("rv_m2", 3), ("panda", 8), ("ur10", 3)], 3))
 @pytest.mark.parametrize("names", [[], ["geometric"], *([effect] for effect, _ in SPOILT.values())])
 def test_what_counts_as_it_should_stays(names, seed, arm):
     plain = with_torques(simulate(load_arm(arm), names, seed=seed, ratio=(1.0, 6.0))[0], 1.0)
@@ -218,26 +216,22 @@ def with_places(campaign, rows, places):
     return replace(campaign, position=position)
 
 
-def test_a_robot_that_stood_still_is_told_by_its_rows_and_they_are_left_out(sound):
-    noise = 20e-6 * np.random.default_rng(1).normal(size=(7, 3))
-    left, (said,) = not_executed(with_places(sound, slice(50, 57), sound.position[49] + noise))
-    assert said.startswith("rows 52 to 58 were not executed as written: the robot stood still in the pose of row 51")
-    assert left.rows.tolist() == [r for r in range(2, ROWS + 2) if not 52 <= r <= 58]
-    np.testing.assert_array_equal(left.position, np.delete(sound.position, np.arange(50, 57), axis=0))
-
-
-def test_it_stood_still_somewhere_else(sound):
-    _, (said,) = not_executed(with_places(sound, slice(20, 25), sound.position[70] + 0.11))
-    assert said.startswith("rows 22 to 26 were not executed as written: one place was measured in all")
-
-
-@pytest.mark.parametrize(("by", "says"), [(-1, "1 row before"), (2, "2 rows later")])
-def test_a_few_rows_behind_or_ahead_are_told(sound, by, says):
-    rows = np.arange(60, 64)
-    left, (said,) = not_executed(with_places(sound, rows, sound.position[rows + by]))
-    assert said.startswith("rows 62 to 65 were not executed as written")
+@pytest.mark.parametrize(
+    ("rows", "measured", "says"),
+    [
+        ((50, 57), lambda place: place[49] + 20e-6 * np.random.default_rng(1).normal(size=(7, 3)), "stood still in"),
+        ((20, 25), lambda place: place[70] + 0.11, "one place was measured in all"),
+        ((60, 64), lambda place: place[59:63], "1 row before"),
+        ((60, 64), lambda place: place[62:66], "2 rows later"),
+    ],
+)
+def test_rows_that_were_not_executed_are_told_and_left_out(sound, rows, measured, says):
+    left, (said,) = not_executed(with_places(sound, slice(*rows), measured(sound.position)))
+    first, last = rows[0] + 2, rows[1] + 1
+    assert said.startswith(f"rows {first} to {last} were not executed as written")
     assert says in said
-    assert left.samples == ROWS - 4
+    assert left.rows.tolist() == [r for r in range(2, ROWS + 2) if not first <= r <= last]
+    np.testing.assert_array_equal(left.position, np.delete(sound.position, np.arange(*rows), axis=0))
 
 
 def test_rows_are_followed_in_the_order_of_measurement(sound):

@@ -4,18 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from helpers import with_law
+from helpers import disturbed, with_law
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simulate import demo, simulate
 
 from thermal_robot.diagnosis.attribution import Explained, explained
 from thermal_robot.effects import Effect, Parameter, at_joint, choose
-from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.errors import EffectError
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.registration import register
-from thermal_robot.observations import observe
 from thermal_robot.report.plots import explain_figure
 
 MRAD = 1e3
@@ -33,25 +30,24 @@ def points(axes, label):
     return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
 
 
-def mean_and_error(values):
-    return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
-
-
-def test_backlash_sets_the_two_sides_apart_by_its_play(rv_m2):
-    figure, found, values, _ = shown(rv_m2, "backlash", places=["joint_3"])
-    play = values["lost motion, joint_3"] * MRAD
-    axes = figure.axes[0]
-    assert axes.get_title(loc="left").startswith("joint_3: ")
+@pytest.mark.parametrize("name", ["backlash", "joint_gain"])
+def test_play_sets_two_sides_apart_a_gain_is_a_slope_and_nothing_is_left_of_either(rv_m2, name):
+    joint, kind = {"backlash": ("joint_3", "lost motion"), "joint_gain": ("joint_2", "gain error")}[name]
+    figure, found, values, _ = shown(rv_m2, name, places=[joint])
+    axes, true = figure.axes[0], values[f"{kind}, {joint}"] * MRAD
+    assert axes.get_title(loc="left").startswith(f"{joint}: ")
     assert axes.get_ylabel() == "error (mrad)"
-    assert axes.get_xlabel() == "approach.joint_3"
-    assert list(axes.get_xticks()) == [-1.0, 1.0]
-    for label, expected in (("as measured", play), ("with this effect taken off", 0.0)):
+    assert axes.get_xlabel() == {"backlash": f"approach.{joint}", "joint_gain": f"position of {joint} (rad)"}[name]
+    for label, expected in (("as measured", true), ("with this effect taken off", 0.0)):
         x, y = points(axes, label)
-        low, high = mean_and_error(y[x < 0]), mean_and_error(y[x > 0])
         assert len(x) == len(found.places[0].before)
-        assert abs(low[0] - high[0] - expected) < 3.0 * np.hypot(low[1], high[1])
-    x, law = points(axes, "fitted law")
-    assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(play, rel=0.1)
+        (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
+        slope, sigma = np.array([slope, np.sqrt(covariance[0, 0])]) * (-2.0 if name == "backlash" else 1.0)
+        assert abs(slope - expected) < 3.0 * abs(sigma)
+    if name == "backlash":
+        assert list(axes.get_xticks()) == [-1.0, 1.0]
+        x, law = points(axes, "fitted law")
+        assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(true, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -62,16 +58,6 @@ def test_the_error_of_a_joint_is_a_length_where_it_slides_and_else_an_angle(awkw
     first = found.places[0]
     assert (first.name, first.unit) == (joint, unit)
     assert figure.axes[0].get_ylabel() in [f"error ({word})" for word in drawn]
-
-
-def test_a_gain_is_a_slope_and_nothing_is_left_of_it(rv_m2):
-    figure, _, values, _ = shown(rv_m2, "joint_gain", places=["joint_2"])
-    axes = figure.axes[0]
-    assert axes.get_xlabel() == "position of joint_2 (rad)"
-    for label, expected in (("as measured", values["gain error, joint_2"] * MRAD), ("with this effect taken off", 0.0)):
-        x, y = points(axes, label)
-        (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
-        assert abs(slope - expected) < 3.0 * np.sqrt(covariance[0, 0])
 
 
 def test_the_spread_is_that_of_the_points(rv_m2):
@@ -116,12 +102,6 @@ def test_drift_and_scale_and_torque_have_their_own_axes(rv_m2):
         assert np.std(place.before - law - place.after) < 0.05 * np.ptp(place.line[1])
 
 
-def test_a_scale_error_is_a_line_through_the_origin(rv_m2):
-    _, found, values, _ = shown(rv_m2, "instrument_scale")
-    place = found.places[0]
-    np.testing.assert_allclose(place.line[1] / place.line[0], next(iter(values.values())), rtol=0.1)
-
-
 def test_tracking_lag_is_drawn_against_speed(rv_m2):
     figure, found, values, _ = shown(rv_m2, "tracking_lag", moving=True)
     place = found.places[0]
@@ -163,10 +143,7 @@ class Coupled(Effect):
 
 def coupled(robot):
     campaign, _, _ = simulate(robot, samples=80, seed=2)
-    here = observe(campaign, register(campaign))
-    moved, _ = displacement(here, [(Coupled(), np.array([2e-3]))])
-    shift = observe(campaign, here.frames, displacement=moved).predicted_position - here.predicted_position
-    return fit(replace(campaign, position=campaign.position + shift), (Coupled(),))
+    return fit(disturbed(campaign, [(Coupled(), np.array([2e-3]))]), (Coupled(),))
 
 
 def test_an_effect_that_says_nothing_is_drawn_against_what_goes_with_it(rv_m2):
@@ -245,11 +222,8 @@ class Follows(Effect):
 @pytest.mark.parametrize(("joint", "centred"), [("joint_1", True), ("joint_3", False)])
 def test_a_constant_that_an_unknown_base_takes_up_squeezes_no_figure(rv_m2, joint, centred):
     campaign, _, _ = simulate(rv_m2, [], seed=5)
-    effect, slope, frames = Follows(joint=joint), np.array([2e-5]), register(campaign)
-    nominal = observe(campaign, frames)
-    moved = observe(campaign, frames, displacement=displacement(nominal, [(effect, slope)])[0])
-    shift = moved.predicted_position - nominal.predicted_position
-    campaign = replace(campaign, position=campaign.position + shift)
+    effect, slope = Follows(joint=joint), np.array([2e-5])
+    campaign = disturbed(campaign, [(effect, slope)])
     truth = slope * above_its_zero(campaign)
     found = explained(fit(campaign, (effect,)), "follows")
     (place,) = found.places

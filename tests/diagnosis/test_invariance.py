@@ -73,11 +73,10 @@ def test_where_the_tracker_stands_does_not_matter(told):
     agree(said, answer(diagnose(replace(campaign, position=campaign.position @ place[:3, :3].T + place[:3, 3]))))
 
 
-def test_units_do_not_matter(told, tmp_path):
+@pytest.mark.parametrize("units", [Units("deg", "um"), pytest.param(Units("rad", "m"), marks=pytest.mark.slow)])
+def test_units_do_not_matter(told, tmp_path, units):
     campaign, said = told
-    for units in (Units("deg", "um"), Units("rad", "m")):
-        file = write_campaign(replace(campaign, units=units), tmp_path / units.length)
-        agree(said, answer(diagnose(read_campaign(file))))
+    agree(said, answer(diagnose(read_campaign(write_campaign(replace(campaign, units=units), tmp_path)))))
 
 
 def test_the_order_of_rows_does_not_matter_where_a_column_tells_it(told):
@@ -133,7 +132,7 @@ def scaled(campaign, s):
     )
 
 
-@pytest.mark.parametrize("s", [0.3, 3.0])
+@pytest.mark.parametrize("s", [0.3, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_a_larger_arm_with_a_larger_gap_has_the_same_faults(told, s):
     """Figures agree to a hundredth: sizes that are expected in metres do not grow with the arm (below)."""
     campaign, said = told
@@ -170,6 +169,7 @@ print(json.dumps([max(p["num_threads"] for p in threadpool_info()), found]))
 """
 
 
+@pytest.mark.slow  # an ordinary run looks at the threads of each stage: tests/diagnosis/test_diagnose.py
 def test_the_number_of_threads_does_not_matter(rv_m2, tmp_path):
     file = write_campaign(simulate(rv_m2, ["thermal_elongation", "backlash"], seed=4)[0], tmp_path)
     said = {}

@@ -340,6 +340,7 @@ def information(root, frames, rows):
 
 
 def test_gains_are_the_information_of_all_that_was_chosen(forty):
+    # gains are the information of all that was chosen
     chosen, gains = most_informative(*forty, 12)
     assert len(set(chosen)) == 12
     for k in range(1, 13):
@@ -350,9 +351,7 @@ def test_gains_are_the_information_of_all_that_was_chosen(forty):
         assert row == max(rest, key=lambda c: information(*forty, [*chosen[:k], c]))
     # without frames all information counts
     assert np.all(np.diff([0.0, *most_informative(forty[0], forty[0][:, :, :0], 3)[1]]) > 0.0)
-
-
-def test_of_candidates_alike_one_is_chosen(forty):
+    # of candidates alike one is chosen
     alike = np.repeat(np.arange(8), 5)
     chosen, _ = most_informative(*forty, 8, alike)
     assert sorted(alike[chosen].tolist()) == list(range(8))

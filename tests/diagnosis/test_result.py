@@ -118,11 +118,12 @@ def test_effects_are_asked_for_by_name(hall):
 
 
 @pytest.fixture(scope="module")
-def diagnosis():
-    return tr.diagnose(tr.demo_campaign())
+def diagnosis(diagnosed_once):
+    return diagnosed_once(tr.demo_campaign())
 
 
-def test_parameters_are_those_of_the_findings(diagnosis):
+def test_the_tables_are_those_of_the_findings(diagnosis):
+    # parameters are those of the findings
     table = diagnosis.parameters
     assert len(table) == sum(len(finding.parameters) for finding in diagnosis.effects)
     told = diagnosis.finding("backlash")
@@ -134,9 +135,17 @@ def test_parameters_are_those_of_the_findings(diagnosis):
         else:
             assert np.isnan(row["value"])
     assert set(table["status"]) <= {"found", "confounded", "contained"}
+    # residuals have the rms that is told
+    table = diagnosis.residuals
+    kept = table[~table["set_aside"]]
+    for kind, wanted in (("gap", diagnosis.gap.rms_before), ("remainder", diagnosis.gap.rms_after)):
+        distance = np.linalg.norm(kept[[f"{kind}.{axis}" for axis in "xyz"]], axis=1)
+        np.testing.assert_allclose(np.sqrt(np.mean(distance**2)), wanted, rtol=1e-9)
+    assert table.index[table["set_aside"]].tolist() == list(diagnosis.outliers)
 
 
-def test_the_covariance_is_one_and_has_the_stated_deviations(diagnosis):
+def test_the_covariance_is_one_has_the_stated_deviations_and_the_correlations_of_least_squares(diagnosis):
+    # the covariance is one and has the stated deviations
     covariance, table = diagnosis.covariance, diagnosis.parameters
     known = table[table["identified"] & table["status"].isin(["found", "confounded"])]
     assert set(covariance.index) == set(known.index)
@@ -147,10 +156,7 @@ def test_the_covariance_is_one_and_has_the_stated_deviations(diagnosis):
     correlation = matrix / np.sqrt(np.outer(matrix.diagonal(), matrix.diagonal()))
     assert np.linalg.eigvalsh(correlation).min() > 0.0
     assert np.abs(correlation - np.eye(len(correlation))).max() < 1.0
-
-
-def test_the_correlations_are_those_of_a_plain_least_squares_fit(diagnosis):
-    """One column for each parameter and each unknown frame, weak priors: (Jᵀ J)⁻¹ has nearly the same correlations."""
+    # One column for each parameter and each unknown frame, weak priors: (Jᵀ J)⁻¹ has nearly the same correlations.
     from thermal_robot.inference.columns import block, frame_columns
 
     fit = diagnosis.fit
@@ -171,15 +177,6 @@ def test_the_correlations_are_those_of_a_plain_least_squares_fit(diagnosis):
 
 def _block(fit, effect):
     return fit.explanation.best.blocks[[e.name for e, _ in fit.effects].index(effect.name)]
-
-
-def test_residuals_have_the_rms_that_is_told(diagnosis):
-    table = diagnosis.residuals
-    kept = table[~table["set_aside"]]
-    for kind, wanted in (("gap", diagnosis.gap.rms_before), ("remainder", diagnosis.gap.rms_after)):
-        distance = np.linalg.norm(kept[[f"{kind}.{axis}" for axis in "xyz"]], axis=1)
-        np.testing.assert_allclose(np.sqrt(np.mean(distance**2)), wanted, rtol=1e-9)
-    assert table.index[table["set_aside"]].tolist() == list(diagnosis.outliers)
 
 
 ANGLES = ["roll", "pitch", "yaw"]

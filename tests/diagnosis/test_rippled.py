@@ -13,7 +13,7 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_ripple_is_named_with_its_orders(rv_m2, seed):
     true = JointRipple().having("joint_2", 26.6, 1.0).having("joint_3", 17.26, 1.0)
     found = diagnose(rippling(rv_m2, true, (2e-4, 3e-4), seed))

@@ -1,4 +1,4 @@
-"""Channels against finite differences, sums of fitted effects, and the columns on which a fitted effect depends."""
+"""Sums of fitted effects, places of parameters, and the columns on which a fitted effect depends."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -22,72 +22,10 @@ from thermal_robot.effects import (
     ThermalElongation,
     ToolFrame,
     at_base,
-    at_instrument,
     at_joint,
     at_segment,
-    at_tool,
 )
-from thermal_robot.effects.apply import by_place, column, depends_on, displacement, sensitivity
-from thermal_robot.kinematics import Displacement, exp6, log3
-from thermal_robot.observations import Frames
-
-FRAMES = Frames(exp6([1.0, -2.0, 0.5, 0.4, 1.0, -0.3]), exp6([0.1, 0.02, 0.05, 0.3, 0.1, 0]))
-STEP = 1e-5
-
-
-def moved(observations, channel, unit):
-    """Twist of the target over the step, root frame axes."""
-    ahead, behind = (
-        observe(observations.campaign, FRAMES, displacement=Displacement(**{channel: s * unit})) for s in (STEP, -STEP)
-    )
-    turn = log3(ahead.rotation @ behind.rotation.transpose(0, 2, 1))
-    return np.hstack([ahead.position - behind.position, turn]) / (2.0 * STEP)
-
-
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "awkward"], indirect=True)
-def test_a_channel_moves_the_target_as_the_displaced_chain_does(arm):
-    seen, segments = observe(commanded(arm), FRAMES), len(arm.segments)
-    units = [("joint", j, unit[None]) for j, unit in enumerate(np.eye(arm.n))]
-    whole = np.eye(6 * segments).reshape(segments, 6, segments, 6)
-    units += [("segment", s, whole[s]) for s in range(segments)]
-    units += [("base", 0, np.eye(6)), ("tool", 0, np.eye(6))]
-    for channel, index, each in units:
-        found = sensitivity(seen, channel, index)
-        assert found.shape == (SAMPLES, 6, len(each))
-        for k, unit in enumerate(each):
-            expected = moved(seen, channel, unit)
-            np.testing.assert_allclose(found[:, :, k], expected, atol=1e-8, err_msg=f"{channel} {index}, {k}")
-
-
-def test_what_the_instrument_adds_points_in_the_measurement_frame_and_turns_nothing(rv_m2):
-    campaign = replace(commanded(rv_m2), position=np.zeros((SAMPLES, 3)))
-    shift = np.array([1e-3, -2e-3, 5e-4])
-    found = sensitivity(observe(campaign, FRAMES), "instrument", 0) @ shift
-    gap, more = (observe(campaign, FRAMES, instrument=i).gap for i in (None, np.tile(shift, (SAMPLES, 1))))
-    np.testing.assert_allclose(found[:, :3], gap - more, atol=1e-15)
-    np.testing.assert_array_equal(found[:, 3:], 0.0)
-
-
-def test_a_column_is_the_sum_of_its_components(awkward):
-    seen, rng = observe(commanded(awkward), FRAMES), np.random.default_rng(1)
-    rows = rng.normal(size=(SAMPLES, 6))
-    responses = [
-        at_joint(1, rows[:, 0]),
-        at_joint(2, 0.7),
-        at_segment(len(awkward.segments) - 1, rows),
-        at_segment(0, np.array([0.0, 2.0, 0.0, 0.0, -1.0, 0.0])),
-        at_segment(0, np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0])),
-        at_base(rows),
-        at_tool(rows[0]),
-        at_instrument(rows[:, :3]),
-    ]
-    for response in responses:
-        whole = sensitivity(seen, response.channel, response.index)
-        values = response.values[..., None] if response.channel == "joint" else response.values
-        each = np.broadcast_to(values, (SAMPLES, whole.shape[2]))
-        expected = sum(whole[:, :, k] * each[:, k, None] for k in range(whole.shape[2]))
-        for measures in (3, 6):
-            np.testing.assert_allclose(column(seen, response, measures), expected[:, :measures], atol=1e-14)
+from thermal_robot.effects.apply import by_place, depends_on, displacement
 
 
 def test_a_parameter_of_all_links_is_shared_out_and_one_with_a_place_is_not(rv_m2):

@@ -12,7 +12,7 @@ from simulate import simulate
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import BaseCompliance, JointCompliance, LinkCompliance, ThermalBending, choose, gate
-from thermal_robot.effects.beam import SHORTEST, beams, cross_axes, shafts
+from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.effects.compliance import overturning
 from thermal_robot.inference.fit import fit
 from thermal_robot.observations import observe
@@ -27,18 +27,6 @@ def loaded(arm, gravity=None):
     """A payload of 3 kg on a weightless arm, measured at its centre."""
     bare = without_masses(arm, gravity)
     return commanded(bare, {"payload": np.full(SAMPLES, 3.0)}, payload_com=PLACE, target=PLACE)
-
-
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda", "awkward", "tiago"], indirect=True)
-def test_the_axes_across_a_segment_are_right_angled_and_only_segments_with_a_length_bend(arm):
-    bent, lengths = beams(arm), np.array([segment.length for segment in arm.segments])
-    assert bent == tuple(np.flatnonzero(lengths > SHORTEST)) != ()
-    for s in bent:
-        segment, axes = arm.segments[s], cross_axes(arm, s)
-        basis, rotation = np.vstack([axes, segment.direction]), arm.chain.rotations[segment.index]
-        np.testing.assert_allclose(basis @ basis.T, np.eye(3), atol=1e-12)
-        # that axis of the parent's frame which lies most across the segment is in the plane of the other two
-        assert abs((rotation @ axes[0])[np.argmin(np.abs(rotation @ segment.direction))]) < 1e-12
 
 
 @on_arms
@@ -165,7 +153,8 @@ def test_the_moment_on_the_base_is_what_a_turn_of_it_works_against(arm):
     np.testing.assert_allclose(overturning(seen), expected, atol=1e-9)
 
 
-def test_an_outstretched_arm_sinks_under_its_own_weight(rv_m2):
+def test_a_load_or_weight_sinks(rv_m2):
+    # an outstretched arm sinks under its own weight
     stretched = Campaign("stretched", rv_m2, np.zeros((1, 5)))
     for j in (1, 2, 3):
         sunk = mine(stretched, JointCompliance(), 1e-5 * np.eye(5)[j])
@@ -175,10 +164,7 @@ def test_an_outstretched_arm_sinks_under_its_own_weight(rv_m2):
     for values in ([1e-6, 1e-6], [1e-6, 7e-7, 1e-6, 7e-7]):
         # all weights lie on the tool's side: it goes down
         assert (mine(swung, BaseCompliance(below=len(values) > 2), values)[:, 2] < 0.0).all()
-
-
-def test_what_the_base_turns_about_lies_below(rv_m2):
-    """A point at the depth stays where it is: each turn by ω shifts the origin, 0.7 m above, by 0.7 ω × up."""
+    # A point at the depth stays where it is: each turn by ω shifts the origin, 0.7 m above, by 0.7 ω × up.
     parameters = BaseCompliance(below=True).parameters(observe(commanded(rv_m2)))
     assert [p.unit for p in parameters] == ["rad/(N·m)", "m/(N·m)"] * 2
     for spring, shift in zip(parameters[::2], parameters[1::2], strict=True):

@@ -1,17 +1,15 @@
 """The contract of an effect, and its gate: a breach is refused with the effect, the parameter and what was found."""
 
-import ast
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 from simulate import simulate
 
-import thermal_robot
 from thermal_robot import EffectError, diagnose
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.effects import (
@@ -306,20 +304,6 @@ def test_a_diagnosis_asks_through_the_gate(rv_m2, member, answer, found):
         diagnose(off, effects=[spoilt(member, answer)], only=["mine"])
 
 
-def test_nobody_asks_an_effect_but_the_gate():
-    def asked_directly(source):
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ASK:
-                if not (call := ast.unparse(node)).startswith("gate."):
-                    yield call
-
-    assert list(asked_directly("f(e.reads(seen)); gate.reads(e, seen)")) == ["e.reads(seen)"]
-    root = Path(thermal_robot.__file__).parent
-    others = [path for path in root.rglob("*.py") if path.parent.name != "effects"]
-    assert len(others) > 100
-    assert {path.name: found for path in others if (found := list(asked_directly(path.read_text("utf-8"))))} == {}
-
-
 @pytest.fixture(scope="module")
 def rich(rv_m2):
     """Commands in all conditions that the library's effects read."""
@@ -417,34 +401,6 @@ def test_an_effect_with_a_constructor_of_its_own_may_sit_in_one_joint(observatio
     assert [(p.place, p.size) for (p,) in single] == [("joint_2", 0.5), ("joint_3", 0.5)]
     # it compares as equal with any other of its kind, and is not mistaken for it
     assert [p.size for p in checked(Built(0.7), observations)] == [0.7, 0.7]
-
-
-def test_settings_in_single_places_share_what_the_effect_answers(observations):
-    asked = []
-
-    @dataclass(frozen=True)
-    class Counted(Effect):
-        """Writes down when it is asked."""
-
-        size: float = 0.5
-        name: ClassVar[str] = "counted"
-
-        def parameters(self, observations):
-            asked.append(self.size)
-            return Built(self.size).parameters(observations)
-
-    here = replace(observations)
-    assert [p.place for one in gate.alone(Counted(), here) for p in checked(one, here)] == ["joint_2", "joint_3"]
-    assert asked == [0.5]
-    checked(Counted(0.7), here)
-    checked(Counted(), replace(observations))  # what is seen from elsewhere is asked anew
-    assert asked == [0.5, 0.7, 0.5]
-    # only the last few are kept, so that the responses of hundreds of settings do not fill the memory
-    for size in np.linspace(1.0, 2.0, 20):
-        checked(Counted(float(size)), here)
-    assert len(here.parameters) < 10
-    checked(Counted(0.7), here)
-    assert asked[-2:] == [2.0, 0.7]
 
 
 def test_parameters_are_declared_whatever_their_responses(observations):

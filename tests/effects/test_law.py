@@ -391,15 +391,14 @@ def test_a_law_of_two_quantities_ends_where_they_no_longer_go_together(rich, sha
     assert np.abs(corner - mean).max() < 1.5 * most
 
 
-def test_what_has_changed_by_the_end_of_the_campaign_stays(rich):
+def test_what_changed_stays_and_an_effect_in_a_law_ends_with_its_own_range(rich):
+    # what has changed by the end of the campaign stays
     law = replace(RAMP, quantity="time", origin=0.0, span=500.0)
     law = gate.delivered(law, observe(rich.campaign.take(np.flatnonzero(TIME <= 500.0))))
     functions, _ = law.at_rows(rich)
     late = functions[TIME >= 500.0]
     np.testing.assert_array_equal(late, np.tile(late[:1], (len(late), 1)))
-
-
-def test_an_effect_in_a_law_ends_with_its_own_range(rich):
+    # an effect in a law ends with its own range
     law = replace(CHANGING, of="transmission_error", of_arguments='{"harmonics": [1]}')
     values = 1e-3 * np.array([5.0, -4.0, 2.0, 1.0])
     far = carrying(rich, 1.0, rich.q[:, 2].max() + 2.0 * np.ptp(rich.q[:, 2]))

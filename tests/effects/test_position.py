@@ -129,7 +129,8 @@ def test_wheels_of_either_side_and_single_orders_are_settings(rv_m2, awkward):
     assert found == [(), (400, 800)]  # a slide has a period only behind a gear
 
 
-def test_a_ripple_begins_without_waves_and_gains_one_at_a_time(rv_m2):
+def test_a_ripple_begins_without_waves_gains_one_at_a_time_and_names_the_motors(rv_m2):
+    # a ripple begins without waves and gains one at a time
     seen, none = observe(commanded(rv_m2)), JointRipple()
     assert gate.checked(none, seen) == ()
     assert none.share < 1e-100  # nothing that could be at work
@@ -144,9 +145,7 @@ def test_a_ripple_begins_without_waves_and_gains_one_at_a_time(rv_m2):
     assert with_arguments(JointRipple, {**vars(none), "joints": list(none.joints)}, "") == none
     with pytest.raises(MisfitError, match="from 1 on"):
         with_arguments(JointRipple, {"tried": np.inf}, "")
-
-
-def test_an_order_of_the_motor_is_called_so(rv_m2):
+    # an order of the motor is called so
     seen = observe(commanded(rv_m2, gears={"joint_2": 50.0, "joint_3": 80.0}))
     ripple = JointRipple().having("joint_2", 100.08, 1.0).having("joint_2", 24.9, 1.0).having("joint_3", 100.0, 1.0)
     assert [p.label for p in gate.checked(ripple, seen)][::2] == [

@@ -30,7 +30,8 @@ def test_no_mean_follows_from_scatter_and_a_draw_has_the_spread_that_its_paramet
     assert np.all((np.ptp(away, axis=1) == 0.0) == (effect.component == "pose"))
 
 
-def test_each_kind_of_scatter_has_one_effect_in_words_of_its_own():
+def test_each_kind_of_scatter_has_one_effect_in_words_of_its_own_and_in_its_places():
+    # each kind of scatter has one effect in words of its own
     found = random_effects()
     assert [(e.component, e.label) for e in found] == [("pose", "step"), ("visit", "standard deviation")]
     assert [e.title for e in found] == [
@@ -44,9 +45,7 @@ def test_each_kind_of_scatter_has_one_effect_in_words_of_its_own():
 
     with pytest.raises(AttributeError):  # one that states no component cannot be told
         _ = Vague().component
-
-
-def test_it_is_in_its_places_and_not_in_those_excluded():
+    # it is in its places and not in those excluded
     chain = ("a", "b", "c")
     told = [EncoderResolution(**given).joints(chain) for given in ({}, {"places": ("c", "a")}, {"excluded": ("b",)})]
     assert told == [chain, ("a", "c"), ("a", "c")]

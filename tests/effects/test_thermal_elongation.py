@@ -166,15 +166,14 @@ def test_a_lag_obeys_its_differential_equation(lag):
     assert history.followed(lag, np.array([-10.0]), np.array([19.0]))[0] == 19.0
 
 
-def test_a_long_record_is_thinned_a_short_lag_is_none_and_a_long_one_stays_where_it_began():
+def test_a_record_is_thinned_and_rows_of_one_instant_count_as_their_mean():
+    # a long record is thinned a short lag is none and a long one stays where it began
     times = np.linspace(0.0, 20000.0, 5000)
     recorded = 20.0 + 3.0 * np.sin(times / 3000.0)
     short, whole = History.of(times, recorded), History(tuple(times.tolist()), tuple(recorded.tolist()))
     assert len(short.times) <= 500
     for lag, expected in ((900.0, whole.followed(900.0, times, recorded)), (1e-3, recorded), (1e9, recorded[0])):
         np.testing.assert_allclose(short.followed(lag, times, recorded), expected, atol=1e-3)
-
-
-def test_rows_of_one_instant_count_as_their_mean_in_any_order():
+    # rows of one instant count as their mean in any order
     history = History.of(np.array([5.0, 0.0, 5.0]), np.array([30.0, 20.0, 20.0]))
     assert history == History((0.0, 5.0), (20.0, 25.0))

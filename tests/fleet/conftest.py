@@ -8,8 +8,8 @@ from thermal_robot import diagnose_many
 
 @pytest.fixture(scope="session")
 def fleet_folder(rv_m2, tmp_path_factory):
-    """Eight campaigns in two halls, one of them with a table that cannot be read."""
-    root = write_fleet(rv_m2, tmp_path_factory.mktemp("campaigns"), 8)
+    """Six campaigns in two halls, one of them with a table that cannot be read."""
+    root = write_fleet(rv_m2, tmp_path_factory.mktemp("campaigns"), 6)
     table = root / "hall_1" / "arm_05" / "measurements.csv"
     table.write_text(table.read_text().replace("\n", "\nnonsense,", 2))
     return root

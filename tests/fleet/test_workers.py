@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -51,7 +52,11 @@ def squares(numbers):
 
 def workers():
     """The processes that work, without nannies and helpers: those in which Python runs a worker."""
-    return [p for p in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.NoSuchProcess):  # one that was just ended
+            found += [process] if "spawn_main" in " ".join(process.cmdline()) else []
+    return found
 
 
 def test_every_task_is_answered_once_and_taken_as_it_is_worked_on(cluster):

@@ -9,7 +9,6 @@ from golden.record import REAL, campaign, diagnosed, shrinks, unchanged
 from thermal_robot import CorrectedModel
 from thermal_robot.report.words import MOST_WORDS
 
-POSITIONS = [name for name in REAL if name != "ipa_ur10_d"]
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(
@@ -18,7 +17,7 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("name", POSITIONS)
+@pytest.mark.parametrize("name", REAL)
 def test_the_same_is_said_as_before_and_the_headline_is_short(name):
     unchanged(name)
     assert len(diagnosed(name).summary.split()) <= MOST_WORDS
@@ -46,3 +45,30 @@ def fresh(found, folder):
     rms = np.sqrt((miss**2).sum(axis=1).mean())
     print(f"ur5_jacobi: {rms:.4f} mm on test.csv")
     return rms
+
+
+def test_ipa_ur10_d_is_calibrated_to_a_fifth_of_a_millimetre():
+    found = diagnosed("ipa_ur10_d")
+    assert found.finding("geometric").status == "found"
+    assert found.measures == "pose"
+    assert shrinks(found) > 0.9
+    assert found.gap.held_out.rms_after < 0.22e-3
+    assert found.gap.orientation_after < found.gap.orientation_before
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="the base link's bending, alike about both axes, is named in place of the joints' springs since columns "
+    "that are rounding take no part: the last digits decide which of thirty waves join, and these decide this",
+)
+def test_ipa_ur10_d_names_joints_that_yield():
+    """By hand, over its four series: 9 to 13 and 11 to 17 µrad/(N·m); a fit of this series alone 10 and 15."""
+    found = diagnosed("ipa_ur10_d")
+    springs = found.finding("joint_compliance")
+    assert springs.status == "found"
+    assert springs.probability > 0.7
+    lift, elbow = (
+        next(p for p in springs.parameters if joint in p.name) for joint in ("shoulder_lift_joint", "elbow_joint")
+    )
+    assert 9e-6 < lift.value < 13e-6
+    assert elbow.value - 2.0 * elbow.std < 11e-6 < 17e-6 < elbow.value + 2.0 * elbow.std

@@ -46,39 +46,41 @@ def integrated(linear, whitening, found):
     return total - density(peak) + 0.5 * peak @ np.linalg.solve(alike(linear, found), peak)
 
 
-def all_combinations(linear, whitening, log_prior=(-1.0, -2.0, -0.5)):
+PRIOR = (-1.0, -2.0, -0.5)
+
+
+def all_combinations(linear, whitening):
     problem = gram(linear, whitening)
-    search = Search(problem, log_prior)
+    search = Search(problem, PRIOR)
     chosen = [c for size in range(4) for c in combinations(range(3), size)]
     return problem, search, [search.evaluate(c) for c in chosen]
 
 
-@pytest.mark.parametrize("present", [(), (1,), (0, 2)])
-@pytest.mark.parametrize("held", [0.0, 20.0])
-@pytest.mark.parametrize("spreads", [(1.5, 1.5, 1.5), (0.5, 1.5, 1.0)])
-def test_evidence_is_the_density_of_the_gap(present, held, spreads):
-    log_prior = (-1.0, -2.0, -0.5)
-    for seed in range(5):
+LARGE = (1.5, 1.5, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("present", "held", "spreads", "larger"),
+    [
+        *((present, held, LARGE, 1.0) for present in ((), (1,), (0, 2)) for held in (0.0, 20.0)),
+        ((), 20.0, (0.5, 1.5, 1.0), 1.0),
+        ((0, 2), 0.0, (0.5, 1.5, 1.0), 1.0),
+        ((0, 2), 20.0, LARGE, 30.0),  # effects much larger than expected
+    ],
+)
+def test_evidence_is_the_density_of_the_gap(present, held, spreads, larger):
+    for seed in range(3):
         linear, whitening = small_problem(seed, present=present, held=held)
-        blocks = (replace(b, spread=s) for b, s in zip(linear.blocks, spreads, strict=True))
-        linear = replace(linear, blocks=tuple(blocks))
-        _, _, found = all_combinations(linear, whitening, log_prior)
+        blocks = zip(linear.blocks, spreads, strict=True)
+        linear = replace(linear, blocks=tuple(replace(b, spread=s, sizes=b.sizes / larger) for b, s in blocks))
+        _, _, found = all_combinations(linear, whitening)
         ours = np.array([c.log_evidence for c in found])
-        theirs = np.array([direct(linear, whitening, c, log_prior) + volume(linear, whitening, c) for c in found])
-        np.testing.assert_allclose(ours - ours[0], theirs - theirs[0], rtol=0, atol=1e-6)
-
-
-def test_evidence_is_the_density_of_the_gap_for_effects_much_larger_than_expected():
-    for seed in range(6):
-        linear, whitening = small_problem(seed, present=(0, 2))
-        linear = replace(linear, blocks=tuple(replace(b, sizes=b.sizes / 30.0) for b in linear.blocks))
-        _, _, found = all_combinations(linear, whitening, (0, 0, 0))
-        ours = np.array([c.log_evidence for c in found])
-        theirs = np.array([direct(linear, whitening, c, (0, 0, 0)) + volume(linear, whitening, c) for c in found])
+        theirs = np.array([direct(linear, whitening, c, PRIOR) + volume(linear, whitening, c) for c in found])
         # in a valley between a small and a large size the search for the peak may end on its brim
         peaked = np.isfinite(theirs)
-        assert peaked.sum() >= 6
-        np.testing.assert_allclose((ours - ours[0])[peaked], (theirs - theirs[0])[peaked], rtol=0, atol=1e-3)
+        assert peaked.sum() >= (8 if larger == 1.0 else 6)
+        off = ((ours - ours[0]) - (theirs - theirs[0]))[peaked]
+        np.testing.assert_allclose(off, 0.0, atol=1e-6 if larger == 1.0 else 1e-3)
 
 
 def test_evidence_is_the_integral_over_the_sizes_of_effects():
@@ -231,17 +233,11 @@ def test_the_mode_keeps_its_side_and_nothing_betters_it(size):
         assert (slope[~found.free] <= 1e-9).all()
         assert not found.values[~found.free].any()
         dropped += int((~found.free).sum())
+        # nor does it matter which were dropped before
+        again = Posterior.at(columns, SCALE, 0.5, (np.arange(size) % 2 == 0) | ~columns.positive)
+        np.testing.assert_allclose(again.values, found.values, atol=1e-12)
+        assert again.log_volume == pytest.approx(found.log_volume)
     assert dropped > 20
-
-
-def test_a_guess_of_what_is_dropped_does_not_change_the_mode():
-    for seed in range(20):
-        columns = drawn(seed)
-        found = Posterior.at(columns, SCALE, 0.5)
-        for guess in (np.zeros(6, dtype=bool), np.arange(6) % 2 == 0):
-            again = Posterior.at(columns, SCALE, 0.5, guess | ~columns.positive)
-            np.testing.assert_allclose(again.values, found.values, atol=1e-12)
-            assert again.log_volume == pytest.approx(found.log_volume)
 
 
 def log_integral(columns, scale, variance):
@@ -272,20 +268,15 @@ def test_one_column_has_the_volume_of_half_a_normal_prior(middle):
     assert ours(columns, scale, 1.0) == pytest.approx(np.log(quad(density, 0.0, 20.0, epsabs=1e-14)[0]), abs=1e-7)
 
 
-def test_several_columns_have_nearly_the_volume_of_their_orthant():
+def test_several_columns_have_nearly_the_volume_of_their_orthant_and_without_a_side_exactly_the_normal_laws():
     errors = []
     for seed in range(40):
         columns = drawn(seed)
         errors.append(ours(columns, SCALE, 4.0) - log_integral(columns, SCALE, 4.0))
+        free = Columns(columns.matrix, columns.vector, columns.owner, np.zeros(6, dtype=bool))
+        assert ours(free, SCALE, 2.0) == pytest.approx(log_integral(free, SCALE, 2.0), abs=1e-6)
     assert np.abs(np.median(errors)) < 0.3
     assert np.quantile(np.abs(errors), 0.9) < 1.5
-
-
-def test_without_a_side_the_volume_is_that_of_the_normal_law():
-    for seed in range(10):
-        known = drawn(seed)
-        columns = Columns(known.matrix, known.vector, known.owner, np.zeros(6, dtype=bool))
-        assert ours(columns, SCALE, 2.0) == pytest.approx(log_integral(columns, SCALE, 2.0), abs=1e-6)
 
 
 def test_the_slope_by_the_scale_is_that_of_the_volume():

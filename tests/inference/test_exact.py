@@ -17,7 +17,6 @@ from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.exact import (
     _leading,
     _others,
-    _ridge_step,
     corrected_observations,
     gauss_newton,
     heard,
@@ -59,7 +58,7 @@ def gained(rv_m2):
 
 
 def test_what_is_at_work_is_held_and_the_exact_model_leaves_the_noise(gained):
-    campaign, found, _ = gained
+    campaign, found, said = gained
     assert names_of(found) == ("joint_gain",)
     left = found.explanation.whitening.noise[0] * found.explanation.best.noise
     assert left == pytest.approx(NOISE, rel=0.15)
@@ -68,13 +67,14 @@ def test_what_is_at_work_is_held_and_the_exact_model_leaves_the_noise(gained):
     # the explanation is linearised there: its remainder is the exact one's
     used = found.explanation.whitening.weights > 0
     assert np.abs(found.explanation.remainder - exact.gap)[used].max() < 0.1 * NOISE
-
-
-def test_it_says_what_it_does(gained):
-    said = gained[2]
-    assert said[0] == "combinations of effects"
-    assert said[1:] == [f"exact fit, revision {k}" for k in range(1, len(said))]
+    # it says what it does
+    assert said == ["combinations of effects", *(f"exact fit, revision {k}" for k in range(1, len(said)))]
     assert 2 <= len(said) <= 4
+    # and one setting is never beside another of its name
+    assert len(found.families) == len(found.explanation.linear.blocks)
+    for combination in found.explanation.combinations:
+        names = [found.families[b] for b in combination.blocks]
+        assert len(names) == len(set(names))
 
 
 def test_where_it_starts_does_not_matter(gained):
@@ -92,15 +92,6 @@ def test_what_was_picked_out_of_many_must_explain_more(rv_m2):
     campaign = simulate(rv_m2, ["joint_gain"], seed=2, ratio=(2.0, 3.0))[0]
     assert names_of(settled(campaign)[0]) == ("joint_gain",)
     assert "joint_gain" not in names_of(settled(campaign, ("joint_offset", "drift"), (Rare(),))[0])
-
-
-def test_one_setting_is_never_beside_another_of_its_name(gained):
-    _, found, _ = gained
-    explanation = found.explanation
-    assert len(found.families) == len(explanation.linear.blocks)
-    for combination in explanation.combinations:
-        names = [found.families[b] for b in combination.blocks]
-        assert len(names) == len(set(names))
 
 
 def test_a_constant_is_moved_off_the_grid_to_where_it_is(rv_m2):
@@ -160,16 +151,6 @@ def test_an_effect_in_all_joints_is_tried_in_those_that_do_most(nominal):
     assert list(_leading(replace(offset, places=("joint_2",)), block(nominal, offset), values)) == []
 
 
-def test_places_stay_with_the_settings_that_have_them(nominal):
-    """Elongations of one link each are named by links, those common to all by joints besides."""
-    (warm,) = choose(("thermal_elongation",), (), ())
-    known = gate.variants(warm, nominal)
-    for setting in (alone for whole in known for alone in gate.alone(whole, nominal)):
-        for other in _others(setting, nominal, known):
-            assert set(other.places) <= set(gate.places_of(gate.checked(replace(other, places=()), nominal)))
-            gate.checked(other, nominal)
-
-
 def explained(data, names):
     """The observations, and the explanation by these effects in one setting each."""
     seen = observe(data, register(data))
@@ -188,23 +169,15 @@ def evidence(explanation, seen, effect):
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])
 @pytest.mark.parametrize("ratio", [30.0, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_no_constant_of_a_fine_grid_is_much_better(kind, constant, attribute, ratio):
-    for seed in range(3):
+    for seed in range(2):
         seen, explanation = explained(lagging("panda", seed, kind, constant, ratio), (kind,))
         ((effect, values),) = refined(explanation, seen, 1.6)
         own, found = evidence(explanation, seen, effect), getattr(effect, attribute)
         assert len(values) == len(explanation.linear.blocks[0].sizes)
-        grid = found * np.exp(np.linspace(-1.0, 1.0, 401))
+        grid = found * np.exp(np.linspace(-1.0, 1.0, 161))
         settings = [type(effect)(**{**effect.arguments(), attribute: float(c)}) for c in grid]
         # where an elongation that would be negative drops out, the evidence has a step of several tenths
         assert max(evidence(explanation, seen, s) for s in settings) < own + 0.4
-
-
-def test_effects_without_a_constant_stay_as_they_were(rv_m2):
-    data = simulate(rv_m2, ["joint_offset", "joint_gain"], seed=3)[0]
-    seen, explanation = explained(data, ("joint_offset", "joint_gain"))
-    for b, (effect, values) in zip(explanation.best.blocks, refined(explanation, seen, 1.6), strict=True):
-        assert effect is explanation.linear.blocks[b].effect
-        np.testing.assert_array_equal(values, explanation.values[b][0])
 
 
 def test_constants_of_several_effects_are_moved_together(rv_m2):
@@ -226,7 +199,7 @@ def test_constants_of_several_effects_are_moved_together(rv_m2):
     assert left(after) < 0.7 * left(before)
 
 
-@pytest.mark.parametrize("other", ["instrument_scale", "drift"])
+@pytest.mark.parametrize("other", ["instrument_scale", pytest.param("drift", marks=pytest.mark.slow)])
 def test_what_only_pays_for_a_constant_that_is_off_is_left_out(other):
     """At 3600 s instead of 2200 s both are needed; once the constant has moved, one is enough."""
     needed = 0
@@ -239,10 +212,16 @@ def test_what_only_pays_for_a_constant_that_is_off_is_left_out(other):
     assert needed >= 2
 
 
-def test_an_effect_at_work_stays_beside_a_constant(rv_m2):
-    data = simulate(rv_m2, ["joint_gain", LAG], seed=3, ratio=(5.0, 6.0))[0]
-    seen, explanation = explained(data, ("joint_gain", LAG))
-    assert [e.name for e, _ in refined(explanation, seen, 1.6)] == ["joint_gain", LAG]
+@pytest.mark.parametrize("other", [LAG, "joint_offset"])
+def test_an_effect_without_a_constant_stays_as_it_was_beside_others(rv_m2, other):
+    names = ("joint_gain", other)
+    seen, explanation = explained(simulate(rv_m2, names, seed=3, ratio=(5.0, 6.0))[0], names)
+    kept = refined(explanation, seen, 1.6)
+    assert {effect.name for effect, _ in kept} == set(names)
+    if other != LAG:  # nor do values move where no constant does
+        for b, (effect, values) in zip(explanation.best.blocks, kept, strict=True):
+            assert effect is explanation.linear.blocks[b].effect
+            np.testing.assert_array_equal(values, explanation.values[b][0])
 
 
 def test_a_share_of_friction_is_moved_no_closer_than_the_data_tell(rv_m2, monkeypatch):
@@ -314,9 +293,18 @@ def assert_least(campaign, explanation, observations, held, step):
         assert min(objective(campaign, explanation, frames, held) for frames in near) > least
 
 
-def test_no_neighbour_of_the_fit_has_a_smaller_misfit(fitted):
-    campaign, explanation, _, _, (observations, held) = fitted
+def test_no_neighbour_of_the_fit_has_a_smaller_misfit_and_another_fit_moves_nothing(fitted):
+    campaign, explanation, before, seen, (observations, held) = fitted
     assert_least(campaign, explanation, observations, held, 1e-6)
+    again, values = gauss_newton(campaign, observations.frames, explanation, held, SETTLED)
+    assert np.abs(again.gap - observations.gap).max() < 1e-3 * NOISE
+    for (_, now), (_, then) in zip(values, held, strict=True):
+        np.testing.assert_allclose(now, then, rtol=0, atol=1e-8)
+    # it leaves the noise where the linear one did not
+    linear = corrected_observations(campaign, seen.frames, before).gap
+    assert np.sqrt((linear**2).mean()) > 5.0 * NOISE
+    used = explanation.whitening.weights > 0
+    assert np.sqrt((observations.gap[used] ** 2).mean()) < 1.2 * NOISE
 
 
 def test_a_firm_prior_is_balanced_against_the_data(rv_m2):
@@ -329,22 +317,6 @@ def test_a_firm_prior_is_balanced_against_the_data(rv_m2):
     free, tight = (gauss_newton(campaign, seen.frames, e, held, SETTLED) for e in (explanation, firm))
     assert_least(campaign, firm, *tight, 1e-6)
     assert 0.0 < np.linalg.norm(tight[1][0][1]) < 0.9 * np.linalg.norm(free[1][0][1])
-
-
-def test_the_exact_model_leaves_the_noise_where_the_linear_one_did_not(fitted):
-    campaign, explanation, before, seen, (observations, _) = fitted
-    linear = corrected_observations(campaign, seen.frames, before).gap
-    assert np.sqrt((linear**2).mean()) > 5.0 * NOISE
-    used = explanation.whitening.weights > 0
-    assert np.sqrt((observations.gap[used] ** 2).mean()) < 1.2 * NOISE
-
-
-def test_another_fit_moves_nothing(fitted):
-    campaign, explanation, _, _, (observations, held) = fitted
-    again, values = gauss_newton(campaign, observations.frames, explanation, held, SETTLED)
-    assert np.abs(again.gap - observations.gap).max() < 1e-3 * NOISE
-    for (_, now), (_, then) in zip(values, held, strict=True):
-        np.testing.assert_allclose(now, then, rtol=0, atol=1e-8)
 
 
 def test_rows_without_weight_do_not_matter(fitted):
@@ -403,17 +375,3 @@ def test_a_linear_fit_that_went_astray_does_not_end_worse_than_it_began(fitted):
     assert objective(campaign, explanation, kept.frames, found) < begun
     for (_, one), (_, other) in zip(found, right, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
-
-
-def test_a_step_minimises_misfit_and_prior_together_and_a_damped_one_is_shorter_and_goes_downhill():
-    rng = np.random.default_rng(0)
-    design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
-    state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
-    rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
-    wanted = np.concatenate([gap, -state / prior])
-    stack = np.column_stack([design, gap])
-    steps, sizes = zip(*(_ridge_step(stack.T @ stack, state, prior, d) for d in (0.0, 0.1, 10.0)), strict=True)
-    np.testing.assert_allclose(steps[0], np.linalg.lstsq(rows, wanted, rcond=None)[0], rtol=1e-9)
-    assert sizes[0] == pytest.approx(np.linalg.norm(rows @ steps[0]), rel=1e-9)  # what it moves, in noise
-    assert (np.diff(np.linalg.norm(steps, axis=1)) < 0.0).all()
-    assert min(step @ rows.T @ wanted for step in steps) > 0.0

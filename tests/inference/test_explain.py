@@ -67,7 +67,8 @@ def test_the_remainder_is_the_gap_less_all_that_was_fitted():
     step = np.linalg.lstsq(design, framed, rcond=None)[0]
     np.testing.assert_allclose(design @ step, framed, rtol=0, atol=1e-14)
     np.testing.assert_allclose(step, [0.5, -0.2], rtol=0, atol=2e-5)
-    assert np.abs(found.smooth).max() == 0.0
+    assert np.abs(found.smooth).max() == 0.0  # without forms there is no discrepancy
+    assert (found.discrepancy.form, found.discrepancy.tau, found.discrepancy.probability) == (None, 0.0, 0.0)
 
 
 def test_rows_that_may_not_be_used_do_not_matter():
@@ -115,7 +116,7 @@ def test_log_priors_are_those_of_effects_and_not_of_settings():
     np.testing.assert_allclose(fewer, odds[:7])
 
 
-def test_settings_of_the_same_places_share_by_their_weight():
+def test_settings_of_the_same_places_share_by_their_weight_and_a_law_with_all_that_were_tried():
     hangs = Backlash(largest=(1.0, 1.0, 1.0), chain=("a", "b", "c"))
     shares = [replace(hangs, held=held) for held in (0.0, 0.2, 0.5, (0.5, 0.5, 0.0))]
     odds = np.exp(log_priors(shares))
@@ -123,9 +124,7 @@ def test_settings_of_the_same_places_share_by_their_weight():
     assert odds[1] == pytest.approx(odds[2])
     assert odds[0] > odds[1]
     assert odds[3] == pytest.approx(odds[2] / 5.0)
-
-
-def test_a_law_has_one_share_of_all_that_were_tried_however_many_are_compared():
+    # however many laws are compared
     laws = [Discovered(place=f"joint_{k}", quantity="time", tried=100.0 * k) for k in (1, 2)]
     odds = np.exp(log_priors([*choose(("joint_gain",), (), ()), *laws]))
     np.testing.assert_allclose(odds[0] / odds[1:], [100.0, 200.0])
@@ -172,7 +171,8 @@ def test_rows_of_one_pose_that_err_alike_count_less():
     assert np.mean(told) < 0.2
 
 
-def test_the_discrepancy_is_a_part_of_the_remainder_and_what_poses_share():
+def test_the_discrepancy_is_what_poses_share_and_part_of_the_remainder():
+    # the discrepancy is a part of the remainder and what poses share
     linear, each = alike(10, 2e-4)
     found = explained(linear, forms=(each,))
     for pose in range(8):
@@ -180,11 +180,12 @@ def test_the_discrepancy_is_a_part_of_the_remainder_and_what_poses_share():
         assert np.ptp(found.smooth[own], axis=0).max() < 1e-12
         # three sigma of the mean of ten rows
         assert np.abs(found.smooth[own][0] - found.remainder[own].mean(axis=0)).max() < 3.0 * 2e-5 / np.sqrt(10.0)
-
-
-def test_without_forms_there_is_no_discrepancy():
-    found = explained(problem(1)[0])
-    assert (found.discrepancy.form, found.discrepancy.tau, found.discrepancy.probability) == (None, 0.0, 0.0)
+    # a noise that is not stated is read off the remainder
+    linear, _, _ = problem(7, (1,))
+    found = explained(linear, Noise())
+    assert found.best.blocks == (1,)
+    assert (found.whitening.noise * found.best.noise)[0] == pytest.approx(2e-5, rel=0.15)
+    assert found.whitening.held == 0.0
 
 
 def test_where_the_search_starts_does_not_matter():
@@ -197,11 +198,3 @@ def test_where_the_search_starts_does_not_matter():
     # a start that is not allowed is left out
     two = explained(linear, families=("a", "b", "a"), starts=[(0, 2)])
     assert not {0, 2} <= set(two.best.blocks)
-
-
-def test_a_noise_that_is_not_stated_is_read_off_the_remainder():
-    linear, _, _ = problem(7, (1,))
-    found = explained(linear, Noise())
-    assert found.best.blocks == (1,)
-    assert (found.whitening.noise * found.best.noise)[0] == pytest.approx(2e-5, rel=0.15)
-    assert found.whitening.held == 0.0

@@ -12,7 +12,7 @@ from thermal_robot.diagnosis.prune import grown
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
-from thermal_robot.inference.fit import fit, refit
+from thermal_robot.inference.fit import fit
 from thermal_robot.inference.generate import HeldOut, candidates, discovered, events, gathered, listed, where
 from thermal_robot.inference.grouping import each
 from thermal_robot.inference.screening import Thin
@@ -48,28 +48,20 @@ def found(stepped):
     return lawful(stepped)
 
 
-def test_the_true_law_is_the_first_that_is_offered(offered):
+def test_the_true_law_is_offered_first_and_pays_for_all_among_which_it_was_picked(offered, stepped):
+    # the true law is the first that is offered
     assert 1 < len(offered) <= settings.COMPARED_LAWS
     assert len(set(offered)) == len(offered)
     assert {law.name for law in offered} == {"discovered.2"}
     assert (offered[0].kind, offered[0].place, offered[0].quantity) == ("joint", "joint_3", "time")
     assert offered[0].shape in ("step", "slide")
-
-
-def test_a_law_pays_for_all_places_quantities_and_shapes_among_which_it_was_picked(stepped, offered):
-    """At each of five joints, base, tool: every quantity, and of each shapes; and segments besides."""
+    # At each of five joints, base, tool: every quantity, and of each shapes; and segments besides.
     robot = stepped.campaign.robot
     for law in offered:
         # a mark in time has its share of the range, all others are counted
         assert law.shape == "step" or law.tried == round(law.tried)
         assert law.tried > (robot.n + 2) * 15
         assert law.share == pytest.approx(1.0 / law.tried)
-
-
-def test_in_which_order_laws_are_offered_does_not_matter(stepped, offered):
-    for laws in (offered, offered[::-1]):
-        ((law, _),) = refit(stepped, {"discovered.2": laws}, [[law] for law in laws]).effects
-        assert (law.place, law.quantity) == ("joint_3", "time")
 
 
 def test_place_and_quantity_have_probabilities(found):
@@ -85,14 +77,11 @@ def test_place_and_quantity_have_probabilities(found):
         assert sum(chances) <= 1.0 + 1e-9  # one law at a time
 
 
-def test_a_fit_without_laws_has_discovered_none(stepped):
-    assert discovered(stepped) == ()
-
-
 @pytest.mark.parametrize(
     ("law", "values"), [(STEP, [0.0, 6e-4]), (BEND, [0.0, 4e-3])], ids=["a step in time", "a bend of a joint"]
 )
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)])
+@pytest.mark.slow  # each is found once below
+@pytest.mark.parametrize("seed", [1, 2, 5])
 def test_an_injected_law_is_found_with_place_and_quantity(rv_m2, law, values, seed):
     own = lawful(known(with_law(rv_m2, law, values, seed=seed)[0]))
     (named,) = discovered(own)
@@ -122,10 +111,11 @@ def test_noise_makes_no_law(rv_m2):
     assert worth == []
 
 
-def test_repeats_of_few_poses_make_no_law_of_what_a_pose_brings(rv_m2):
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 12), marks=pytest.mark.slow)], ids=len)
+def test_repeats_of_few_poses_make_no_law_of_what_a_pose_brings(rv_m2, seeds):
     """Threefold visits to poses that each have an error of their own: rows of one pose count once."""
     worth = []
-    for seed in range(8):
+    for seed in seeds:
         plain = simulate(rv_m2, samples=40, seed=seed, noise=NOISE)[0].take(np.repeat(np.arange(40), 3))
         rng = np.random.default_rng(seed)
         shared = np.repeat(2.0 * NOISE * rng.normal(size=(40, 3)), 3, axis=0)
@@ -151,25 +141,19 @@ def test_what_a_known_effect_and_a_zero_do_is_no_law(rv_m2):
         assert not listed(Thin.of(known(campaign, fewer)), levels)
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_a_known_effect_that_is_at_work_in_several_joints_leaves_nothing_to_find(rv_m2, seed):
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow), 4])
+def test_a_known_effect_that_is_at_work_in_one_joint_or_several_leaves_nothing_to_find(rv_m2, seed):
     campaign, truth, _ = simulate(rv_m2, ["backlash"], seed=seed, noise=NOISE)
-    assert len(truth["parts"]["backlash"]["values"]) > 1
-    own = known(campaign)
-    assert [effect.name for effect, _ in own.effects] == ["backlash"]
-    assert grown(own, 1, lambda _: None) is None
-
-
-def test_an_effect_of_one_joint_is_that_effect_in_that_joint_and_no_law(rv_m2):
-    campaign, truth, _ = simulate(rv_m2, ["backlash"], seed=4, noise=NOISE)
-    assert list(truth["parts"]["backlash"]["values"]) == ["lost motion, joint_5"]
+    faulty = tuple(name.removeprefix("lost motion, ") for name in truth["parts"]["backlash"]["values"])
+    assert (len(faulty) > 1) == (seed != 4)
     own = known(campaign)
     ((effect, _),) = own.effects
-    assert (effect.name, effect.places) == ("backlash", ("joint_5",))
+    assert effect.name == "backlash"
+    assert effect.places == faulty or seed != 4
     assert grown(own, 1, lambda _: None) is None
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_effects_that_had_taken_the_cause_upon_themselves_go_again(rv_m2, seed):
     """A joint that errs on one side of a place alone looks like a zero and a gain."""
     own = known(with_law(rv_m2, BEND, [0.0, 4e-3], seed=seed)[0])
@@ -177,13 +161,6 @@ def test_effects_that_had_taken_the_cause_upon_themselves_go_again(rv_m2, seed):
     assert not any(isinstance(effect, Discovered) for effect, _ in own.effects)
     again = lawful(own)
     ((law, _),) = again.effects
-    assert (law.place, law.quantity) == ("joint_2", "joint_2")
-
-
-def test_a_law_does_better_than_an_effect_that_stands_in_for_it(rv_m2):
-    feigned = known(with_law(rv_m2, BEND, [0.0, 4e-3], seed=1)[0], ("joint_gain",))
-    assert [effect.name for effect, _ in feigned.effects] == ["joint_gain"]
-    ((law, _),) = lawful(feigned).effects
     assert (law.place, law.quantity) == ("joint_2", "joint_2")
 
 
@@ -228,8 +205,17 @@ def with_events(campaign, *only):
     return known, events(known)
 
 
-@pytest.mark.parametrize("kind", ["base", "tool", "joint"])
-@pytest.mark.parametrize("span", [(0, 30), (50, ROWS), (35, 55)])
+SPANS = {"base": (0, 30), "tool": (50, ROWS), "joint": (35, 55)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "span"),
+    [
+        pytest.param(kind, span, marks=() if own == kind else pytest.mark.slow)
+        for kind in SPANS
+        for own, span in SPANS.items()
+    ],
+)
 def test_rows_that_go_together_are_one_event_at_its_place(kind, span):
     """1 mm or 1 mrad: before, after, and between two changes; each of its rows is in it and no other."""
     data = spliced(measured(), shifted(kind, 1e-3), slice(*span))
@@ -270,7 +256,7 @@ def test_noise_and_ordinary_effects_are_no_events():
 
 def test_gross_errors_side_by_side_are_no_event():
     """Three lost beams in a row, each its own way: rows that share in nothing."""
-    for seed in range(8):
+    for seed in range(4):
         data, rng = measured(), np.random.default_rng(seed)
         position = data.position.copy()
         position[40:43] += rng.normal(size=(3, 3)) * 3e-3
@@ -296,7 +282,13 @@ def test_rows_set_aside_near_each_other_are_told_from_single_ones():
     assert np.flatnonzero(gathered(known, aside)).tolist() == [30, 33, 34, 36]
 
 
-@pytest.mark.parametrize(("kind", "says"), [("tool", "the target sits 1 mm elsewhere"), ("joint", "zero 1 mrad off")])
+@pytest.mark.parametrize(
+    ("kind", "says"),
+    [
+        ("tool", "the target sits 1 mm elsewhere"),
+        pytest.param("joint", "zero 1 mrad off", marks=pytest.mark.slow),
+    ],
+)
 def test_an_event_is_told_by_its_rows_and_leaves_the_other_effect_its_size(kind, says):
     """Lost motion beside an event: the same as without it, within what noise allows."""
     lost = {"backlash": 3e-4}
@@ -315,38 +307,18 @@ def test_an_event_is_told_by_its_rows_and_leaves_the_other_effect_its_size(kind,
         assert one.value == pytest.approx(same.value, abs=3.0 * np.hypot(one.std, same.std))
 
 
-def left_out(columns, values, flat, prior, folds):
-    return HeldOut.of(columns, values, folds).left(flat, prior)
-
-
-def problem(seed, noise=1.0):
-    rng = np.random.default_rng(seed)
+def test_what_is_left_of_rows_held_out_is_what_separate_fits_leave():
+    """A column that a tight prior holds at nothing is as none; a further one counts as if it had been there."""
+    rng = np.random.default_rng(0)
     columns = rng.normal(size=(60, 3, 4))
-    truth = np.array([1.0, -2.0, 0.5, 3.0])
-    return columns, columns @ truth + noise * rng.normal(size=(60, 3))
-
-
-def test_it_is_what_separate_fits_leave():
-    columns, values = problem(0)
-    labels = np.arange(60) % 5
-    expected = 0.0
+    values = columns @ [1.0, -2.0, 0.5, 3.0] + rng.normal(size=(60, 3))
+    labels, expected, none = np.arange(60) % 5, 0.0, np.zeros(0)
     for label in range(5):
         held = labels == label
         fitted = np.linalg.lstsq(columns[~held].reshape(-1, 4), values[~held].ravel(), rcond=None)[0]
         expected += ((values[held] - columns[held] @ fitted) ** 2).sum()
-    np.testing.assert_allclose(left_out(columns, values, 4, np.zeros(0), each(labels)), expected, rtol=1e-8)
-
-
-def test_a_tight_prior_holds_a_column_at_nothing():
-    columns, values = problem(2)
-    folds = each(np.arange(60) % 6)
-    without = left_out(columns[:, :, :3], values, 3, np.zeros(0), folds)
-    np.testing.assert_allclose(left_out(columns, values, 3, np.array([1e12]), folds), without, rtol=1e-6)
-
-
-def test_a_further_column_counts_as_if_it_had_been_there():
-    columns, values = problem(5)
-    folds, prior = each(np.arange(60) % 6), np.array([0.3])
-    first = HeldOut.of(columns[:, :, :3], values, folds)
-    whole = left_out(columns, values, 3, prior, folds)
-    np.testing.assert_allclose(first.left(3, prior, columns[:, :, 3:]), whole, rtol=1e-12)
+    whole, first = (HeldOut.of(own, values, each(labels)) for own in (columns, columns[:, :, :3]))
+    np.testing.assert_allclose(whole.left(4, none), expected, rtol=1e-8)
+    np.testing.assert_allclose(whole.left(3, np.array([1e12])), first.left(3, none), rtol=1e-6)
+    prior = np.array([0.3])
+    np.testing.assert_allclose(first.left(3, prior, columns[:, :, 3:]), whole.left(3, prior), rtol=1e-12)

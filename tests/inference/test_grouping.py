@@ -10,7 +10,6 @@ from simulate import commands
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference.grouping import (
     blocks,
-    each,
     in_a_row,
     in_order,
     near_repeats,
@@ -55,17 +54,6 @@ def test_points_of_two_paths_are_not_the_same_pose_whatever_they_are_called(rv_m
     assert repeated_poses(campaign.take([3, 5]))[0] != repeated_poses(campaign.take([3, 5]))[1]
 
 
-def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
-    q = commands(rv_m2, 60, np.random.default_rng(1))
-    label = np.array([f"p{k % 20}" for k in range(60)])
-    label[::7] = ""
-    campaign = Campaign("labelled", rv_m2, q, labels={"pose": label})
-    cluster = near_repeats(campaign)
-    for name in set(label) - {""}:
-        assert len(set(cluster[label == name])) == 1
-    assert len(set(cluster)) == len(set(label) - {""}) + np.sum(label == "")
-
-
 def test_a_path_is_not_one_single_repeat(rv_m2):
     """Samples along a path lie within a hair of each other from end to end: they still make blocks."""
     along = np.linspace(0.0, 1.0, 500)[:, None]
@@ -90,29 +78,14 @@ def test_blocks_are_consecutive_in_time_and_of_one_size(rv_m2, samples):
     assert set(blocks(Campaign("long", rv_m2, q), 4)) == set(range(4))
 
 
-def test_each_row_is_in_the_mask_of_its_label():
-    labels = np.array([3, 1, 3, 7, 1])
-    masks = each(labels)
-    np.testing.assert_array_equal(np.sum(masks, axis=0), np.ones(5))
-    assert [sorted(np.flatnonzero(mask)) for mask in masks] == [[1, 4], [0, 2], [3]]
-
-
-def test_neighbourhoods_share_the_rows_out_evenly(rv_m2):
-    rng = np.random.default_rng(4)
-    campaign = Campaign("rows", rv_m2, rng.uniform(-1, 1, (200, 5)))
-    boxes = neighbourhoods(campaign, 16)
-    assert np.ptp(np.bincount(boxes)) <= 1
-    inside = np.mean([campaign.q[boxes == b].var(axis=0).sum() for b in range(16)])
-    assert inside < 0.7 * campaign.q.var(axis=0).sum()
-
-
 def clocked(robot, **columns):
     """Twelve rows whose clock runs otherwise than the file."""
     q = commands(robot, 12, np.random.default_rng(5))
     return Campaign("clocked", robot, q, covariates={k: np.asarray(v, dtype=float) for k, v in columns.items()})
 
 
-def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m2):
+def test_rows_follow_each_other_by_the_clock_and_stand_in_a_row_where_three_do(rv_m2):
+    # rows follow each other by the clock and without one as in the file
     backwards = np.arange(12.0)[::-1]
     np.testing.assert_array_equal(in_order(clocked(rv_m2)), np.arange(12))
     np.testing.assert_array_equal(in_order(clocked(rv_m2, time=backwards)), np.arange(12)[::-1])
@@ -120,9 +93,7 @@ def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m
     # the time is the better clock; rows of one time stay as they are
     both = clocked(rv_m2, time=np.arange(12.0) // 3, order=backwards)
     np.testing.assert_array_equal(in_order(both), np.arange(12))
-
-
-def test_of_rows_set_aside_those_that_follow_each_other_thrice_stand_in_a_row(rv_m2):
+    # of rows set aside those that follow each other thrice stand in a row
     time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
     aside = np.isin(np.arange(12), [0, 1, 2, 4, 9, 10, 11])
     # by the clock: rows 0, 2, 4 at 0, 1, 2; rows 10, 1 at 5 and 6; rows 9, 11 at 10 and 11
@@ -148,10 +119,11 @@ def test_repeated_poses_are_those_of_one_command_or_label(arm):
     # the label counts where there is one, an empty one stands alone
     label = np.array([f"p{k % 20}" for k in range(120)])
     label[:4] = ""
-    told = repeated_poses(replace(apart, labels={"pose": label}))
-    assert len(set(told)) == 20 + 4
-    for name in set(label) - {""}:
-        assert len(set(told[label == name])) == 1
+    far = replace(campaign, q=commands(arm, 120, np.random.default_rng(1)), labels={"pose": label})
+    for rows in (repeated_poses(far), near_repeats(far)):
+        for name in set(label) - {""}:
+            assert len(set(rows[label == name])) == 1
+        assert len(set(rows)) == 20 + 4
 
 
 def same(labels):
@@ -174,6 +146,7 @@ def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
     half = neighbourhoods(campaign, 2)
     assert max(q[half == half[q[:, 1].argmin()], 1]) < min(q[half == half[q[:, 1].argmax()], 1])
     boxes = neighbourhoods(campaign, 16)
+    assert np.ptp(np.bincount(boxes)) <= 1
     low = np.array([q[boxes == b].min(axis=0) for b in range(16)])
     high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
     apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])

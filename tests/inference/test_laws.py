@@ -52,33 +52,15 @@ def test_every_quantity_is_tried_at_every_place(here):
     assert {(law.place, law.shape) for law in links} == {(s, k) for s in segments for k in ("smooth", "constant")}
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
-def test_every_law_that_is_tried_has_columns(arm):
-    here = observed(arm)
-    for law in laws(here, ("joint", "base", "tool", "link"), ["time", "payload", arm.joint_names[0]]):
-        own = block(here, law).columns
-        assert own.shape[2] >= 1
-        assert np.isfinite(own).all()
-        assert np.abs(own).max() > 0.0
-
-
-def test_labels_are_levels_with_their_names(rv_m2):
-    session = np.array(["monday", "tuesday", "friday"])[np.arange(40) % 3]
-    here = observed(rv_m2, labels={"session": session})
-    (law,) = laws(here, ("base",), ["session"])
-    assert (law.shape, law.labels) == ("levels", ("friday", "monday", "tuesday"))
-    assert law.functions(law.values(here))[1] == ("at friday", "at monday", "at tuesday")
-
-
 def test_a_stated_gear_adds_the_orders_of_the_motor(rv_m2):
     here = observed(rv_m2, gears={"joint_2": 101.0})
-    assert harmonics(here, "joint_1") == (1.0, 2.0, 3.0)
-    assert harmonics(here, "joint_2") == (1.0, 2.0, 3.0, 101.0, 202.0)
     tried = {law.marks for law in laws(here, ("joint",), ["joint_2"]) if law.shape == "harmonic"}
     assert tried == {(1.0,), (2.0,), (3.0,), (101.0,), (202.0,)}
+    assert harmonics(here, "joint_1") == (1.0, 2.0, 3.0)
 
 
-def test_knots_stand_apart_where_most_values_lie_in_one_spot():
+def test_quantities_are_levels_or_smooth_with_knots_apart():
+    # knots stand apart where most values lie in one spot
     rng = np.random.default_rng(0)
     values = np.concatenate([1.0 - 1e-6 * rng.random(500), rng.uniform(0.7, 1.0, 20)])
     marks = np.array(of_quantity(Discovered(), values).marks)
@@ -87,9 +69,7 @@ def test_knots_stand_apart_where_most_values_lie_in_one_spot():
     np.testing.assert_allclose(
         of_quantity(Discovered(), spread).marks, np.quantile(spread, np.linspace(0.02, 0.98, 5)), rtol=1e-12
     )
-
-
-def test_few_values_are_levels_and_many_a_smooth_law():
+    # few values are levels and many a smooth law
     few = of_quantity(Discovered(), np.array([3.0, 1.0, 2.0, 1.0, 3.0]))
     assert (few.shape, few.marks, few.origin, few.span) == ("levels", (1.0, 2.0, 3.0), 1.0, 2.0)
     assert of_quantity(Discovered(), np.arange(6.0)).shape == "levels"
@@ -123,20 +103,6 @@ def test_shapes_are_those_that_the_quantity_may_have():
         assert names(shapes(of_quantity(plain, count), count)) == {"levels"} | more
 
 
-def test_every_shape_holds_the_constant_and_marks_lie_within_the_range():
-    """An error that is the same throughout must not look like a law; beyond the outer marks no row would speak."""
-    values = np.random.default_rng(2).uniform(-1.0, 1.0, 200)
-    law = of_quantity(Discovered(quantity="velocity.joint_1", place="velocity.joint_1"), values)
-    for shape in shapes(law, values):
-        functions = shape.functions(values)[0]
-        ones = np.ones(200)
-        fitted = functions @ np.linalg.lstsq(functions, ones, rcond=None)[0]
-        np.testing.assert_allclose(fitted, ones, atol=1e-9, err_msg=shape.shape)
-        if shape.shape in ("step", "slide", "hinge", "bump"):
-            assert np.mean(values < shape.marks[0]) > 0.05
-            assert np.mean(values > shape.marks[0]) > 0.05
-
-
 @pytest.mark.parametrize("unit", [(1.0, 0.0), (1e-3, 273.15), (-40.0, 7.0)], ids=["as it is", "scaled", "reversed"])
 def test_smooth_columns_are_uncorrelated_and_do_not_depend_on_units(unit):
     rng = np.random.default_rng(3)
@@ -146,6 +112,7 @@ def test_smooth_columns_are_uncorrelated_and_do_not_depend_on_units(unit):
         assert k == (4 if len(set(values)) > 6 else 2)
         np.testing.assert_allclose(own.mean(axis=0), 0.0, atol=1e-9)
         np.testing.assert_allclose(own.T @ own / 300, np.eye(k), atol=1e-9)
+        assert smooth_columns(np.full(20, 3.0)).shape == (20, 0)
         plain = smooth_columns(values)
         np.testing.assert_allclose(own @ own.T, plain @ plain.T, atol=1e-6)
         # a straight line is one of their sums
@@ -153,17 +120,10 @@ def test_smooth_columns_are_uncorrelated_and_do_not_depend_on_units(unit):
         np.testing.assert_allclose(own @ (own.T @ line) / 300, line, atol=1e-6)
 
 
-def test_a_quantity_that_does_not_vary_has_no_columns():
-    assert smooth_columns(np.full(20, 3.0)).shape == (20, 0)
-
-
-def test_conditions_are_what_is_recorded_and_of_joints_their_own(here):
-    assert set(conditions(here)) == {"time", "temperature", "payload"}
-    own = {"approach.joint_2", "velocity.joint_2", "acceleration.joint_2"}
-    assert set(conditions(here, "joint_2")) == set(conditions(here)) | own
-
-
 def test_every_effect_that_varies_in_a_joint_may_change_there(here):
+    own = {"approach.joint_2", "velocity.joint_2", "acceleration.joint_2"}
+    assert set(conditions(here)) == {"time", "temperature", "payload"}
+    assert set(conditions(here, "joint_2")) == set(conditions(here)) | own
     found = modulated(here)
     pairs = {(law.of, law.place) for law in found}
     varying = {"joint_gain", "transmission_error", "backlash", "joint_compliance", "tracking_lag"}
@@ -180,37 +140,38 @@ def test_every_effect_that_varies_in_a_joint_may_change_there(here):
         assert np.abs(block(here, law).columns).max() > 0.0
 
 
-def test_an_effect_keeps_the_setting_that_it_is_offered_in(here):
-    offered = TransmissionError((1, 3), places=("joint_2",))
-    found = modulated(here, [offered])
-    assert {law.place for law in found} == {"joint_2"}
-    single = gate.at(TransmissionError((1, 3)), "joint_2", here)
-    assert {law.modulated for law in found} == {single}
-
-
 class Sag(Effect):
     """An effect of somebody's own, which no package offers."""
 
     name = "sag"
 
     def parameters(self, observations):
-        q = observations.q
         return tuple(
-            Parameter("sag", "rad", 1e-3, "joint", joint, (at_joint(j, q[:, j]),))
+            Parameter("sag", "rad", 1e-3, "joint", joint, (at_joint(j, observations.q[:, j]),))
             for j, joint in enumerate(observations.robot.joint_names)
         )
 
 
-def test_what_a_saved_law_could_not_name_is_left_out_and_so_is_what_stands_still(here):
+def test_an_effect_changes_in_the_setting_it_is_offered_in_and_never_with_what_it_is_made_of(here):
+    offered = TransmissionError((1, 3), places=("joint_2",))
+    found = modulated(here, [offered])
+    assert {law.place for law in found} == {"joint_2"}
+    assert {law.modulated for law in found} == {gate.at(TransmissionError((1, 3)), "joint_2", here)}
+    # a wave that changed with its own position would be any law of that position
+    found = modulated(here, [library()["transmission_error"], library()["joint_gain"]])
+    assert not any(law.quantity == law.place for law in found)
+    # what a saved law could not name is left out, and so is what stands still
     assert modulated(here, [Sag(), JointOffset()]) == []
     assert modulated(observed(here.robot, covariates={}), [library()["backlash"]]) == []
 
 
-def test_a_session_is_a_value_each_for_an_effect_and_no_factor(rv_m2):
-    labels = {"session": np.array(["am", "pm", "am", "noon"] * 10)}
-    here = observed(rv_m2, labels=labels)
-    found = [law for law in modulated(here) if law.quantity == "session"]
+def test_a_session_is_a_value_each_and_no_factor(rv_m2):
+    here = observed(rv_m2, labels={"session": np.array(["am", "pm", "am", "noon"] * 10)})
+    (law,) = laws(here, ("base",), ["session"])
+    assert law.functions(law.values(here))[1] == ("at am", "at noon", "at pm")
+    found = [law, *(law for law in modulated(here) if law.quantity == "session")]
     assert {(law.shape, law.labels) for law in found} == {("levels", ("am", "noon", "pm"))}
+    assert len(found) > 1
     assert not any("session" in (law.quantity, law.by) for law in products(here, ("joint", "base", "tool")))
 
 
@@ -264,9 +225,3 @@ def test_each_joint_remembers_its_own_turns_if_rows_are_in_an_order(here):
     assert {(law.shape, law.starts) for law in started} == {("relaxing", (here.covariates["time"].min(),))}
     assert memory(observed(here.robot, covariates={})) == []
     assert memory(observe(commanded(here.robot))) == []
-
-
-def test_a_wave_does_not_change_with_its_own_position(rv_m2):
-    """It would be any law of that position, of many functions that cancel."""
-    found = modulated(observed(rv_m2), [library()["transmission_error"], library()["joint_gain"]])
-    assert not any(law.quantity == law.place for law in found)

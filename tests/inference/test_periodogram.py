@@ -26,8 +26,20 @@ def test_a_joint_that_is_held_has_no_orders(jitter):
     assert len(orders(0.7 + noise)) == 0
 
 
-def test_a_joint_that_creeps_has_orders_though_no_two_positions_are_far_apart():
+def test_orders_end_where_a_joint_creeps_or_a_screw_begins():
+    # a joint that creeps has orders though no two positions are far apart
     assert len(orders(np.linspace(0.2, 0.25, 2000))) > 0
+    # a slide is searched down to the lead of a screw
+    rng = np.random.default_rng(3)
+    for period in (0.005, 0.02, 0.11):
+        q, _, _, seat = drawn(int(1e4 * period), reach=0.8, order=2.0 * np.pi / period, size=2e-4)
+        found = peak(seat, q, orders(q, slides=True))
+        assert 2.0 * np.pi / found == pytest.approx(period, rel=1e-3)
+    assert len(orders(np.zeros(ROWS))) == 0
+    assert independent(orders(np.zeros(ROWS))) == 0.0
+    # twice as far, twice as many orders can be told apart
+    near, far = (independent(orders(r * rng.uniform(0.0, 1.0, 4000))) for r in (1.5, 3.0))
+    assert far == pytest.approx(2.0 * near, rel=0.02)
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-6, 1e-5])
@@ -69,19 +81,6 @@ def test_the_peak_is_the_order_that_was_put_in(seed):
     assert target.worth(moves * wave(q, found)[:, None, :]).gain >= (
         target.worth(moves * wave(q, order)[:, None, :]).gain - 1e-3
     )
-
-
-def test_a_slide_is_searched_down_to_the_lead_of_a_screw():
-    rng = np.random.default_rng(3)
-    for period in (0.005, 0.02, 0.11):
-        q, _, _, seat = drawn(int(1e4 * period), reach=0.8, order=2.0 * np.pi / period, size=2e-4)
-        found = peak(seat, q, orders(q, slides=True))
-        assert 2.0 * np.pi / found == pytest.approx(period, rel=1e-3)
-    assert len(orders(np.zeros(ROWS))) == 0
-    assert independent(orders(np.zeros(ROWS))) == 0.0
-    # twice as far, twice as many orders can be told apart
-    near, far = (independent(orders(r * rng.uniform(0.0, 1.0, 4000))) for r in (1.5, 3.0))
-    assert far == pytest.approx(2.0 * near, rel=0.02)
 
 
 def test_in_noise_the_choice_of_an_order_is_paid_for():

@@ -1,6 +1,5 @@
 """What the normal equations hold: frames projected out, rows in their own noise, what nothing tells apart left out."""
 
-import gc
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,6 @@ from simulate import simulate
 from thermal_robot import diagnose
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.problem import (
     Linear,
     Products,
@@ -73,14 +71,6 @@ def test_aliases_of_the_frames_vanish():
     assert again.total == pytest.approx(plain.total, rel=1e-9)
 
 
-def test_a_frame_that_is_there_twice_counts_once():
-    linear, whitening = small_problem(2)
-    twice = replace(linear, frames=np.concatenate([linear.frames, linear.frames[:, :, :1] * 5.0], axis=2))
-    plain, again = gram(linear, whitening), gram(twice, whitening)
-    assert again.equations == plain.equations
-    np.testing.assert_allclose(again.matrix, plain.matrix, rtol=1e-9, atol=1e-9)
-
-
 def test_rows_without_weight_do_not_count():
     linear, whitening = small_problem(3)
     spoilt = replace(linear, gap=linear.gap.copy())
@@ -102,6 +92,10 @@ def test_the_frames_step_leaves_nothing_that_frames_could_explain(twice):
     step = frame_step(linear, whitening, linear.gap)
     left = flat(linear, whitening, (linear.gap - linear.frames @ step)[:, :, None])
     assert np.abs(flat(linear, whitening, linear.frames).T @ left).max() < 1e-9
+    # and a frame that is there twice counts once
+    plain, again = gram(small_problem(5)[0], whitening), gram(linear, whitening)
+    assert again.equations == plain.equations
+    np.testing.assert_allclose(again.matrix, plain.matrix, rtol=1e-9, atol=1e-9)
     none = replace(linear, frames=linear.frames[:, :, :0])
     assert frame_step(none, whitening, linear.gap).shape == (0,)
 
@@ -133,17 +127,6 @@ def test_a_block_lies_within_another_where_the_data_cannot_tell(left, held):
     # what moves the gap by less than its noise is not told from anything
     faint = replace(linear, blocks=(*linear.blocks[:2], columns_of(1e-3 * linear.blocks[2].columns)))
     assert frozenset({1, 2}) in contained(gram(faint, whitening))
-
-
-def test_contributions_add_up_to_what_an_explanation_does_to_the_gap():
-    linear, whitening = small_problem(8, present=(1,), noise=1e-6)
-    none = Combination((1,), 0.0, 1.0, {1: 1.0}, np.zeros(2), np.eye(2), 2.0)
-    assert np.abs(linear.contribution(1, parameter_values(linear, gram(linear, whitening), none)[1][0])).max() == 0.0
-    found = Search(gram(linear, whitening), (0.0,) * 3).evaluate((1,))
-    values = parameter_values(linear, gram(linear, whitening), found)[1][0]
-    left = linear.gap - linear.contribution(1, values)
-    left = left - linear.frames @ frame_step(linear, whitening, left)
-    assert np.abs(left[whitening.weights > 0]).max() < 1e-5
 
 
 def test_values_are_the_posterior_mean_and_covariance():
@@ -227,12 +210,11 @@ def test_geometric_contains_offsets_and_for_positions_scale_and_nothing_else(arm
 
 
 @pytest.mark.parametrize("arm", ["ur10"], indirect=True)
-def test_two_effects_of_which_one_contains_the_other_are_never_named_together(arm):
-    for seed, both in enumerate([["geometric", "joint_offset"], ["geometric", "instrument_scale"]]):
-        campaign = simulate(arm, both, seed=seed)[0]
-        found = diagnose(campaign)
-        assert found.verdict == ("geometric",)
-        assert found.finding(both[1]).status != "found"
+@pytest.mark.parametrize("part", [pytest.param("joint_offset", marks=pytest.mark.slow), "instrument_scale"])
+def test_two_effects_of_which_one_contains_the_other_are_never_named_together(arm, part):
+    found = diagnose(simulate(arm, ["geometric", part], seed=int(part == "instrument_scale"))[0])
+    assert found.verdict == ("geometric",)
+    assert found.finding(part).status != "found"
 
 
 def test_each_row_is_whitened_by_its_own_noise():
@@ -293,35 +275,15 @@ def covariances(rng, rows):
     return (turned * 10.0 ** rng.uniform(-10, -6, (rows, 1, 3))) @ turned.transpose(0, 2, 1)
 
 
-def test_rows_have_the_covariance_of_the_noise():
-    rng = np.random.default_rng(0)
-    linear = small_problem(0)[0]
-    covariance = np.repeat(covariances(rng, 1), 12, axis=0)
-    gaps = []
-    for _ in range(2000):
-        gap = rng.multivariate_normal(np.zeros(3), covariance[0], size=12)
-        gaps.append(generalised(type(linear)(gap, linear.frames, ()), covariance, NOISE).gap)
-    rows = np.concatenate(gaps)
-    spread = rows.T @ rows / len(rows) / np.outer(NOISE, NOISE)
-    np.testing.assert_allclose(spread, np.eye(3), atol=4.0 * np.sqrt(2.0 / len(rows)))
-
-
-@pytest.mark.parametrize("only", [False, True], ids=["with its values", "its columns alone"])
-def test_squared_lengths_are_those_of_the_covariance(only):
+def test_squared_lengths_are_those_of_the_covariance():
     """Of the gap and of every column: |x|² in noise is xᵀ S⁻¹ x."""
     rng = np.random.default_rng(1)
     linear = small_problem(1)[0]
     covariance = covariances(rng, 12)
-    white = generalised(linear, covariance, NOISE)
-    inverse = np.linalg.inv(covariance)
-    pairs = [(linear.frames, white.frames)]
-    pairs += [(a.columns, b.columns) for a, b in zip(linear.blocks, white.blocks, strict=True)]
-    pairs += [] if only else [(linear.gap[:, :, None], white.gap[:, :, None])]
-    for plain, own in pairs:
-        expected = np.einsum("nik,nij,njl->nkl", plain, inverse, plain)
-        own = own / NOISE[:, None]
-        found = np.einsum("nik,nil->nkl", own, own)
-        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
+    plain, white = linear.stack, generalised(linear, covariance, NOISE).stack / NOISE[:, None]
+    expected = np.einsum("nik,nij,njl->nkl", plain, np.linalg.inv(covariance), plain)
+    found = np.einsum("nik,nil->nkl", white, white)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
 def test_the_fit_is_that_of_weighted_least_squares():
@@ -339,21 +301,3 @@ def test_the_fit_is_that_of_weighted_least_squares():
     white = generalised(linear, covariance, NOISE)
     root = (white.stack / NOISE[:, None]).reshape(36, -1)
     np.testing.assert_allclose(np.linalg.lstsq(root[:, :-1], root[:, -1], rcond=None)[0], expected, rtol=1e-7)
-
-
-def test_the_noise_itself_changes_nothing():
-    linear = small_problem(3)[0]
-    same = generalised(linear, np.broadcast_to(np.diag(NOISE**2), (12, 3, 3)), NOISE)
-    np.testing.assert_allclose(same.stack, linear.stack, rtol=1e-12)
-    assert [b.sizes is o.sizes for b, o in zip(same.blocks, linear.blocks, strict=True)] == [True] * 3
-
-
-def test_a_block_that_is_gone_leaves_nothing(seen, whitening):
-    kept = Products(Linear(seen.gap, frame_columns(seen)[0], ()), whitening)
-    stays, goes = (block(seen, choose([name])[0]) for name in ("joint_offset", "backlash"))
-    kept.problem([stays, goes])
-    assert len(kept._white) == 2
-    del goes
-    gc.collect()
-    assert list(kept._white) == [stays]
-    assert [len(own) for own in kept._pairs.values()] == [1]

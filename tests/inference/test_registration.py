@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from simulate import commands, simulate
 
-import thermal_robot as tr
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.registration import alternate, middle, register, starts
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import Displacement, align, exp3, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
@@ -123,15 +122,6 @@ def test_rows_that_are_not_kept_do_not_matter(rv_m2):
         register(campaign, np.arange(SAMPLES) < 2)
 
 
-@measures
-def test_the_order_of_rows_does_not_matter(rv_m2, with_orientation):
-    rng = np.random.default_rng(5)
-    true = far_frames(rng, exp3(rng.normal(size=3)))
-    campaign = measured(rv_m2, true, rng, with_orientation=with_orientation, noise=2e-5, turning=3e-5, gross=0.1)
-    shuffled = campaign.take(rng.permutation(SAMPLES))
-    assert_same_frames(register(shuffled), register(campaign), 1e-9, turned_tool=with_orientation)
-
-
 def test_a_flat_or_noisy_cloud_is_turned_but_never_mirrored():
     """Points in a plane fit their mirror image as well as themselves; a tracker does not mirror."""
     rng = np.random.default_rng(8)
@@ -142,49 +132,6 @@ def test_a_flat_or_noisy_cloud_is_turned_but_never_mirrored():
         np.testing.assert_allclose(align(flat, seen, np.ones(30)), motion, atol=1e-12)
         mirrored = align(flat + 1e-3 * rng.normal(size=(30, 3)), -seen, np.ones(30))
         assert np.linalg.det(mirrored[:3, :3]) == pytest.approx(1.0)
-
-
-def carried_off(campaign, motion):
-    """The same campaign as a tracker elsewhere would have reported it."""
-    turn, shift = motion[:3, :3], motion[:3, 3]
-    orientation = campaign.orientation
-    if orientation is not None:
-        orientation = rotation_to_quaternion(turn @ quaternion_to_rotation(orientation))
-    return replace(campaign, position=campaign.position @ turn.T + shift, orientation=orientation)
-
-
-@pytest.mark.parametrize(
-    ("arm", "turning", "effects"),
-    [
-        ("rv_m2", 3e-5, ["thermal_elongation", "backlash"]),
-        ("panda", None, ["instrument_scale", "drift"]),
-    ],
-    indirect=["arm"],
-)
-def test_where_the_tracker_stands_changes_nothing(arm, turning, effects):
-    campaign = simulate(arm, effects, seed=6, samples=80, turning=turning, outliers=0.03)[0]
-    motion = pose(exp3([0.3, np.pi, -0.2]), [3.0, -2.0, -4.0])
-    here, there = diagnose(campaign), diagnose(carried_off(campaign, motion))
-    assert (there.verdict, there.outliers) == (here.verdict, here.outliers)
-    assert there.unexplained.flagged == here.unexplained.flagged
-    # the exact refit stops within 1e-4 of a noise; everything else is the same to rounding
-    close = {"rtol": 1e-5, "atol": 1e-12}
-    np.testing.assert_allclose(there.gap.rms_before, here.gap.rms_before, rtol=1e-6)
-    np.testing.assert_allclose(there.gap.rms_after, here.gap.rms_after, **close)
-    np.testing.assert_allclose(there.gap.held_out.rms_after, here.gap.held_out.rms_after, **close)
-    for finding in here.effects:
-        other = there.finding(finding.name)
-        assert other.status == finding.status
-        if finding.probability is not None:
-            np.testing.assert_allclose(other.probability, finding.probability, rtol=1e-3, atol=1e-6)
-        for now, then in zip(other.parameters, finding.parameters, strict=True):
-            assert now.identified == then.identified
-            if then.identified:
-                np.testing.assert_allclose(now.value, then.value, rtol=0, atol=1e-3 * then.std)
-                np.testing.assert_allclose(now.std, then.std, rtol=1e-4)
-    predicted, _ = here.model.predict(campaign)
-    expected = predicted @ motion[:3, :3].T + motion[:3, 3]
-    np.testing.assert_allclose(there.model.predict(campaign)[0], expected, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -206,7 +153,8 @@ def test_a_simulators_prediction_replaces_the_urdfs_and_keeps_the_declared_targe
     np.testing.assert_allclose(seen.position, curved, rtol=0, atol=1e-14)
     assert np.abs(seen.gap).max() < 1e-9
     assert diagnose(told, only=["geometric"]).gap.rms_before < 1e-9
-    assert diagnose(replace(told, simulated_position=None), only=["geometric"]).gap.rms_before > 1e-4
+    without = replace(told, simulated_position=None)
+    assert np.sqrt((observe(without, register(without)).gap ** 2).sum(axis=1).mean()) > 1e-4
 
 
 def test_a_simulators_orientation_is_the_prediction_too(rv_m2):
@@ -228,36 +176,3 @@ def test_a_simulators_orientation_is_the_prediction_too(rv_m2):
     turned = [b @ a.transpose(0, 2, 1) for a, b in (gaps[:2], gaps[2:])]
     assert np.abs(turned[0] - np.eye(3)).max() > 1e-4
     np.testing.assert_allclose(turned[0], turned[1], rtol=0, atol=1e-12)
-
-
-@pytest.fixture(scope="module")
-def campaign():
-    base, tool = np.eye(4), np.eye(4)
-    base[:3, :3], base[:3, 3], tool[:3, 3] = exp3(np.array([0.3, -2.0, 1.0])), [2.0, -1.0, 0.5], [0.2, 0.05, -0.1]
-    return tr.simulate("builtin:rv_m2", rows=40, noise=1e-4, base=base, tool=tool, tool_frame="tool0", seed=4)
-
-
-def test_starts_side_by_side_find_what_each_finds_alone(campaign):
-    declared = Frames.declared(campaign)
-    targets = declared.tool[:3, 3] + starts(campaign)
-    alone = [alternate(campaign, declared, target[None]) for target in targets]
-    cost, frames = alternate(campaign, declared, targets)
-    nearest = min(alone, key=lambda found: found[0])
-    assert cost == nearest[0]
-    np.testing.assert_array_equal(frames.base, nearest[1].base)
-    np.testing.assert_array_equal(frames.tool, nearest[1].tool)
-    assert len({round(each[0], 12) for each in alone}) > 1  # they do end at different places
-
-
-def test_some_rows_are_a_campaign_of_these_rows(campaign):
-    declared, some = Frames.declared(campaign), np.arange(3, 40, 2)
-    targets = starts(campaign)
-    found, part = alternate(campaign, declared, targets, some=some), alternate(campaign.take(some), declared, targets)
-    assert found[0] == part[0]
-    np.testing.assert_array_equal(found[1].base, part[1].base)
-
-
-@pytest.mark.parametrize("count", [1, 2, 7, 8])
-def test_the_middle_is_the_median(count):
-    values = np.random.default_rng(count).normal(size=(5, count))
-    np.testing.assert_array_equal(middle(values), np.median(values, axis=1))

@@ -2,22 +2,19 @@
 
 import numpy as np
 import pytest
+from conftest import load_arm
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference.scatter import variance_components
 from thermal_robot.kinematics import frame_jacobians
-from thermal_robot.robot import load_robot
 
 NOISE, TURNING = 2e-5, 3e-5
 KINDS = {"u": "pose", "v": "visit"}
 
 
-@pytest.fixture(scope="module", params=["rv_m2", "panda"])
+@pytest.fixture(scope="module", params=["rv_m2", pytest.param("panda", marks=pytest.mark.slow)])
 def robot(request):
-    if request.param == "rv_m2":
-        return load_robot("builtin:rv_m2", "tool0")
-    pytest.importorskip("example_robot_data")
-    return load_robot("example-robot-data:panda", "panda_hand")
+    return load_arm(request.param)
 
 
 def simulate(robot, seed, rows=100, k=1, u=(), v=(), m=3, tails=None, bias=0.0, uniform=True):
@@ -140,13 +137,13 @@ def test_three_joints_that_scatter_are_no_larger_noise():
 
 def test_a_few_gross_errors_left_in(robot):
     right = 0
-    for seed in range(20):
+    for seed in range(8):
         remainder, sensitivity, noise, _, truth = simulate(robot, seed, u={1: 4.0})
         remainder[:3] += 40 * NOISE
         used = np.arange(100) > 2
         right += set(truth) <= found(variance_components(remainder, sensitivity, noise))
         assert set(truth) <= found(variance_components(remainder, sensitivity, noise, used=used))
-    assert right >= 18
+    assert right >= 7
 
 
 def test_one_joint_alone():

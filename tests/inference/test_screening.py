@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers import NOISE, with_law
+from helpers import NOISE, erring, with_law
 from simulate import simulate
 
 from thermal_robot.campaign.turning import SLIPS
@@ -81,17 +81,6 @@ def test_every_candidate_is_counted_and_segments_are_tried_with_what_speaks_else
     again = shaped(here, target, constant.law)
     assert again.law == constant.law
     assert again.gain == pytest.approx(constant.gain, rel=1e-9)
-
-
-def test_several_remainders_are_scanned_as_each_alone(scanned):
-    _, here, target, alone = scanned["base"]
-    other = Target.of(here.gap[:, ::-1].copy(), frame_columns(here)[0])
-    both, _ = scan(here, [target, other])
-    # which quantities segments are tried with is what either speaks for
-    plain = [{i.law: i.gain for i in own if i.law.kind != "link"} for own in (both[0], alone)]
-    assert len(plain[0]) > 100
-    assert plain[0] == plain[1]
-    assert both[1][0].gain != both[0][0].gain
 
 
 def test_in_noise_no_law_gains_much(rv_m2):
@@ -257,9 +246,7 @@ def test_friction_on_springs_comes_first_and_leaves_the_noise(arm, seeds, ratio)
         fitted = frame_columns(small)[0].reshape(len(moved), -1)
         left = moved - fitted @ np.linalg.lstsq(fitted, moved, rcond=1e-10)[0]
         shift *= 1e-5 * ratio * NOISE / np.sqrt((left**2).mean())
-        real = observe(data, frames, displacement=Displacement(joint=shift))
-        noise = NOISE * np.random.default_rng([seed, 7]).normal(size=data.position.shape)
-        here, target = seen(replace(data, position=real.predicted_position + noise))
+        here, target = seen(erring(data, [seed, 7], joint=shift))
         first = scan(here, [target])[0][0][0].law
         assert (first.place, first.quantity) == (arm.joint_names[j], f"since_turn.{arm.joint_names[j]}")
         best = shaped(here, target, first).law
@@ -298,12 +285,15 @@ def test_an_effect_that_does_not_change_is_no_law(rv_m2):
     assert {i.law.of for i in scan(here, [target], [])[0][0]} == {""}
 
 
-def test_gains_in_a_scan_are_those_of_one_law_alone(rv_m2):
+def test_gains_in_a_scan_are_those_of_one_law_alone_whatever_else_is_scanned(rv_m2):
     here, target = seen(simulate(rv_m2, ["backlash"], samples=60, seed=4, noise=NOISE)[0])
-    found = scan(here, [target])[0][0]
-    assert {bool(i.law.of) for i in found} == {True, False}
-    for item in found[::7]:
-        assert item.gain == pytest.approx(target.worth(block(here, item.law).columns).gain, rel=1e-6, abs=1e-6)
+    other = Target.of(here.gap[:, ::-1].copy(), frame_columns(here)[0])
+    found, _ = scan(here, [target, other])
+    assert {bool(i.law.of) for i in found[0]} == {True, False}
+    for own, one in zip(found, (target, other), strict=True):
+        for item in own[::7]:
+            assert item.gain == pytest.approx(one.worth(block(here, item.law).columns).gain, rel=1e-6, abs=1e-6)
+    assert found[0][0].gain != found[1][0].gain
 
 
 def in_sessions(robot, joint, zeros, seed=3):
@@ -314,9 +304,7 @@ def in_sessions(robot, joint, zeros, seed=3):
     data = replace(plain, covariates=covariates, labels={"session": np.array(["am", "noon", "pm"])[part]})
     shift = np.zeros_like(data.q)
     shift[:, robot.joint_names.index(joint)] = np.array(zeros)[part]
-    real = observe(data, Frames.declared(data), displacement=Displacement(joint=shift))
-    noise = NOISE * np.random.default_rng([seed, 7]).normal(size=data.position.shape)
-    return replace(data, position=real.predicted_position + noise)
+    return erring(data, [seed, 7], joint=shift)
 
 
 @pytest.mark.parametrize("zeros", [(0.0, 0.0, 4e-4), (0.0, -4e-4, -4e-4)])
@@ -366,11 +354,7 @@ def test_a_tool_that_stands_elsewhere_in_one_session_is_no_curve_over_weeks(rv_m
         "time": data.covariates["time"] + 1.8e6 * np.digitize(data.covariates["time"], [5e3, 1e4]),
     }
     data = replace(data, covariates=weeks)
-    frames = Frames.declared(data)
-    away, sound = np.zeros((data.samples, 6)), np.zeros((data.samples, 6))
-    away[noon, 0] = 4.2e-4
-    real, plain = (observe(data, frames, displacement=Displacement(tool=twist)) for twist in (away, sound))
-    here, target = seen(replace(data, position=data.position + real.predicted_position - plain.predicted_position))
+    here, target = seen(erring(data, [7, 7], tool=np.outer(noon, [4.2e-4, 0.0, 0.0, 0.0, 0.0, 0.0])))
     found = scan(here, [target])[0][0]
     at_tool = [i.law for i in found if i.law.kind == "tool" and not i.law.by]
     assert (found[0].law.kind, found[0].law.quantity) == ("tool", "session")
@@ -387,9 +371,7 @@ def test_a_joint_that_relaxes_after_each_start_comes_first(rv_m2, sizes):
     since = time - np.array([time[session == run].min() for run in runs])[which]
     shift = np.zeros_like(data.q)
     shift[:, 2] = 8e-4 * np.array(sizes)[which] * np.exp(-since / 500.0)
-    frames = Frames.declared(data)
-    real, sound = (observe(data, frames, displacement=Displacement(joint=s)) for s in (shift, 0.0 * shift))
-    here, target = seen(replace(data, position=data.position + real.predicted_position - sound.predicted_position))
+    here, target = seen(erring(data, [7, 7], joint=shift))
     first = scan(here, [target])[0][0][0].law
     assert (first.place, first.quantity) == ("joint_3", "time")
     best = shaped(here, target, first).law
@@ -416,46 +398,31 @@ def known(rv_m2):
     return fit(replace(campaign, position=position), choose(("joint_offset",), (), ()))
 
 
-@pytest.fixture
-def thinned(known, monkeypatch):
-    monkeypatch.setattr(settings, "ENOUGH_ROWS", 90)
-    return Thin.of(known)
-
-
-def test_below_the_limit_all_rows_are_there(known):
-    thin, e = Thin.of(known), known.explanation
-    assert thin.observations is known.corrected
-    assert thin.linear is e.linear
-    # the knocked rows follow each other, scattered gross errors do not
-    assert thin.changed[np.argsort(known.campaign.covariates["time"])[60:64]].all()
-    assert thin.changed.sum() < e.outliers.sum()
-
-
-def test_above_it_rows_are_drawn_once_and_in_order(known, thinned):
-    assert thinned.observations.campaign.samples == 90
-    rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in thinned.observations.q]
+@pytest.mark.parametrize("enough", [90, 1000])
+def test_above_a_limit_rows_are_drawn_once_in_order_and_stand_for_all(known, monkeypatch, enough):
+    e, clock = known.explanation, known.campaign.covariates["time"]
+    sound = Thin.of(known).target(e.best.blocks).white
+    monkeypatch.setattr(settings, "ENOUGH_ROWS", enough)
+    thin = Thin.of(known)
+    assert thin.observations.campaign.samples == min(enough, 150)
+    rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in thin.observations.q]
     assert rows == sorted(set(rows))
-    e = known.explanation
-    np.testing.assert_array_equal(thinned.linear.gap, e.linear.gap[rows])
-    np.testing.assert_array_equal(thinned.linear.frames, e.linear.frames[rows])
-    for own, whole in zip(thinned.linear.blocks, e.linear.blocks, strict=True):
+    np.testing.assert_array_equal(thin.linear.gap, e.linear.gap[rows])
+    np.testing.assert_array_equal(thin.linear.frames, e.linear.frames[rows])
+    for own, whole in zip(thin.linear.blocks, e.linear.blocks, strict=True):
         np.testing.assert_array_equal(own.columns, whole.columns[rows])
-    np.testing.assert_array_equal(thinned.changed, in_a_row(known.campaign, e.outliers)[rows])
+    # the knocked rows follow each other, scattered gross errors do not
+    aside = in_a_row(known.campaign, e.outliers)
+    np.testing.assert_array_equal(thin.changed, aside[rows])
+    assert aside[np.argsort(clock)[60:64]].all()
+    assert aside.sum() < e.outliers.sum()
     # the corrected model is the same: its gap at these rows is the one it had among all
-    np.testing.assert_allclose(thinned.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(thin.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
     # the same campaign always gets the same rows
-    np.testing.assert_array_equal(Thin.of(known).observations.q, thinned.observations.q)
-
-
-def test_the_rows_drawn_stand_for_all(known, thinned, monkeypatch):
-    clock = known.campaign.covariates["time"]
-    share = np.mean(thinned.observations.campaign.covariates["time"] < np.median(clock))
-    assert share == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(90))
-    blocks = known.explanation.best.blocks
-    own = thinned.target(blocks).white
-    monkeypatch.undo()
-    sound = Thin.of(known).target(blocks).white
+    np.testing.assert_array_equal(Thin.of(known).observations.q, thin.observations.q)
+    assert np.mean(clock[rows] < np.median(clock)) == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(90))
     # four of its standard deviations: that of a normal law's median of |x|, 1.17/√n of it
+    own = thin.target(e.best.blocks).white
     assert np.median(np.abs(own)) == pytest.approx(np.median(np.abs(sound)), rel=4.0 * 1.17 / np.sqrt(own.size))
 
 

@@ -61,13 +61,9 @@ def test_every_setting_is_defined_once_with_its_reason_behind_it():
     assert [name for name, times in names.items() if times > 1] == []  # none is defined twice
 
 
-def test_every_setting_is_used():
+def test_every_setting_is_used_and_is_a_number_an_array_of_numbers_or_words():
     text = "\n".join(path.read_text(encoding="utf-8") for path in ROOT.rglob("*.py") if path.name != "settings.py")
-    unused = [name for _, name, _ in OWN if f"settings.{name}" not in text]
-    assert unused == []
-
-
-def test_a_setting_is_a_number_an_array_of_numbers_or_words():
+    assert [name for _, name, _ in OWN if f"settings.{name}" not in text] == []
     for package, name, _ in OWN:
         value = getattr(import_module(f"thermal_robot.{package}.settings"), name)
         words = isinstance(value, tuple) and all(isinstance(word, str) and word for word in value)

@@ -27,7 +27,8 @@ def squares(gap, columns):
     return float(left @ left)
 
 
-def test_in_noise_every_p_value_is_as_likely_the_share_is_zero_and_the_evidence_falls():
+def test_in_noise_p_values_are_uniform_the_share_is_zero_and_the_evidence_falls():
+    # in noise every p value is as likely the share is zero and the evidence falls
     rng = np.random.default_rng(0)
     noise = [plain(gap, design).worth(further) for gap, design, further in (drawn(rng) for _ in range(200))]
     assert kstest([w.p_value for w in noise], "uniform").pvalue > 0.01
@@ -36,10 +37,7 @@ def test_in_noise_every_p_value_is_as_likely_the_share_is_zero_and_the_evidence_
     assert (shares < 0.0).any()
     assert np.mean([w.gain for w in noise]) < -3.0
     assert np.mean([w.gain > 0.0 for w in noise]) < 0.02
-
-
-def test_weights_hardly_make_the_test_of_noise_bolder():
-    """With the weights of a robust fit, too, no more than its share of p-values lies below a level."""
+    # With the weights of a robust fit, too, no more than its share of p-values lies below a level.
     rng = np.random.default_rng(1)
     found = []
     for _ in range(200):
@@ -88,20 +86,16 @@ def test_columns_that_explain_everything_leave_nothing():
     assert np.isfinite(exact.gain)
 
 
-def test_what_the_design_holds_already_is_worth_nothing():
+def test_what_the_design_holds_already_and_too_few_equations_are_worth_nothing():
     gap, design, further = drawn(np.random.default_rng(5))
     own = plain(gap, design)
     assert own.worth(design) == NOTHING
     assert own.worth(design[:, :, :2] @ [[1.0], [3.0]]) == NOTHING
     # beside further columns it does not count as one
     assert own.worth(np.concatenate([design, further], axis=2)).gain == pytest.approx(own.worth(further).gain, rel=1e-6)
-
-
-def test_too_few_equations_say_nothing():
-    rng = np.random.default_rng(6)
+    few = plain(gap[:4], np.zeros((4, 3, 0)))
     for columns, worth in ((7, False), (8, True)):
-        gap, design = 1e-5 * rng.normal(size=(4, 3)), np.zeros((4, 3, 0))
-        assert (plain(gap, design).worth(rng.normal(size=(4, 3, columns))) == NOTHING) == worth
+        assert (few.worth(np.random.default_rng(6).normal(size=(4, 3, columns))) == NOTHING) == worth
 
 
 def test_rows_far_from_the_rest_weigh_little_unless_they_are_trusted():

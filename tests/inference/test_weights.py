@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from inference.problems import small_problem
 
 from thermal_robot.inference.weights import (
     Noise,
     distance_limit,
-    first_whitening,
     reweigh,
     robust_noise,
     settled_noise,
@@ -82,7 +80,8 @@ def test_a_stated_noise_counts_whatever_is_left():
     assert (robust_noise(np.zeros((20, 6))) > 0.0).all()
 
 
-def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others():
+def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others_and_a_quarter_at_most():
+    # where more than noise is left rows are far only if far from the others
     rng = np.random.default_rng(8)
     rows, use = 10.0 * noise_of(rng, 400), np.ones(400, dtype=bool)
     whitening, aside = reweigh(rows, STATED, use, 0.0, 3)
@@ -90,15 +89,19 @@ def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others(
     np.testing.assert_array_equal(whitening.noise, SIGMA[:3])
     rows[:5] += 500.0 * SIGMA[:3]
     np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 0.0, 3)[1]), np.arange(5))
-
-
-def test_rows_that_are_not_used_have_no_weight_at_first():
-    linear, _ = small_problem(0)
-    use = np.arange(12) > 3
-    linear.gap[~use] = 1e9
-    whitening = first_whitening(linear, Noise(), use)
-    np.testing.assert_array_equal(whitening.weights, use)
-    assert whitening.noise.max() < 1e3
+    # no more than a quarter is set aside and these are the worst
+    rng = np.random.default_rng(4)
+    rows = noise_of(rng, 100)
+    rows[:40] += np.arange(100.0, 140.0)[:, None] * SIGMA[:3]
+    whitening, aside = reweigh(rows, STATED, np.ones(100, dtype=bool), 0.0, 3)
+    np.testing.assert_array_equal(aside, np.isin(np.arange(100), np.arange(15, 40)))
+    assert 0.0 < whitening.weights[:15].max() < whitening.weights[40:].min()
+    # What is left where two thirds of the equations were taken up is smaller: as much is then less likely noise.
+    rng = np.random.default_rng(5)
+    rows, use = noise_of(rng, 300) / np.sqrt(3.0), np.ones(300, dtype=bool)
+    rows[0] = 3.0 * SIGMA[:3]
+    assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
+    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
 
 
 @measured
@@ -120,24 +123,6 @@ def test_gross_errors_are_set_aside_and_sound_rows_weigh_fully(measures):
     bent = sound < 1.0
     np.testing.assert_allclose(np.ptp((sound * distance)[bent]), 0.0, atol=1e-9)
     assert distance[bent].min() > distance[~bent].max()
-
-
-def test_no_more_than_a_quarter_is_set_aside_and_these_are_the_worst():
-    rng = np.random.default_rng(4)
-    rows = noise_of(rng, 100)
-    rows[:40] += np.arange(100.0, 140.0)[:, None] * SIGMA[:3]
-    whitening, aside = reweigh(rows, STATED, np.ones(100, dtype=bool), 0.0, 3)
-    np.testing.assert_array_equal(aside, np.isin(np.arange(100), np.arange(15, 40)))
-    assert 0.0 < whitening.weights[:15].max() < whitening.weights[40:].min()
-
-
-def test_a_close_fit_is_judged_by_the_equations_that_it_leaves():
-    """What is left where two thirds of the equations were taken up is smaller: as much is then less likely noise."""
-    rng = np.random.default_rng(5)
-    rows, use = noise_of(rng, 300) / np.sqrt(3.0), np.ones(300, dtype=bool)
-    rows[0] = 3.0 * SIGMA[:3]
-    assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
-    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
 
 
 @measured

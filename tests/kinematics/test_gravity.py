@@ -1,21 +1,20 @@
-"""Gravity torques against the potential energy and against arithmetic."""
+"""Gravity torques and loads against arithmetic and against Pinocchio."""
 
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pinocchio
 import pytest
-import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics.model import PRISMATIC
+from thermal_robot.kinematics.links import to_pinocchio
 from thermal_robot.kinematics.urdf import parse_urdf
 from thermal_robot.robot import load_robot
 
 
 def potential_energy(robot, q, payload, com):
     model, data = robot.model, robot.model.createData()
-    arm = [pinocchio.computePotentialEnergy(model, data, row) for row in reference.to_pinocchio(robot, q)]
+    arm = [pinocchio.computePotentialEnergy(model, data, row) for row in to_pinocchio(robot, q)]
     poses = kin.tool_poses(robot, q)
     return np.array(arm) - payload * ((poses[:, :3, 3] + poses[:, :3, :3] @ com) @ robot.gravity)
 
@@ -63,32 +62,10 @@ def test_gravity_default_is_down_in_the_root_of_the_urdf(awkward, awkward_urdf, 
     np.testing.assert_allclose(from_ground.gravity, [0.0, 0.0, -9.81])
 
 
-def test_the_moment_on_a_segment_holds_its_joint_and_those_that_mimic_it(arm, configurations):
-    q = configurations(arm, 30)
-    load = {"payload": np.linspace(0.0, 10.0, 30), "payload_com": np.array([0.05, -0.02, 0.1])}
-    loads, torques = kin.segment_loads(arm, q, **load), kin.gravity_torques(arm, q, **load)
-    chain, held = arm.chain, []
-    for k in chain.movable:
-        part = slice(0, 3) if chain.kinds[k] == PRISMATIC else slice(3, 6)
-        held.append(-loads[:, chain.placed.tolist().index(k), part] @ chain.axes[k])
-    for j, name in enumerate(arm.joint_names):
-        # the power of a joint is its own and that of all that follow it, each as fast as it is geared
-        follow = [speed(ElementTree.fromstring(arm.urdf), chain.names[k], name) for k in chain.movable]
-        np.testing.assert_allclose(np.array(follow) @ held, torques[:, j], atol=1e-9)
-
-
-def speed(tree, joint, driver):
-    """How fast a joint moves for a unit speed of another one, by the mimic tags alone."""
-    mimic = next(item for item in tree.findall("joint") if item.get("name") == joint).find("mimic")
-    if mimic is None:
-        return float(joint == driver)
-    return float(mimic.get("multiplier", 1.0)) * speed(tree, mimic.get("joint"), driver)
-
-
 def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
     """Force and moment across every placement from the links of the URDF one by one, none of them lumped."""
-    q = configurations(arm, 4)
-    loads, frames = kin.segment_loads(arm, q), kin.chain_frames(arm, q)
+    q, payload, com = configurations(arm, 4), np.linspace(0.0, 9.0, 4), np.array([0.05, -0.02, 0.1])
+    loads, frames = kin.segment_loads(arm, q, payload=payload, payload_com=com), kin.chain_frames(arm, q)
     full = parse_urdf(arm.urdf, "the robot")
     rows = whole_configurations(full, arm, q)
     behind = links_behind(arm.urdf)
@@ -98,7 +75,7 @@ def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
         pinocchio.framesForwardKinematics(full, data, row)
         root = data.oMf[full.getFrameId(arm.root_frame, pinocchio.FrameType.BODY)]
         for s, segment in enumerate(arm.segments):
-            mass, moment = 0.0, np.zeros(3)
+            mass, moment = payload[i], payload[i] * data.oMf[bodies[arm.tool_frame]].act(com)
             for link, weight, centre in behind[segment.name]:
                 mass, moment = mass + weight, moment + weight * data.oMf[bodies[link]].act(centre)
             centre = root.actInv(moment / mass) if mass > 0 else np.zeros(3)

@@ -47,16 +47,6 @@ def test_the_chain_is_what_the_text_says(awkward):
     assert not any(array.flags.writeable for array in (chain.rotations, chain.coupling.matrix, awkward.lower))
 
 
-def test_every_placement_is_a_rotation_and_every_axis_a_unit_vector(arm):
-    chain = arm.chain
-    products = chain.rotations @ np.swapaxes(chain.rotations, 1, 2)
-    np.testing.assert_allclose(products, np.broadcast_to(np.eye(3), products.shape), atol=1e-14)
-    np.testing.assert_allclose(np.linalg.det(chain.rotations), 1.0, atol=1e-14)
-    np.testing.assert_allclose(np.linalg.norm(chain.axes, axis=1), (chain.kinds != FIXED).astype(float), atol=1e-14)
-    assert np.flatnonzero(chain.kinds).tolist() == chain.movable.tolist()
-    assert set(chain.movable) <= set(chain.placed)
-
-
 def test_masses_and_their_centres_are_pinocchios(arm, configurations):
     q = configurations(arm, 3)
     frames, chain, model = kin.chain_frames(arm, q), arm.chain, arm.model

@@ -24,8 +24,14 @@ MADE = {
 }
 
 
-@pytest.mark.parametrize("arm", ["ur10", "panda"], indirect=True)
-@pytest.mark.parametrize("made", list(MADE))
+PAIRS = [(made, arm) for made in MADE for arm in ("ur10", "panda")]
+
+
+@pytest.mark.parametrize(
+    ("made", "arm"),
+    [pytest.param(*pair, marks=() if k % 4 in (0, 3) else pytest.mark.slow) for k, pair in enumerate(PAIRS)],
+    indirect=["arm"],
+)
 def test_an_effect_explains_what_it_made_and_is_saved_whole(arm, made, tmp_path):
     effects, options = MADE[made]
     campaign, _, (fresh, place) = simulate(arm, effects, seed=12, noise=NOISE, ratio=(4.0, 6.0), fresh=60, **options)
@@ -57,7 +63,7 @@ def test_backlash_is_named_where_only_the_side_counts():
     assert found.verdict == ("backlash",)
 
 
-@pytest.mark.parametrize("name", ["ur10", "panda"])
+@pytest.mark.parametrize("name", ["ur10", pytest.param("panda", marks=pytest.mark.slow)])
 def test_weights_that_nobody_wrote_down_are_free(name, tmp_path):
     arm = load_arm(name)
     campaign, _, (fresh, place) = simulate(arm, ["joint_compliance"], seed=8, ratio=(5.0, 6.0), samples=150, fresh=60)

@@ -17,15 +17,15 @@ def diagnosis(request):
 
 
 @pytest.fixture(scope="session")
-def drifted(rv_m2):
+def drifted(rv_m2, diagnosed_once):
     """A real diagnosis: the base has drifted."""
-    return tr.diagnose(simulate(rv_m2, ["drift"], seed=3)[0])
+    return diagnosed_once(simulate(rv_m2, ["drift"], seed=3)[0])
 
 
 @pytest.fixture(scope="session")
-def demo():
+def demo(diagnosed_once):
     """The diagnosis of the demo."""
-    return tr.diagnose(tr.demo_campaign())
+    return diagnosed_once(tr.demo_campaign())
 
 
 @pytest.fixture(scope="session")

@@ -33,8 +33,6 @@ from thermal_robot.report.drawing import (
     log_axis,
     note,
     plain,
-    thinned,
-    tidy,
     title,
 )
 
@@ -547,14 +545,6 @@ def test_names_with_dollar_signs_and_empty_panels_say_what_they_are():
     assert axes.texts[0].get_position() == (0.5, 0.5)
 
 
-@pytest.mark.parametrize(("grid", "shown"), [("x", [True, False]), ("y", [False, True]), ("both", [True, True])])
-def test_tidy_axes_have_two_spines_and_the_grid_that_was_asked_for(grid, shown):
-    axes = Drawing(2.0, 1.0).subplots()
-    tidy(axes, grid)
-    assert [side for side, spine in axes.spines.items() if spine.get_visible()] == ["left", "bottom"]
-    assert [any(g.get_visible() for g in axis.get_gridlines()) for axis in (axes.xaxis, axes.yaxis)] == shown
-
-
 @pytest.mark.parametrize(("low", "high"), [(3.0, 180.0), (0.004, 5.0), (1e-3, 1e3)])
 def test_a_logarithmic_axis_is_labelled_with_numbers_read_at_sight(low, high):
     figure = Drawing(6.0, 2.0)
@@ -565,13 +555,3 @@ def test_a_logarithmic_axis_is_labelled_with_numbers_read_at_sight(low, high):
     assert len(shown) >= 3
     assert all(text.strip("0.").rstrip("0") in ("1", "2", "5") for text in shown)
     assert all(low <= float(text) <= high for text in shown)
-
-
-def test_few_points_are_all_drawn_and_many_are_thinned_fairly():
-    assert np.array_equal(thinned(6000), np.arange(6000))
-    many = thinned(60000)
-    assert len(many) == len(np.unique(many)) == 6000
-    assert np.all(np.diff(many) > 0)
-    assert np.array_equal(many, thinned(60000))
-    counts, _ = np.histogram(many, bins=10, range=(0, 60000))
-    assert np.all(np.abs(counts - 600) < 5.0 * np.sqrt(600))

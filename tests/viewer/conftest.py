@@ -3,13 +3,12 @@
 import pytest
 
 from thermal_robot.datasets import demo_campaign
-from thermal_robot.diagnosis import diagnose
 from thermal_robot.viewer.scene import scene_of_diagnosis
 
 
 @pytest.fixture(scope="session")
-def found():
-    return diagnose(demo_campaign())
+def found(diagnosed_once):
+    return diagnosed_once(demo_campaign())
 
 
 @pytest.fixture(scope="session")

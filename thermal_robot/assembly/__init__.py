@@ -1,1 +1,1 @@
-"""The paper's chain, no data needed: repeatability, thermal shift, probability of joining, maps of the workspace."""
+"""Assembly by a robot (Kluz et al. 2018): repeatability, thermal shift, probability of joining, workspace maps."""

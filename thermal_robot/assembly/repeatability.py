@@ -1,4 +1,4 @@
-"""Joint scatter to the scatter of the tool (Kluz et al. 2018, Eqs 1–4), and back."""
+"""Propagation of joint scatter to the tool (Kluz et al. 2018, Eqs 1–4), and its inverse."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class JointSigmas:
 
     @property
     def compatible(self) -> bool:
-        """Whether any non-negative solution lies within the tolerance of everything that was measured."""
+        """Whether some non-negative solution is within all tolerances."""
         return self.needed <= 1.0
 
     @property
@@ -143,7 +143,7 @@ def joint_sigmas(
     confidence: float = 0.95,
     point: ArrayLike | None = None,
 ) -> JointSigmas:
-    """Find σ_q ≥ 0 from the measured scatter of the tool at N poses, with the interval in which each is determined.
+    """Non-negative least squares for σ_q from measured scatter of the tool at N poses, with feasible intervals.
 
     The variances of Eqs 2–4 are linear in σ_q². They are fitted by non-negative least squares, each weighted by its
     tolerance; the intervals follow from linear programs over all σ_q² ≥ 0 that meet every measured value within its
@@ -255,7 +255,7 @@ def _equations(
     sample_size: int | None,
     risk: float,
 ) -> tuple[Array, Array, Array, Array]:
-    """One row for each measured (co)variance: coefficients of σ_q², value, least and largest value.
+    """Linear equations in σ_q², one for each measured (co)variance: coefficients, value, bounds.
 
     Each row is divided by the largest variance of its components, so that lengths and angles weigh alike.
     """
@@ -282,7 +282,7 @@ def _equations(
 
 
 def _fit(design: Array, observed: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """Non-negative least squares, and the smallest common factor of the tolerances that leaves a solution."""
+    """Non-negative least squares, and the smallest common factor of the tolerances that admits a solution."""
     from scipy.optimize import linprog, nnls
 
     half, middle = (high - low) / 2.0, (high + low) / 2.0
@@ -298,7 +298,7 @@ def _fit(design: Array, observed: Array, low: Array, high: Array) -> tuple[Array
 
 
 def _intervals(design: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Least and largest value of each unknown over v ≥ 0 with low ≤ design v ≤ high."""
+    """Linear programs for the least and largest value of each unknown over v ≥ 0 with low ≤ design v ≤ high."""
     from scipy.optimize import linprog
 
     above, limits = np.vstack([design, -design]), np.concatenate([high, -low])

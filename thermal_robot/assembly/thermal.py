@@ -1,4 +1,4 @@
-"""Temperature to elongation to displacement, and back (Kluz et al. 2018, Eqs 5-13).
+"""Thermal elongation of links and displacement of the tool, and the inverse (Kluz et al. 2018, Eqs 5-13).
 
 What a temperature adds to the lengths of a robot (Eq 5); whether a mean has moved to where the model says (Eq 13);
 links that lag behind the hall; at which poses to measure, and the elongations from displacements there (Eq 12).
@@ -63,7 +63,7 @@ def displacement(robot: Robot, q: ArrayLike, elongations: PerSegment, *, exact: 
 
 
 def sensitivity(robot: Robot, q: ArrayLike, *, coefficients: PerSegment) -> Array:
-    """Displacement of the tool for a kelvin in each segment alone: the matrix of Eq 14 times χ_i l_i.
+    """Displacement of the tool per kelvin in each segment alone: the matrix of Eq 14 times χ_i l_i.
 
     The sum over the segments is the displacement for a kelvin in the whole robot; its norm, drawn over the workspace,
     is the map of where a part is joined with the least sensitivity to temperature.
@@ -100,7 +100,7 @@ STANDARD_TEMPERATURE = 20.0
 
 
 def segment_names(robot: Robot) -> tuple[str, ...]:
-    """Names of the S segments that have a length, from the root on: the order of every array of elongations."""
+    """Names of the S segments with a length, from the root on: the order of all arrays of elongations."""
     return tuple(segment.name for segment in _segments(robot))
 
 
@@ -154,7 +154,7 @@ def expansion_coefficients(robot: Robot, elongations: PerSegment, rise: PerSegme
 def expansion_coefficient(
     robot: Robot, elongations: PerSegment, rise: PerSegment, *, segments: Iterable[str] | None = None
 ) -> float:
-    """Find the one coefficient of expansion that explains elongations best, by least squares.
+    """Return the common coefficient of expansion of measured elongations, by least squares.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def expansion_coefficient(
 
 
 def per_segment(robot: Robot, values: PerSegment, what: str) -> Array:
-    """Write values given in any form as (..., S), one for each segment with a length.
+    """Values in any accepted form as (..., S), one for each segment with a length.
 
     The name of a segment goes before the name of its link.
     """
@@ -211,7 +211,7 @@ def per_segment(robot: Robot, values: PerSegment, what: str) -> Array:
 
 
 def columns_of(robot: Robot, name: str) -> tuple[int, ...]:
-    """Columns of the segment of a name, or of the segments that a link carries; refused where there is neither."""
+    """Columns of a segment, or of the segments of a link, by name; an unknown name is refused."""
     chosen = _segments(robot)
     own = tuple(column for column, segment in enumerate(chosen) if segment.name == name)
     carried = tuple(column for column, segment in enumerate(chosen) if segment.parent_link == name)
@@ -295,7 +295,7 @@ class MeanShift:
 def mean_shift_test(
     sample: ArrayLike, mu0: ArrayLike, sigma: ArrayLike | None = None, *, n: int | None = None, alpha: float = 0.05
 ) -> MeanShift:
-    """Test whether a mean is μ0, two-sided, with known standard deviation (Eq 13).
+    """Two-sided z test of a mean against μ0, with known standard deviation (Eq 13).
 
     Parameters
     ----------
@@ -400,7 +400,7 @@ def warm_up(
     time_constants: PerSegment,
     initial: PerSegment | None = None,
 ) -> LinkWarmUp:
-    """Let every link follow the temperature around it with a lag of first order: τ_i dT_i/dt = T_ambient − T_i.
+    """First-order thermal lag of every link behind its surroundings: τ_i dT_i/dt = T_ambient − T_i.
 
     Parameters
     ----------
@@ -469,7 +469,7 @@ _LEAST_SHARE = 1e-6
 
 
 def axes_of(axes: Axes, count: int) -> tuple[str, ...]:
-    """Write the measured axes as a word of x, y and z for each of ``count`` poses; refused where they are none."""
+    """Measured axes as a word of x, y and z for each of ``count`` poses."""
     words = (axes,) * count if isinstance(axes, str) else tuple(axes)
     if len(words) != count:
         raise EstimationError(f"measured axes are given for {len(words)} poses, but there are {count}")
@@ -480,14 +480,14 @@ def axes_of(axes: Axes, count: int) -> tuple[str, ...]:
 
 
 def measured(words: Sequence[str]) -> NDArray[np.bool_]:
-    """Whether each component was measured, (N, 3)."""
+    """Mask (N, 3) of the measured components."""
     return np.array([[letter in word for letter in "xyz"] for word in words], dtype=bool).reshape(-1, 3)
 
 
 def pseudo_inverse(system: Array) -> tuple[Array, int, NDArray[np.bool_]]:
-    """Pseudo-inverse (S, m) of a system (m, S), its rank, and which unknowns it determines by themselves, (S,).
+    """Pseudo-inverse (S, m) of a system (m, S), its rank, and the mask (S,) of identified unknowns.
 
-    An unknown is determined alone where no combination that the system cannot see holds it.
+    An unknown is identified if it has no component in the null space.
     """
     left, singular, right = np.linalg.svd(system, full_matrices=True)
     rank = int(np.sum(singular > _RANK * np.max(singular, initial=0.0)))
@@ -534,7 +534,7 @@ def best_poses(
     axes: Axes = "xyz",
     seed: int = 0,
 ) -> BestPoses:
-    """Choose poses greedily, then exchange them one at a time until no exchange is better.
+    """Optimal design of measuring poses: greedy choice, then exchange of one pose at a time.
 
     Parameters
     ----------
@@ -552,7 +552,7 @@ def best_poses(
         What is measured: letters for all poses, or a word for each, as for
         :func:`~thermal_robot.assembly.thermal.identify_elongations`.
     seed
-        Of the draw.
+        Seed of the random candidates.
 
     Returns
     -------
@@ -593,9 +593,9 @@ def _pool(robot: Robot, candidates: ArrayLike | int, seed: int) -> Array:
 
 
 def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: str) -> list[int]:
-    """Add one pose after the other, then exchange one at a time until nothing is better.
+    """Greedy choice followed by exchanges of one pose at a time.
 
-    Poses are added by determinant, which alone tells half-determined systems apart.
+    Poses are added by determinant, the one criterion that ranks underdetermined systems.
     """
     chosen: list[int] = []
     for slot in range(len(words)):
@@ -616,7 +616,7 @@ def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: st
 def _scores(
     information: dict[str, Array], words: tuple[str, ...], chosen: list[int], slot: int, criterion: str, least: float
 ) -> Array:
-    """How good each candidate is for a slot beside the others, (M,); the larger, the better."""
+    """Design criterion (M,) of each candidate with the other poses; larger is better."""
     others = [(words[other], c) for other, c in enumerate(chosen) if other != slot]
     own = information[words[slot]]
     total = least * np.eye(own.shape[1])
@@ -690,7 +690,7 @@ def identify_elongations(
     sigma: ArrayLike | None = None,
     covariance: ArrayLike | None = None,
 ) -> IdentifiedElongations:
-    """Solve Eq 12 for the elongations, by weighted least squares, from displacements measured at N poses.
+    """Weighted least squares for the elongations of Eq 12, from displacements measured at N poses.
 
     Parameters
     ----------
@@ -771,7 +771,7 @@ def _noise(poses: int, sigma: ArrayLike | None, covariance: ArrayLike | None) ->
 
 
 def _root(covariance: Array) -> Array:
-    """Cholesky's factor of the noise of a pose."""
+    """Cholesky factor of the noise of a pose."""
     if not np.all(np.isfinite(covariance)):
         raise EstimationError("the noise of a measured component is not a finite number")
     try:

@@ -1,4 +1,4 @@
-"""Where in its workspace should a robot join parts? Poses that hold a peg, and the clearance that each place needs."""
+"""Workspace map of joining: poses that hold a peg at each place, and the clearance required there."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SAME_BRANCH = (0.25, 0.5, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class AssemblyMap:
-    """What M places ask of a clearance, from :func:`assembly_map`; NaN for a pose that is NaN.
+    """Required clearances of M places, from :func:`assembly_map`; NaN for a pose that is NaN.
 
     Parameters
     ----------
@@ -58,22 +58,22 @@ class AssemblyMap:
 
     @property
     def cost(self) -> Array:
-        """Clearance (M,), m, that the rise of temperature costs."""
+        """Additional clearance (M,), m, required by the rise of temperature."""
         return self.required_warm - self.required
 
     @property
     def best(self) -> int:
-        """Row of the place that needs the smallest clearance when it is warm."""
+        """Row of the place with the smallest warm clearance."""
         return int(np.nanargmin(self.required_warm))
 
     @property
     def worst(self) -> int:
-        """Row of the place that needs the largest."""
+        """Row of the place with the largest warm clearance."""
         return int(np.nanargmax(self.required_warm))
 
 
 def grid(xs: ArrayLike, ys: ArrayLike, zs: ArrayLike) -> Array:
-    """All places (M, 3), m, with these coordinates, x running fastest; a plane if one of them is a single number."""
+    """Grid of places (M, 3), m, x running fastest; a plane if one coordinate is a single number."""
     heights, ahead, across = np.meshgrid(*(np.atleast_1d(np.asarray(v, float)) for v in (zs, ys, xs)), indexing="ij")
     return np.stack([across, ahead, heights], axis=-1).reshape(-1, 3)
 
@@ -87,7 +87,7 @@ def reach(
     axis: ArrayLike = (0.0, 0.0, 1.0),
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Find poses that hold a peg along ``approach`` with its tip at each place; the turn about the peg is left free.
+    """Inverse kinematics of a peg along ``approach`` with its tip at each place; rotation about the peg is free.
 
     The place nearest to the seed is solved first, and every other from a neighbour that is solved, so that the whole
     map keeps the seed's branch (elbow up, say). A place counts as not reached too if that branch does not lead there
@@ -159,7 +159,7 @@ def assembly_map(
     axis: ArrayLike = (0.0, 0.0, 1.0),
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> AssemblyMap:
-    """Probability of joining a round peg, and the clearance it needs, at each pose before and after a rise.
+    """Probability of joining a round peg, and required clearance, at each pose before and after warming.
 
     Only errors across the peg count.
 
@@ -217,7 +217,7 @@ def assembly_map(
 def _solve(
     robot: Robot, targets: Array, from_q: Array, approach: Array, axis: Array, point: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Damped least squares for all places at once; the damping falls with the square of what is missing."""
+    """Levenberg-Marquardt for all places at once, damping proportional to the squared residual."""
     q = from_q.copy()
     closed = np.zeros(len(q), dtype=bool)
     for _ in range(_STEPS):

@@ -1,1 +1,1 @@
-"""The blind trial: robots whose fault is hidden are diagnosed, and the answers scored."""
+"""Blind trial: diagnosis of simulated robots with hidden faults, scored against the truth."""

@@ -1,4 +1,4 @@
-"""What the trial asks: cases, and the records that it keeps of them.
+"""Cases of the trial, and the records of their results.
 
 A **record** is what is known of one case after its seal was opened, as plain JSON (lengths m, angles rad)::
 
@@ -65,7 +65,7 @@ class RobotChoice:
 
 @dataclass(frozen=True)
 class Several:
-    """What a case of several campaigns asks beside.
+    """What a case of several campaigns asks in addition.
 
     Attributes
     ----------

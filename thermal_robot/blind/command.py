@@ -1,4 +1,4 @@
-"""The command ``thermal-robot blind``: what is asked for, a trial, its score."""
+"""Command ``thermal-robot blind``: plan a trial, run it, score it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the trial that the options ask for, print its score and write what is asked for.
+    """Run a trial, print its score and write the requested files.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) 
 def _with_faults(
     cases: tuple[Case, ...], faults: Sequence[str], seed: int, robots: tuple[RobotChoice, ...]
 ) -> tuple[Case, ...]:
-    """Add cases with faults of the user's own: named by the library where it has an effect of that name."""
+    """Add cases with faults of the user's own, under the library's name where there is one."""
     if not faults:
         return cases
     from thermal_robot.blind.reality.unlisted import load
@@ -185,7 +185,7 @@ def _with_faults(
 
 
 def _counts(options: argparse.Namespace) -> dict[str, int]:
-    """Return the number of cases by kind; ``real`` is there only where it was given."""
+    """Return the number of cases by kind; ``real`` only where it was given."""
     from thermal_robot.blind.plan import FULL, SHORT
 
     if not options.count:

@@ -1,4 +1,4 @@
-"""The program that is examined, in a process of its own: it is given a folder with a campaign, and no answers.
+"""Process under examination: it is given a folder with a campaign, without the answers.
 
 ``python -m thermal_robot.blind.examinee DIRECTORY`` reads one request a line, as JSON, and writes one reply a line::
 
@@ -51,7 +51,7 @@ _ROUNDS = 3  # after which noise and fit agree to a per cent
 
 
 def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[str, Array]:
-    """Predict samples with every subset of the effects of a model, frames and effects fitted anew for each.
+    """Predict samples with every subset of a model's effects, frames and effects refitted for each.
 
     Of a part of the effects linear about the nominal robot, by least squares on the rows that were not set aside, with
     the settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the
@@ -83,7 +83,7 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
 
 
 def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
-    """Pretend that samples were measured, so that their columns are those of the campaign."""
+    """Return the samples with dummy measurements, so that their columns are those of the campaign."""
     count = samples.samples
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)) if model.measures == "pose" else None
     read = {name: values for name, values in samples.covariates.items() if name in model.needs}
@@ -93,7 +93,7 @@ def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
 def _design(
     model: CorrectedModel, given: Observations, asked: Observations
 ) -> tuple[Array, Array, Array, tuple[slice, ...]]:
-    """(N, m, K) and (M, 3, K) columns of frames and effects, (K,) one over what holds each, and each effect's columns.
+    """Columns (N, m, K) and (M, 3, K) of frames and effects, prior deviations (K,), and each effect's columns.
 
     A parameter is held to the rms of its effect's parameters, in units of their expected sizes.
     """
@@ -113,7 +113,7 @@ def _design(
 
 
 def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
-    """Least squares with a row for each parameter that is held; noise and remainder of each kind found together.
+    """Ridge regression with the noise and the residual of each kind estimated together.
 
     (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad.
     """
@@ -132,7 +132,7 @@ def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
 
 
 class Fence:
-    """An audit hook that refuses every file of the trial's directory except those of the folder in question.
+    """Audit hook that denies access to all files of the trial's directory but one folder.
 
     It keeps honest code honest: a compiled library that opens files past Python is not seen. The seal does not depend
     on it.
@@ -143,11 +143,11 @@ class Fence:
         self._folder = ""
 
     def allow(self, folder: Path) -> None:
-        """Let this folder be read, and no longer the one before."""
+        """Grant access to this folder, and revoke that to the one before."""
         self._folder = os.path.realpath(folder)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
-        """Refuse, if that is what is asked for."""
+        """Deny access, if the event asks for a forbidden file."""
         if event not in ("open", "os.listdir", "os.scandir") or not isinstance(arguments[0], (str, bytes, os.PathLike)):
             return
         # links are followed: one inside the folder could lead out of it
@@ -157,7 +157,7 @@ class Fence:
 
 
 def answer(request: dict[str, Any]) -> Plain:
-    """Diagnose a campaign and predict its fresh samples; whatever goes wrong becomes the reply's error."""
+    """Diagnose a campaign and predict its fresh samples; any exception becomes the reply's error."""
     folder, asks = Path(request["folder"]), request.get("asks", "diagnosis")
     reply: Plain = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
     at, start = asks, time.perf_counter()
@@ -212,14 +212,14 @@ def _within(path: str, folder: str) -> bool:
 
 
 def comparison(folder: Path, only: Sequence[str]) -> Plain:
-    """Compare the campaigns that are listed in a folder: ``thermal-robot/comparison/1``."""
+    """Compare the campaigns listed in a folder: ``thermal-robot/comparison/1``."""
     listed = campaigns(folder / LISTED)
     names = [name for name, _ in listed.campaigns]
     return compare(*(listed.folder(name) for name in names), names=names, only=only or None).to_dict()
 
 
 def followed(folder: Path, only: Sequence[str]) -> Plain:
-    """Follow the robot of dated campaigns: ``thermal-robot/wear/1``."""
+    """Change over time of the robot of dated campaigns: ``thermal-robot/wear/1``."""
     listed = campaigns(folder / LISTED)
     date = listed.names.index("date")
     dated = [(labels[date], listed.folder(name)) for name, labels in listed.campaigns]

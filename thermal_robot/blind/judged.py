@@ -1,4 +1,4 @@
-"""One record judged: which questions it answers, and which of them rightly.
+"""Scoring of one record: the questions that it answers, and which of them rightly.
 
 A diagnosis that failed answers every question wrongly. Questions by kind:
 
@@ -77,59 +77,59 @@ _SILENT: dict[str, Any] = {
 
 
 def marks(record: Record) -> Marks:
-    """Judge one record: answers by question, one or one for each effect found; what cannot be asked is missing."""
+    """Score one record: answers by question, one or one for each effect found; unasked questions are missing."""
     answers = _ASKED[record["kind"]](record)
     return {name: (name in BAD,) * len(given) for name, given in answers.items()} if failed(record) else answers
 
 
 def is_miss(record: Record) -> bool:
-    """Whether the question that matters most for this kind is answered wrongly."""
+    """Whether the main question of this kind of case is answered wrongly."""
     return not all(marks(record)[HEADLINE[record["kind"]]])
 
 
 def failed(record: Record) -> bool:
-    """Whether there is no diagnosis."""
+    """Whether the diagnosis failed."""
     return record.get("error") is not None or record.get("said") is None
 
 
 def said(record: Record) -> Plain:
-    """Return the diagnosis, or one that says nothing where it failed."""
+    """Diagnosis, or an empty one where it failed."""
     return _SILENT if failed(record) else record["said"]
 
 
 def at_work(record: Record) -> tuple[str, ...]:
-    """Return the effects that are to be found."""
+    """Effects at work, which are to be found."""
     return tuple(record["truth"]["effects"])
 
 
 def found(record: Record) -> frozenset[str]:
-    """Return the effects that the diagnosis claims."""
+    """Effects that the diagnosis reports as found."""
     return frozenset(e["name"] for e in said(record)["effects"] if e["status"] == "found")
 
 
 def ratio(record: Record, effect: str) -> float | None:
-    """Return what an effect truly leaves, over the noise; ``None`` where it is absent or its size unknown."""
+    """Return the true size of an effect over the noise; ``None`` where it is absent or its size unknown."""
     size = record["truth"].get("parts", {}).get(effect, {}).get("ratio")
     return None if size is None else float(size)
 
 
 def is_absent(record: Record, effect: str) -> bool:
-    """Whether an effect is not at work, not even in the background."""
+    """Whether an effect is not at work, nor in the background."""
     return effect not in at_work(record) and (ratio(record, effect) or 0.0) < ABSENT
 
 
 def first_named(record: Record) -> str | None:
-    """Return the first effect of the verdict."""
+    """First effect of the verdict."""
     return next(iter(said(record)["verdict"]["effects"]), None)
 
 
 def unexplained(record: Record) -> bool:
-    """Whether the diagnosis calls something unexplained."""
+    """Whether the diagnosis flags an unexplained residual."""
     return bool(said(record)["verdict"]["unexplained"])
 
 
 def corrects(record: Record) -> bool:
-    """Whether the corrected model holds more than the frames: an effect that is named and shrinks the gap.
+    """Whether the corrected model holds more than the frames: a named effect with a shrinkage.
 
     Effects that scatter are named, too, but no correction takes them away.
     """
@@ -138,7 +138,7 @@ def corrects(record: Record) -> bool:
 
 
 def is_right_law(record: Record, law: Plain) -> bool:
-    """Whether a law has the place, or one beside it, and the quantity of a cause that no effect may explain."""
+    """Whether a law has the place, or a neighbour, and the quantity of a cause outside the library."""
     truth = record["truth"]
     near = _sites(truth.get("near") or truth.get("places", ()))
     return any(site in near for site in _sites(law["locations"][:1])) and (
@@ -147,9 +147,9 @@ def is_right_law(record: Record, law: Plain) -> bool:
 
 
 def answer(record: Record) -> tuple[tuple[str, str] | None, str | None]:
-    """Return where the unknown cause enters and what it follows: a discovered law's word counts before the rest's.
+    """Place and quantity of the unknown cause: of a discovered law, else of the unexplained residual.
 
-    Where something is called unexplained and follows nothing, that is ``none``.
+    The quantity is ``none`` where an unexplained residual follows nothing.
     """
     left = said(record)["unexplained"]
     laws = [e for e in said(record)["effects"] if e["name"].startswith(LAW)][:1]
@@ -167,12 +167,12 @@ def _sites(places: Any) -> list[tuple[str, str]]:
 
 
 def _extra(record: Record) -> set[str]:
-    """Return what is claimed and is not at work."""
+    """Return the reported effects that are not at work."""
     return {name for name in found(record) if is_absent(record, name)}
 
 
 def _known(record: Record) -> Marks:
-    """Judge a case whose causes are all in the library."""
+    """Score a case whose causes are all in the library."""
     wanted, extra, strange = set(at_work(record)), _extra(record), unexplained(record)
     confounded = {e["name"] for e in said(record)["effects"] if e["status"] == "confounded"}
     escaped = confounded & set(said(record)["verdict"]["effects"])
@@ -188,7 +188,7 @@ def _known(record: Record) -> Marks:
 
 
 def _located(record: Record, effect: str) -> list[tuple[bool, bool]]:
-    """Tell whether the first place is the first true one, and one of them; nothing where the effect sits everywhere."""
+    """Whether the first place is the first true one, and whether it is a true one; empty where places do not apply."""
     true = _sites(record["truth"].get("parts", {}).get(effect, {}).get("places", ()))
     told = next(e for e in said(record)["effects"] if e["name"] == effect)["locations"]
     first = next(iter(_sites(told)), None)
@@ -196,14 +196,14 @@ def _located(record: Record, effect: str) -> list[tuple[bool, bool]]:
 
 
 def _mixed(record: Record) -> Marks:
-    """Judge a case whose effects may be too small to be seen: nothing else must be."""
+    """Score a case whose effects may be too small to be seen: only false alarms count."""
     right = {e["name"] for e in said(record)["effects"] if e["name"].startswith(LAW) and is_right_law(record, e)}
     extra, strange = _extra(record) - right, unexplained(record) and not record["truth"].get("unlisted")
     return _yes(sound=not extra and not strange, false_alarm=bool(extra))
 
 
 def _unknown(record: Record) -> Marks:
-    """Judge a case one cause of which is not in the library, or was taken from it."""
+    """Score a case with a cause outside the library, or removed from it."""
     flagged, blameless = unexplained(record), not _blamed(record)
     truth, (place, quantity) = record["truth"], answer(record)
     answers = _yes(flagged=flagged, not_blamed=blameless, right=flagged and blameless)
@@ -216,7 +216,7 @@ def _unknown(record: Record) -> Marks:
 
 
 def _both(record: Record) -> Marks:
-    """Judge a case with one or two listed effects beside a cause that is not in the library."""
+    """Score a case with one or two listed effects and a cause outside the library."""
     answers, listed = _unknown(record), set(at_work(record)) <= found(record)
     return {**answers, **_yes(listed=listed, right=listed and all(answers["right"]))}
 
@@ -228,7 +228,7 @@ def _blamed(record: Record) -> bool:
 
 
 def _hidden(record: Record) -> Marks:
-    """Judge a case whose cause follows a column that was taken away; ``temperature`` stands for each link's, too."""
+    """Score a case whose cause follows a removed column; ``temperature`` stands for each link's, too."""
 
     def stems(columns: Any) -> set[str]:
         return {column.partition(".")[0] for column in columns}
@@ -246,7 +246,7 @@ _HALL = "hall"
 
 
 def _compared(record: Record) -> Marks:
-    """Judge a comparison of two campaigns, of the format ``thermal-robot/comparison/1``."""
+    """Score a comparison of two campaigns, of the format ``thermal-robot/comparison/1``."""
     truth, told = record["truth"], said(record)
     right, others = _parted(truth, told["changes"])
     kept = set(truth["effects"]) <= set(told["verdict"]["effects"])
@@ -256,7 +256,7 @@ def _compared(record: Record) -> Marks:
 
 
 def _followed(record: Record) -> Marks:
-    """Judge what is said of a robot over time, of the format ``thermal-robot/wear/1``."""
+    """Score the result of a robot over time, of the format ``thermal-robot/wear/1``."""
     truth, rings = record["truth"], [p for p in said(record)["parameters"] if p["alarm"]]
     right, others = _parted(truth, rings)
     if not truth["changes"]:
@@ -277,14 +277,14 @@ def _followed(record: Record) -> Marks:
 
 
 def _parted(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[Plain]]:
-    """Part what is told to have changed into what did, and what did not."""
+    """Split reported changes into true and false ones."""
     true = {(c["effect"], c["place"]["name"]) for c in truth["changes"]}
     right = [one for one in told if (one["effect"], one["place"]) in true]
     return right, [one for one in told if one not in right]
 
 
 def _shared(record: Record) -> Marks:
-    """Judge the summary of a fleet, of the format ``thermal-robot/fleet/1``."""
+    """Score the summary of a fleet, of the format ``thermal-robot/fleet/1``."""
     truth, told = record["truth"], said(record)
     called = [s for s in told["shared"] if not any(_same(s, true) for true in truth["shared"])]
     true_ones = {true["effect"] for true in truth["shared"]}
@@ -332,7 +332,7 @@ _ASKED: dict[str, Callable[[Record], Marks]] = {
 
 
 def true_words(truth: Plain) -> tuple[str, ...]:
-    """Say in short words what was true of several campaigns."""
+    """Truth of several campaigns in short words."""
     words = []
     for c in truth.get("changes", ()):
         day = "" if c["after"] is None else f", after campaign {c['after'] + 1}"
@@ -342,7 +342,7 @@ def true_words(truth: Plain) -> tuple[str, ...]:
 
 
 def said_words(kind: str, said: Plain) -> tuple[str, ...]:
-    """Say in short words what was answered of several campaigns."""
+    """Answer on several campaigns in short words."""
     if kind in ("same", "changed"):
         return tuple(f"{c['effect']}, {c['place'] or 'everywhere'}" for c in said["changes"])
     if kind in ("steady", "series"):

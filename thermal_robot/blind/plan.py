@@ -1,4 +1,4 @@
-"""Which cases a trial has: drawn from one seed, every effect and withholding of a kind in turn."""
+"""Plan of a trial: cases drawn from one seed, every effect and withholding of a kind in turn."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ _FLEETS: tuple[How, ...] = ("all", "hall", "")
 
 
 def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield what is asked in cases of one kind, without end, of these effects and unlisted causes, each in turn.
+    """Endless sequence of cases of one kind, cycling through these effects and unlisted causes.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def _in_turn(
 
 
 def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Asked]:
-    """Return what is asked in turn: every item as often as any other."""
+    """Items of one cycle: every effect or cause as often as any other."""
     # contained effects are no loss where the library keeps the container
     contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
     apart, local = _apart(effects), [name for name in LOCAL if name in effects]
@@ -138,7 +138,7 @@ def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Aske
 
 
 def _beside(kind: str, asked: Asked, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
-    """Draw what stands beside an item of the menu."""
+    """Draw the other faults of a case."""
     apart, always = _apart(effects), [name for name in BESIDE if name in effects]
     if kind == "both":
         return {"effects": _several(apart, int(rng.integers(1, 3)), rng)}
@@ -167,7 +167,7 @@ def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tup
 
 
 def _mixture(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
-    """Draw each effect by a chance of its own: something to hold probabilities against.
+    """Draw each effect with its own probability, to calibrate probabilities.
 
     Sets in which one contains another are drawn again.
     """
@@ -182,14 +182,14 @@ def _mixture(effects: Sequence[str], causes: Sequence[str], rng: np.random.Gener
 
 
 def _with_another(first: tuple[str, ...], always: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Add another effect that stays in every second case, by chance, unless the two do the same."""
+    """Add a constant effect in every second case, at random, unless the two are confounded."""
     second = str(always[int(rng.integers(len(always)))])
     wanted = bool(rng.random() < 0.5)
     return first if not wanted or second in first or alike((*first, second)) else (*first, second)
 
 
 def _own(shared: tuple[str, ...], effects: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw faults of single robots of a fleet, no more of one kind than every arm has places for."""
+    """Draw faults of single robots of a fleet, no more of one kind than every arm has joints for."""
     places = [name for name in LOCAL if name in effects for _ in range(PLACES - shared.count(name))]
     count = min(int(rng.integers(APART[0], APART[1] + 1)), len(places))
     return tuple(places[k] for k in rng.permutation(len(places))[:count])
@@ -200,7 +200,7 @@ def _holds(contents: Mapping[str, set[str]], chosen: Sequence[str]) -> bool:
 
 
 def alike(chosen: Sequence[str]) -> bool:
-    """Whether one of them contains another, or can do nearly the same."""
+    """Whether one effect contains another, or can nearly imitate it."""
     return _holds(CONTAINS, chosen) or _holds(IMITATES, chosen)
 
 
@@ -245,7 +245,7 @@ SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0,
 
 
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
-    """Return robots with their URDF's text, so that nothing else has to find it again.
+    """Robots with their URDF text.
 
     Of each a name, a URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and the tool frame.
 
@@ -270,7 +270,7 @@ def plan(
     only_effects: Sequence[str] = (),
     unlisted: Sequence[str] = (),
 ) -> tuple[Case, ...]:
-    """Draw the cases of a trial from its seed, in a drawn order, so that a case's number tells nothing.
+    """Draw the cases of a trial from its seed, in random order, so that a case's number gives nothing away.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def _cases(
     causes: Sequence[str],
     rng: np.random.Generator,
 ) -> Iterator[Case]:
-    """Yield cases in a drawn order, each with a seed and a robot."""
+    """Yield cases in random order, each with a seed and a robot."""
     drawn: list[Asked] = []
     for kind, count in counts.items():
         turn = turns(kind, effects, causes, rng)

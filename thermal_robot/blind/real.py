@@ -1,4 +1,4 @@
-"""Real data with a cause put in or withheld: the noise, the geometry and all else are a real robot's.
+"""Semi-synthetic cases: real campaigns with a fault added or a column withheld.
 
 Every campaign of the folder is asked about untouched first (the **control**), then with one condition changed. A real
 arm has a wrong geometry and a remainder that nothing explains before anything is put in; what is right is therefore
@@ -49,7 +49,7 @@ _SHORTEST = 1e-9  # m: a shorter segment has no direction along which it grows
 
 
 def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Campaign:
-    """Return the campaign with commands as if the joint were off: actual = command in the table + error.
+    """Campaign with commands that hide a joint error: actual = command in the table + error.
 
     A scalar or (N,), rad: a constant is a zero offset, a step a slip, −½ b·approach lost motion.
     """
@@ -59,7 +59,7 @@ def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Ca
 
 
 def with_approaches(campaign: Campaign) -> Campaign:
-    """Return the campaign with the side from which each joint came, the rows being in the order of measurement.
+    """Campaign with directions of approach, derived from the order of measurement.
 
     The sign of the change of the command since the row before; 0 in the first row and where the joint stayed. Where
     only some rows of a campaign are taken this is a side as good as any: what is put in follows it.
@@ -71,7 +71,7 @@ def with_approaches(campaign: Campaign) -> Campaign:
 
 
 def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
-    """Return the campaign with links that grew along their S nominal segments; the table tells no temperature.
+    """Campaign with elongated links, (N, S) of the nominal segments, whose temperature the table lacks.
 
     Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
     """
@@ -86,7 +86,7 @@ def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
 
 
 def warm_up(rng: np.random.Generator, samples: int) -> Array:
-    """Return (N,) kelvin above the start over a campaign: the robot warms up, cools in a break, and warms up again."""
+    """Return the simulated temperature (N,), kelvin above the start: warm-up, break, and warm-up again."""
     passed = np.linspace(0.0, 1.0, samples)
     start, end = rng.uniform(0.35, 0.45), rng.uniform(0.55, 0.65)
     slow = rng.uniform(0.1, 0.25)
@@ -99,7 +99,7 @@ def warm_up(rng: np.random.Generator, samples: int) -> Array:
 
 
 def registered(campaign: Campaign) -> Frames:
-    """Fit base and target point to the nominal robot by least squares, and nothing else."""
+    """Least-squares registration of base and target to the nominal robot."""
     frames = Frames.declared(campaign)
     predicted = observe(campaign, frames).position
     frames = Frames(align(predicted, measured(campaign), np.ones(campaign.samples)), frames.tool)
@@ -117,12 +117,12 @@ def registered(campaign: Campaign) -> Frames:
 
 
 def frame_columns(seen: Observations) -> Array:
-    """Return (N, 3, 9): what a unit twist of the base and a unit shift of the target do to the target, root frame."""
+    """Displacement (N, 3, 9) of the target per unit twist of the base and unit shift of the target, root frame."""
     return np.concatenate([seen.base_sensitivity[:, :3], seen.tool_sensitivity[:, :3, :3]], axis=2)
 
 
 def leaves(seen: Observations, shift: Array) -> float:
-    """Return the rms distance, m, that (N, 3) shifts in the root frame leave after the best frames."""
+    """Residual rms, m, of (N, 3) shifts in the root frame after registration."""
     columns = frame_columns(seen).reshape(-1, 9)
     columns = columns / np.linalg.norm(columns, axis=0)
     rest = shift.ravel() - columns @ np.linalg.lstsq(columns, shift.ravel(), rcond=1e-9)[0]
@@ -130,7 +130,7 @@ def leaves(seen: Observations, shift: Array) -> float:
 
 
 def measured(campaign: Campaign) -> Array:
-    """Return the measured positions, which a campaign has that is no mere sample."""
+    """Measured positions; an error if there are none."""
     return np.asarray(campaign.position)
 
 
@@ -142,7 +142,7 @@ CLAIM = (0.5, 1.25)  # rms reached over rms claimed
 
 
 def judged(fault: str, record: Record, control: Record | None, remainder: float) -> tuple[bool, str]:
-    """Return whether the answer is right, and the answer in short words; see :meth:`RealCase.judge`.
+    """Whether the answer is right, and the answer in short words; see :meth:`RealCase.judge`.
 
     The remainder is what a full geometry leaves of the campaign, rms distance, m.
     """
@@ -200,7 +200,7 @@ def _backlash(said: Record, truth: Record) -> tuple[bool, str]:
 
 
 def _unexplained(said: Record, truth: Record, kind: str) -> tuple[bool, str]:
-    """Tell whether it is flagged, with one of the truth's quantities and, where a kind of place is given, places."""
+    """Whether a flagged residual names one of the true quantities and, where a kind is given, places."""
     left = said["unexplained"]
     places = {(p["kind"], p["name"]) for p in truth["places"]}
     first = left["locations"][:1], [d["covariate"] for d in left["depends_on"][:1]]
@@ -248,7 +248,7 @@ _EARLY = 0.7
 
 @dataclass(frozen=True)
 class RealCase:
-    """A real campaign with what was done to it; its ``id`` names its folder and tells nothing.
+    """Real campaign with an added fault; its ``id`` names its folder and gives nothing away.
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ class RealCase:
     kind: Literal["real"] = "real"
 
     def make(self, folder: Path) -> Answers:
-        """Write what the diagnosis sees, and return the answers: what of the record is known before the diagnosis.
+        """Write the campaign for the diagnosis, and return the truth.
 
         ``truth`` has a ``size`` (SI) in its parts; ``noise`` is what a full geometry leaves, per axis. Both (N, 3) m in
         the measurement frame or ``None``: ``fresh_position``, measured, and ``fresh_before``, predicted by the nominal
@@ -306,13 +306,13 @@ class RealCase:
         return answers
 
     def judge(self, record: dict[str, Any], control: dict[str, Any] | None) -> dict[str, Any]:
-        """Return this case's record with ``right`` and, in short words, ``answer``; ``control`` is that it names."""
+        """Record of this case with ``right`` and ``answer`` in short words; ``control`` is the unmodified one's."""
         right, answer = judged(self.fault, record, control, REMAINDERS[self.campaign])
         return {**record, "right": right, "answer": answer}
 
 
 def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCase, ...]:
-    """Return the cases of one trial, each after its control; a campaign that the folder lacks is left out.
+    """Cases of one trial, each after its control; missing campaigns are left out.
 
     At most ``count``, controls included; about sixteen where absent.
     """
@@ -340,7 +340,7 @@ def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCas
 
 
 def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
-    """Return at most so many rows as a quick diagnosis takes: every k-th, or those of a spell."""
+    """Row limit of a quick diagnosis: every k-th row, or consecutive ones."""
     rows = in_order(campaign)
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 1])
     size = int(rng.integers(*_ROWS))
@@ -352,7 +352,7 @@ def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
 
 
 def _kept(samples: int, seed: int, name: str) -> NDArray[np.bool_]:
-    """(N,) True for the rows of some spells: single rows would have near-repeats among the diagnosed."""
+    """Mask (N,) of training rows in whole runs, so that near-repeats are not split."""
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 3])
     spell = np.arange(samples) * _SPELLS // samples
     return np.isin(spell, rng.choice(_SPELLS, _SPELLS // 5, replace=False))
@@ -362,7 +362,7 @@ Made = tuple[Campaign, Answers, str]
 
 
 def _truth(effect: str | None = None, ratio: float = 0.0, size: float = 0.0, joint: str = "") -> Answers:
-    """Return the truth of a case: a real arm's geometry is never that of its URDF, and no part that was put in."""
+    """Truth of a case: the arm's geometric errors, and the added fault."""
     places = [{"kind": "joint", "name": joint}] if joint else []
     parts = {effect: {"ratio": ratio, "main": True, "places": places, "size": size}} if effect else {}
     effects = ["geometric", *parts]
@@ -375,7 +375,7 @@ def _nothing(campaign: Campaign, rng: np.random.Generator, remainder: float, ask
 
 
 def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float, fault: Fault) -> Made:
-    """Put an offset, lost motion or a slip into one joint; it leaves a drawn multiple of the remainder."""
+    """Add an offset, backlash or a slip to one joint, scaled to a random multiple of the residual."""
     joint = int(rng.integers(1, campaign.robot.n - 2))
     name = campaign.robot.joint_names[joint]
     shape = np.ones(campaign.samples)

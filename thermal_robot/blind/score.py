@@ -1,4 +1,4 @@
-"""The score of a blind trial, as plain JSON: rates with Wilson's intervals, calibration, coverage, detection."""
+"""Score of a blind trial as plain JSON: rates with Wilson intervals, calibration, coverage, detection."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ Plain = dict[str, Any]
 
 
 def score(records: Sequence[Record]) -> Plain:
-    """Score records as in :mod:`thermal_robot.blind.cases`; a failed diagnosis counts as wrong everywhere.
+    """Score records (:mod:`thermal_robot.blind.cases`); a failed diagnosis counts as wrong everywhere.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def rate(successes: int, trials: int) -> Plain:
 
 
 def counted(outcomes: Iterable[bool]) -> Plain:
-    """Rate of outcomes."""
+    """Rate of true outcomes."""
     told = [bool(outcome) for outcome in outcomes]
     return rate(sum(told), len(told))
 
@@ -136,7 +136,7 @@ def _tally(answers: Iterable[tuple[str, str, bool | None]]) -> dict[str, dict[st
 
 
 def _grouped(named: Iterable[tuple[str, Record]]) -> dict[str, dict[str, Plain]]:
-    """Rates of all questions that records are asked, by the groups that they are named with."""
+    """Rates of all questions by the groups of their records."""
     return _tally(
         (name, question, right)
         for name, record in named
@@ -176,7 +176,7 @@ def _real(record: Record) -> Plain:
 
 
 def _miss(record: Record) -> Plain:
-    """Return what it takes to look at a wrong answer again."""
+    """Return the data to look up a wrong answer."""
     return {
         **{name: record[name] for name in ("id", "kind", "robot")},
         **_told(record),
@@ -186,7 +186,7 @@ def _miss(record: Record) -> Plain:
 
 
 def _told(record: Record) -> Plain:
-    """Return effects at work and named, where the unexplained is and what it follows, and the verdict's probability."""
+    """Effects at work and named, place and quantity of the unexplained residual, and the verdict's probability."""
     if record["kind"] in SEVERAL:
         words = {"truth": list(true_words(record["truth"])), "said": list(said_words(record["kind"], said(record)))}
         return {**words, "unexplained": None, "probability": None}
@@ -244,7 +244,7 @@ def _shares(record: Record) -> Iterator[bool]:
 
 
 def fresh_ratio(record: Record) -> float | None:
-    """Return what the corrected model leaves on fresh samples, rms per axis over the noise."""
+    """Residual of the corrected model on fresh samples, rms per axis over the noise."""
     fresh = record.get("fresh")
     if failed(record) or not fresh or not record.get("noise"):
         return None
@@ -264,14 +264,14 @@ _VISIBLE = 0.5  # × noise per axis: where the gap before is less, a share of it
 
 
 def shrinkage(records: Sequence[Record]) -> Plain:
-    """Shrinkage claimed from held-out rows and reached on fresh samples, and the median of their differences."""
+    """Shrinkage claimed from held-out rows and reached on fresh samples, with the median difference."""
     pairs = [pair for record in records for pair in _pair(record)]
     apart = [abs(pair["claimed"] - pair["real"]) for pair in pairs]
     return {"pairs": pairs, "median_absolute_difference": float(np.median(apart)) if apart else None}
 
 
 def _pair(record: Record) -> Iterator[Plain]:
-    """Compare the mean squares without noise; those of real campaigns with it, since their fresh rows hold it, too."""
+    """Ratios of mean squares, the noise subtracted; on real campaigns with the noise, as fresh rows contain it."""
     fresh = record.get("fresh")
     if failed(record) or not fresh or not fresh["rms_before"] or record.get("noise") is None:
         return
@@ -292,7 +292,7 @@ DOUBTFUL = (0.05, 0.95)
 
 
 def calibration(records: Sequence[Record]) -> Plain:
-    """Calibration of the probabilities of all effects and laws of mixtures, and of those that were in doubt.
+    """Reliability diagrams of the probabilities of effects and laws of mixtures, all and uncertain ones.
 
     An effect in the background, neither clearly present nor clearly absent, does not count. A discovered law is right
     where its place, or one beside it, and its quantity are those of the unlisted cause.
@@ -318,7 +318,7 @@ def _pairs(record: Record) -> Iterator[tuple[float, bool]]:
 
 
 def reliability(p: Array, present: NDArray[np.bool_]) -> Plain:
-    """Return the expected calibration error Σ n_b/N |mean p_b − frequency_b| of (N,) probabilities, and its bins.
+    """Return the expected calibration error Σ n_b/N |mean p_b − frequency_b| of (N,) probabilities, with its bins.
 
     Naeini et al. 2015; Guo et al. 2017. The error is ``None`` without any.
     """
@@ -333,7 +333,7 @@ def reliability(p: Array, present: NDArray[np.bool_]) -> Plain:
 
 
 def sure_laws(records: Sequence[Record]) -> Plain:
-    """Rate of right ones among the laws printed at 0.9 or more, in all records but real ones.
+    """Rate of correct laws among those of probability 0.9 or more, in all records but real ones.
 
     A law where all that is at work is in the library is wrong.
     """
@@ -346,7 +346,7 @@ NOTHING, UNLISTED, UNEXPLAINED, FAILED = "nothing", "unlisted", "unexplained", "
 
 
 def confusion(records: Sequence[Record], kinds: Sequence[str]) -> Plain:
-    """Confusion matrix of truths against what was named first, over cases of some kinds.
+    """Confusion matrix of truths and first-named effects, over cases of some kinds.
 
     Rows are effects, ``nothing``, ``unlisted``; columns the rows' effects, then others, ``nothing``, ``unexplained``,
     ``failed``. Of several effects at work the first of the truth's list is the row. A discovered law counts as
@@ -386,7 +386,7 @@ _POINTS = 41
 
 
 def detection(records: Sequence[Record]) -> Plain:
-    """Rates of effects found, over their size, over rows, over both, and the curve; where one effect is at work.
+    """Return the detection rates by size, by rows, by both, and the fitted curve, over cases with one effect.
 
     A case whose size is unknown does not count. ``table`` has one row for each step of the ratio.
     """
@@ -410,7 +410,7 @@ def detection(records: Sequence[Record]) -> Plain:
 
 
 def logistic(size: Array, rows: Array, hit: NDArray[np.bool_]) -> Plain:
-    """Fit the curve of detection by ridge logistic regression (le Cessie & van Houwelingen 1992, Appl. Stat. 41, 191).
+    """Ridge logistic regression of detection (le Cessie & van Houwelingen 1992, Appl. Stat. 41, 191).
 
     Chance = logistic(intercept + ratio · ln(ratio) + samples · ln(samples)), on centred logarithms of the (N,) ratios
     to the noise and numbers of rows; ``hit`` says where the effect was found. ``std`` are the standard deviations of

@@ -1,4 +1,4 @@
-"""Examinees and their supervisor: processes that are given a folder each, and ended where they do not answer."""
+"""Supervisor of examinee processes: requests, timeouts, termination."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _KEPT = ("PATH", "HOME", "LD_LIBRARY_PATH")  # a Pinocchio that came with ROS or
 
 
 class Lost(Exception):
-    """An examinee that gave no answer; says why."""
+    """An examinee gave no answer; says why."""
 
 
 class Examinee:
-    """One examinee's process, of the trial in a directory."""
+    """One examinee process for the trial in a directory."""
 
     def __init__(self, directory: Path) -> None:
         self._complaints = tempfile.TemporaryFile()
@@ -44,14 +44,14 @@ class Examinee:
         )
 
     def start(self) -> None:
-        """Wait until it is ready; RuntimeError if it does not start: then the fault is not a campaign's."""
+        """Wait until the process is ready; RuntimeError if it does not start."""
         try:
             self._line(START_TIMEOUT)
         except Lost as why:
             raise RuntimeError(f"the examinee does not start: {why}") from None
 
     def ask(self, request: Mapping[str, Any], timeout: float) -> dict[str, Any]:
-        """Return its reply; Lost if it ends, or takes longer than the timeout (s), and is then ended."""
+        """Send a request and return the reply; :class:`Lost` if it ends or exceeds the timeout (s)."""
         assert self._process.stdin
         try:
             self._process.stdin.write(json.dumps(request) + "\n")
@@ -65,12 +65,12 @@ class Examinee:
             raise Lost(f"its reply cannot be read: {line[:60]!r}") from None
 
     def end(self) -> None:
-        """End it, whatever it does; more than once does no harm."""
+        """Terminate the process; idempotent."""
         self._process.kill()
         self._process.wait()
 
     def close(self) -> None:
-        """End it and give everything back."""
+        """Terminate the process and release its resources."""
         self.end()
         for stream in (self._process.stdin, self._process.stdout, self._complaints):
             with suppress(BrokenPipeError):  # what it never read
@@ -106,12 +106,12 @@ class Examinee:
 
 
 def command(directory: Path) -> list[str]:
-    """Return the command line of an examinee."""
+    """Command line of an examinee."""
     return [sys.executable, "-m", "thermal_robot.blind.examinee", str(directory.resolve())]
 
 
 def environment() -> dict[str, str]:
-    """Return an examinee's environment: enough to find the program and its libraries, on one core."""
+    """Environment variables of an examinee: program, libraries, one core."""
     root = Path(__file__).resolve().parents[2]
     # a checkout is found by PYTHONPATH; an installed package must not be, since it would stand before Python's own
     own = [] if root.name in ("site-packages", "dist-packages") else [str(root)]
@@ -123,7 +123,7 @@ def environment() -> dict[str, str]:
 def examine(
     requests: Mapping[str, Mapping[str, Any]], directory: Path, *, workers: int, timeout: float
 ) -> Generator[tuple[str, dict[str, Any]], None, None]:
-    """Have requests, by name of the case, answered by several examinees at once, each within the timeout, s.
+    """Answer requests, by name of the case, with several examinees in parallel, each within the timeout, s.
 
     Yields name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving
     the loop early ends all of them.

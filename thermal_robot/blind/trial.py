@@ -1,4 +1,4 @@
-"""A trial: campaigns are made, their answers sealed, the campaigns diagnosed, the seal opened, all of it joined."""
+"""Run of a trial: generate campaigns, seal the answers, diagnose, open the seal, join."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ KEY_BYTES = 32
 
 
 def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
-    """Write answers under a stream cipher, and return their commitment: SHA-256 of key and text, in hexadecimal.
+    """Encrypt answers with a stream cipher, and return their commitment: SHA-256 of key and text, in hexadecimal.
 
     The text, :func:`canonical` JSON, is added to a keystream that SHAKE-256 draws from the 32 random bytes of the key.
     The key stays in the memory of the process that made the answers: without it the file tells only its length. A key
@@ -46,7 +46,7 @@ def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
 
 
 def open_seal(path: Path, key: bytes, commitment: str) -> dict[str, Any]:
-    """Read the answers that :func:`seal` wrote, with the same key and the commitment that it returned.
+    """Decrypt the answers of :func:`seal` and verify the commitment.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def open_seal(path: Path, key: bytes, commitment: str) -> dict[str, Any]:
 
 
 def canonical(value: Any) -> bytes:
-    """Write plain values as the one JSON text that stands for them: sorted keys, no spaces, ASCII, no NaN."""
+    """Canonical JSON of plain values: sorted keys, no spaces, ASCII, no NaN."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode("ascii")
 
 
 def _cipher(text: bytes, key: bytes) -> bytes:
-    """Encipher, or decipher: adding the same stream twice gives the text back."""
+    """Stream cipher; applied twice it gives the text back."""
     stream = hashlib.shake_256(key).digest(len(text))
     both = int.from_bytes(text, "big") ^ int.from_bytes(stream, "big")
     return both.to_bytes(len(text), "big")
@@ -99,7 +99,7 @@ def run_trial(
     sealed: Callable[[str], None] = lambda _: None,
     timeout: float = 600.0,
 ) -> list[Plain]:
-    """Run a trial, or go on with one that was stopped.
+    """Run a trial, or resume one.
 
     Campaigns are made in processes that are started anew, so a script must call this under
     ``if __name__ == "__main__"``. A trial that is taken up again makes them all once more, which gives the same files,
@@ -163,7 +163,7 @@ def run_trial(
 
 
 def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, Any] | None) -> Plain:
-    """Join what was asked, what is true and what was said to a record."""
+    """Record of a case, its truth and its reply."""
     asked: Plain = {"id": case.id, "kind": case.kind}
     if isinstance(case, Case):
         asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
@@ -192,7 +192,7 @@ def _request(case: Case | RealCase, folder: Path) -> Plain:
 
 
 def _identity(cases: Sequence[Case | RealCase]) -> Plain:
-    """Return what tells this trial from another one: of what is drawn it says nothing."""
+    """Identity of this trial, which reveals nothing that is drawn."""
     from thermal_robot import __version__
 
     if len({case.id for case in cases}) < len(cases) or not cases:
@@ -210,7 +210,7 @@ def _identity(cases: Sequence[Case | RealCase]) -> Plain:
 
 
 def _take(folder: Path, identity: Plain) -> None:
-    """Take possession of a directory that is empty or holds this very trial."""
+    """Claim a directory that is empty or holds this trial."""
     file = folder / PLAN
     if file.is_file():
         try:
@@ -238,7 +238,7 @@ def _make_all(
     workers: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[dict[str, Plain], dict[str, str]]:
-    """Make all campaigns; return their answers, and a digest of the files of each."""
+    """Generate all campaigns; return their answers, and a digest of each one's files."""
     answers, made = {}, {}
     pool = ProcessPoolExecutor(min(workers, len(cases)), get_context("spawn"), _quiet)
     try:
@@ -252,7 +252,7 @@ def _make_all(
 
 
 def _quiet() -> None:
-    """Leave Ctrl-C to the parent, and the other cores to the other makers."""
+    """Ignore Ctrl-C in a worker, and use one core."""
     from threadpoolctl import threadpool_limits
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -279,7 +279,7 @@ def _make_one(case: Case | RealCase, folder: Path, make: Make | None) -> tuple[P
 
 
 def _read_replies(path: Path, made: Mapping[str, str]) -> dict[str, Plain]:
-    """Read the replies that there are, and keep those to the campaigns as they are now.
+    """Read the replies that belong to the present campaigns.
 
     Where a file was made on another machine, a campaign may differ in its last digits from what was diagnosed.
     """

@@ -1,4 +1,4 @@
-"""The only room that knows files, units and tables."""
+"""Campaigns: measurement files, units and tables, read and validated here only."""
 
 from thermal_robot.campaign.campaign import Campaign, describe
 from thermal_robot.campaign.read import campaign_from_table, read_campaign, read_samples

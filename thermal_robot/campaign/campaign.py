@@ -1,4 +1,4 @@
-"""A campaign: what was commanded, what was measured, and the conditions, in SI units and without gaps."""
+"""A campaign: commands, measurements and conditions, in SI units and without gaps."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_al
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
+from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
 
@@ -36,7 +37,7 @@ TextArray: TypeAlias = NDArray[np.str_]
 
 
 def _instance(kind: Any, expected: str) -> Kind:
-    """Take an object of a type."""
+    """Require an object of a type."""
 
     def take(value: Any, path: str) -> Any:
         if not isinstance(value, kind):
@@ -47,7 +48,7 @@ def _instance(kind: Any, expected: str) -> Kind:
 
 
 def _sigma(value: Any, path: str) -> float | None:
-    """Take a standard deviation; 0 says the same as ``None``, that none is given."""
+    """Return the standard deviation as given; 0 counts as ``None``, not stated."""
     if value is None or (isinstance(value, (int, float, np.number)) and value == 0):
         return None
     return float(number(least=SMALLEST, expected="a number above 0, or None")(value, path))
@@ -71,6 +72,7 @@ _WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simu
 """Figures in a row of each (N, k) array; of the commands as many as the chain has joints."""
 _PER_SAMPLE = (*_WIDE, "noise_of_rows", "rows")
 _BY_NAME = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_, "travelled": np.float64}
+_BY_NAME |= {"readings": np.float64}
 """Arrays (N,) by name, and their types."""
 
 
@@ -137,6 +139,11 @@ class Campaign:
         The robot's reference as written in the campaign file.
     travelled
         Of rows taken from a larger campaign: what :attr:`since_turn` was there. Leave it out.
+    readings
+        (N,) per column of measurements of other kinds, where :attr:`kinds` are not position or pose alone, SI; 0 in
+        rows of another kind. Their labels stand in ``labels``, the kind of each row in ``labels["kind"]``.
+    facts
+        What is known of the things that such rows share, by kind, SI.
 
     Raises
     ------
@@ -149,6 +156,8 @@ class Campaign:
     >>> campaign = tr.demo_campaign()
     >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels, campaign.relative_noise
     (120, 'position', 'tool0', None, None)
+    >>> campaign.kinds, campaign.measured, campaign.numbered
+    (('position',), True, {})
     >>> campaign.clock.shape, campaign.since_turn["joint_2"].shape, campaign.reach > 1.0
     ((120,), (120,), True)
     """
@@ -183,6 +192,8 @@ class Campaign:
     urdf: str = ""
     travelled: Mapping[str, Array] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
+    readings: Mapping[str, Array] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         file = f"<{self.name}>"
@@ -215,7 +226,7 @@ class Campaign:
         self._set(key, checked_array(f"<{self.name}>", key, getattr(self, key), shape, kind))
 
     def _weigh_rows(self, file: str, samples: int) -> None:
-        """Take targets and the noise of each row; where none is given for all, it is their root mean square."""
+        """Set targets and the noise of each row; without one for all, that is their root mean square."""
         if self.targets is not None and len(self.targets.points) != samples:
             raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
         if self.noise_of_rows is None:
@@ -232,7 +243,7 @@ class Campaign:
 
     def __repr__(self) -> str:
         """One line; the arrays stay out of a notebook."""
-        what = "to predict" if self.position is None else f"of {self.measures}"
+        what = f"of {self.measures}" if self.measured else "to predict"
         return (
             f"<Campaign {self.name!r}: {self.samples} samples {what}, {self.robot.n} joints, "
             f"{len(self.covariates)} covariate{'' if len(self.covariates) == 1 else 's'}>"
@@ -242,7 +253,7 @@ class Campaign:
         return description.html(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
+        """Table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
 
         Returns
         -------
@@ -271,27 +282,50 @@ class Campaign:
 
     @property
     def measures(self) -> str:
-        """``"pose"`` where orientations were measured, otherwise ``"position"``."""
-        return "position" if self.orientation is None else "pose"
+        """What the rows say: one of :attr:`kinds`, ``"position"`` and ``"pose"`` among them, or ``"mixed"``."""
+        return self.kinds[0] if len(self.kinds) == 1 else "mixed"
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of measurement of the rows, sorted; see :mod:`thermal_robot.observables`."""
+        if "kind" in self.labels:
+            return tuple(np.unique(self.labels["kind"]).tolist())
+        return ("position",) if self.orientation is None else ("pose",)
+
+    @cached_property
+    def numbered(self) -> Mapping[str, tuple[tuple[str, ...], NDArray[np.int64]]]:
+        """Of each label of a kind of measurement its values, sorted, and (N,) the number of that of each row."""
+        found = {}
+        for name in (name for name in names.OF_KINDS if name in self.labels):
+            values, number = np.unique(self.labels[name], return_inverse=True)
+            found[name] = tuple(values.tolist()), number.ravel()
+        return found
 
     @property
+    def measured(self) -> bool:
+        """Whether anything was measured: rows to predict say nothing."""
+        return self.position is not None or "kind" in self.labels
+
+    @cached_property
     def reach(self) -> float:
-        """Diagonal of the volume that was measured, m."""
-        return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
+        """Diagonal of the volume that was measured, or through which the tool was led, m."""
+        led = self.position if self.position is not None else tool_poses(self.robot, self.q)[:, :3, 3]
+        return float(np.linalg.norm(np.ptp(led, axis=0)))
 
     @cached_property
     def relative_noise(self) -> Array | None:
         """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
-        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
+        turned = "pose" in self.kinds or "controller" in self.kinds
+        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, turned)
 
     @property
     def clock(self) -> Array | None:
-        """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
+        """Clock (N,): ``time`` in s, or ``order`` where there is no time; ``None`` without either."""
         return clock_of(self.covariates)
 
     @cached_property
     def pose_labels(self) -> TextArray | None:
-        """(N,) which commanded pose a row repeats, ``""`` where it has no label; ``None`` where no row is labelled.
+        """Label (N,) of the commanded pose that a row repeats, ``""`` without one; ``None`` where no row has one.
 
         Labels of poses count within their path: point 3 of one path is not that of another.
         """
@@ -303,7 +337,7 @@ class Campaign:
 
     @cached_property
     def since_turn(self) -> Mapping[str, Array]:
-        """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
+        """Signed distance (N,) from each joint's last turning point, rad or m; empty where rows have no order.
 
         It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
         :func:`~thermal_robot.campaign.turning.since_turns`.
@@ -314,14 +348,14 @@ class Campaign:
 
     @property
     def settings(self) -> Settings:
-        """What is not in the table; the chain's root and gravity as the robot has them."""
+        """Settings that are not in the table; root frame and gravity are the robot's."""
         own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
-        return Settings(**{**own, "gravity": as_vector(self.robot.gravity)})
+        return Settings(**{**own, "kind": "", "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
-        """Return the campaign of some of the rows, without validating again.
+        """Subset of the rows, without a new validation.
 
         Parameters
         ----------
@@ -355,7 +389,7 @@ class Campaign:
         return replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:
-        """Return the campaign as if the table had no such column (a covariate or a label).
+        """Copy without a covariate or label column.
 
         Raises
         ------
@@ -379,14 +413,14 @@ class Campaign:
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Freeze an array that nobody else holds, so that the constructor need not copy it."""
+    """Freeze an array, so that the constructor need not copy it."""
     if array.base is None:
         array.flags.writeable = False
     return array
 
 
 def table_columns(campaign: Campaign) -> dict[str, Array]:
-    """Return the numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
+    """Numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
     robot, units, several = campaign.robot, campaign.units, campaign.targets
     scales = [units.joint_scale(kind) for kind in robot.joint_types]
     columns: dict[str, Array] = dict(zip(robot.joint_names, (campaign.q / scales).T, strict=True))
@@ -401,6 +435,7 @@ def table_columns(campaign: Campaign) -> dict[str, Array]:
     ):
         if values is not None:
             columns |= dict(zip(group, values.T / scale, strict=True))
+    columns |= {name: v / names.reading_scale(name, units.length_scale) for name, v in campaign.readings.items()}
     if campaign.noise_of_rows is not None:
         columns[names.NOISE] = campaign.noise_of_rows / units.length_scale
     return columns | {name: v / covariate_scale(name, robot, units) for name, v in campaign.covariates.items()}
@@ -431,7 +466,7 @@ GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:
-    """Return a campaign that reads a quantity with the other sign.
+    """Copy of a campaign with the sign of one quantity reversed.
 
     Parameters
     ----------
@@ -460,14 +495,14 @@ def turned_round(campaign: Campaign, quantity: str) -> Campaign:
 
 
 def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campaign:
-    """Return a campaign of a robot that reads the same quantities with the other sign as another one does."""
+    """Copy of a campaign with the same sign reversals as another one."""
     for quantity in {*campaign.turned} ^ {*turned}:
         campaign = turned_round(campaign, quantity)
     return campaign if (campaign.robot.gravity == robot.gravity).all() else replace(campaign, robot=robot)
 
 
 def appended(campaigns: Sequence[Campaign]) -> Campaign:
-    """Return the rows of several campaigns of one robot as one campaign, with the declarations of the first.
+    """Concatenate campaigns of one robot, with the declarations of the first.
 
     Parameters
     ----------
@@ -511,7 +546,7 @@ def appended(campaigns: Sequence[Campaign]) -> Campaign:
             changes[key] = np.concatenate(values)
     if any(one.targets is not None for one in campaigns):
         raise CampaignError(first.name, "has several targets of each pose: rows of another file cannot be put to them")
-    for key in ("covariates", "labels", "since_turn"):
+    for key in ("covariates", "labels", "readings", "since_turn"):
         by_name = [getattr(one, key) for one in campaigns]
         common = [name for name in by_name[0] if all(name in other for other in by_name)]
         changes[key] = {name: np.concatenate([own[name] for own in by_name]) for name in common}

@@ -1,4 +1,4 @@
-"""Figures and arrays that can be computed with: finite, none too large or too small, of the shape that is needed."""
+"""Validation of numbers and arrays: finite, within range, of the required shape."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ Rows: TypeAlias = "NDArray[np.int64]"
 
 
 def first_true(refused: NDArray[np.bool_]) -> int | None:
-    """Return the index of the first true of (N,), or row of (N, k); ``None`` without one."""
+    """Index of the first true entry of (N,), or row of (N, k); ``None`` without one."""
     rows = refused if refused.ndim == 1 else refused.any(axis=1)
     return int(np.argmax(rows)) if rows.any() else None
 
 
 def first_beyond(values: Array, most: float = LARGEST) -> int | None:
-    """Return the row of the first figure that is not finite or too large, of (N,) or (N, k); ``None`` without one."""
+    """Row of the first number that is not finite or too large, of (N,) or (N, k); ``None`` without one."""
     return first_true(~(np.abs(values) <= most))
 
 
 def settled(values: Array) -> Array:
-    """Return the figures with those that are next to nothing as 0; the array itself where there are none."""
+    """Set negligibly small numbers to 0; the array itself where there are none."""
     vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
 
 
 def no_orientation(quaternions: Array) -> int | None:
-    """Return the row of the first quaternion, of (N, 4), whose length is not 1; ``None`` without one."""
+    """Row of the first of (N, 4) quaternions that is not normalised; ``None`` without one."""
     return first_true(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE)
 
 
 def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-    """Return a value as an array of a shape and type, read-only; a copy unless it was: the caller's stays writable.
+    """Read-only array of a required shape and type; a copy unless the input is read-only.
 
     Refused, by ``file`` and ``key``, are something else than numbers, another shape, and a figure that is not finite or
     larger than any. ``kind`` is ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
@@ -83,7 +83,7 @@ def _as_array(value: Any, kind: Any) -> NDArray[Any]:
 
 
 def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None = None) -> None:
-    """Refuse (N, 4) quaternions of which one is no orientation, naming its number of (N,) ``rows``, or its index."""
+    """Refuse (N, 4) quaternions that are not normalised, naming the first by its number of (N,) ``rows``, or index."""
     index = no_orientation(quaternions)
     if index is not None:
         four = ", ".join(f"{part:g}" for part in quaternions[index])
@@ -93,7 +93,7 @@ def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None
 
 
 def check_covariate(file: str, name: str, values: Array, rows: Rows | None = None) -> None:
-    """Refuse (N,) numbers that cannot be what their name says, naming the number of (N,) ``rows``, or the index."""
+    """Refuse (N,) values outside the physical range of a quantity, naming the first by its number, or index."""
     quantity, place = split_name(name)
     if quantity == "approach" and place:
         refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
@@ -110,14 +110,14 @@ def check_covariate(file: str, name: str, values: Array, rows: Rows | None = Non
 
 
 def _at(found: str, index: int, rows: Rows | None) -> dict[str, Any]:
-    """Return what was found, and in which row: by its number, where there are any."""
+    """Found value and its row number, for an error."""
     return {"found": f"{found} at index {index}"} if rows is None else {"found": found, "row": int(rows[index])}
 
 
 def check_joints(
     file: str, key: str, named: Iterable[str], joints: tuple[str, ...], lines: Mapping[str, int | None] | None = None
 ) -> None:
-    """Refuse what is stated of a joint that the chain does not have, with its line; name the nearest joint."""
+    """Refuse declarations about unknown joints, with the line and the nearest name."""
     for joint in named:
         if joint not in joints:
             problem = f"the chain has no such joint{did_you_mean(joint, joints)}"
@@ -126,7 +126,7 @@ def check_joints(
 
 
 def checked_mapping(file: str, key: str, given: Any) -> Mapping[str, Any]:
-    """Return what is given by names; refuse anything else than a mapping whose keys are text."""
+    """Require a mapping with text keys."""
     if isinstance(given, Mapping) and all(isinstance(name, str) for name in given):
         return given
     expected = "values by name, as a dict"

@@ -1,4 +1,4 @@
-"""A campaign in words: what `thermal-robot check` prints, and what a notebook shows."""
+"""Description of a campaign in words: what `thermal-robot check` and notebooks print."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_SESSIONS = 8  # Sessions named in one line; more would not fit beside each
 
 
 def text(campaign: Any) -> str:
-    """Return blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
+    """Blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
     blocks = [
         [f"Campaign {campaign.name}", *aligned(_facts(campaign))],
         ["Joints", *aligned(_joints(campaign))],
@@ -32,7 +32,7 @@ def text(campaign: Any) -> str:
 
 
 def html(campaign: Any) -> str:
-    """Return the same as tables of a notebook."""
+    """HTML tables of a notebook with the same content as :func:`text`."""
     head, *joints = _joints(campaign)
     warned = html_table([[warning] for warning in campaign.warnings], heading="Warnings")
     return (
@@ -48,8 +48,11 @@ def _facts(campaign: Any) -> Iterator[Sequence[str]]:
     yield "robot", f"{robot.name}, chain from {robot.root_frame} to {robot.tool_frame}, {robot.n} movable joints"
     yield "gravity", f"{_triple(robot.gravity)} m/s² in {robot.root_frame}"
     yield "lengths hold at", f"{campaign.reference_temperature:g} °C"
-    if campaign.position is None:
+    if not campaign.measured:
         yield "samples", f"{campaign.samples}, to be predicted"
+        return
+    if campaign.position is None:
+        yield from _of_kinds(campaign)
         return
     what = "position and orientation" if campaign.measures == "pose" else "position only"
     what = what if campaign.targets is None else f"{len(campaign.targets.numbers)} targets, which tell a pose"
@@ -72,6 +75,15 @@ def _facts(campaign: Any) -> Iterator[Sequence[str]]:
     for name, sizes in (("gear ratios", campaign.gears), ("expected sizes", campaign.priors)):
         if sizes:
             yield name, ", ".join(f"{of} {size:g}" for of, size in sizes.items())
+
+
+def _of_kinds(campaign: Any) -> Iterator[Sequence[str]]:
+    """Yield how many rows there are of each kind of measurement, and what they share."""
+    for kind in campaign.kinds:
+        here, labels = campaign.labels["kind"] == kind, names.KINDS[kind][1]
+        shared = (f"{len(np.unique(campaign.labels[label][here]))} of {label!r}" for label in labels)
+        yield f"rows of {kind}", ", ".join([str(int(here.sum())), *shared])
+    yield "noise of position", _noise_of_position(campaign)
 
 
 def _joints(campaign: Any) -> Iterator[Sequence[str]]:

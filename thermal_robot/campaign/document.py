@@ -1,4 +1,4 @@
-"""Documents: campaign.toml with its lines, each key of its kind, and what it declares; YAML of other programs."""
+"""Parsers of campaign.toml, with line numbers and a schema, and of other programs' YAML."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import SMALLEST
+from thermal_robot.campaign.names import KINDS as NAMED_KINDS
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
@@ -44,6 +45,17 @@ def _vector(value: Any, path: str) -> Any:
         raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
 
 
+def _pairs(value: Any, path: str) -> Any:
+    """Take pairs of sockets with their distance."""
+    expected = 'pairs of sockets with their distance, as [["0", "1", 50.0]]'
+    if not isinstance(value, list) or not all(isinstance(own, list) and len(own) == 3 for own in value):
+        raise MisfitError(path, value, expected)
+    for one, other, length in value:
+        if str(one) == str(other) or not isinstance(length, (int, float)) or not length > 0.0:
+            raise MisfitError(path, [one, other, length], expected)
+    return value
+
+
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "robot": {
         "urdf": _named("the path of the robot's URDF file"),
@@ -58,12 +70,15 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "file": _named("the path of the table"),
         "angle_unit": kinds.ANGLE_UNIT,
         "length_unit": kinds.LENGTH_UNIT,
+        "kind": word(tuple(NAMED_KINDS), kinds.WORD),
     },
     "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
     "noise": {"position": _sigma, "orientation": _sigma},
     "payload": {"com": _vector},
     "priors": kinds.PRIORS,
     "gears": kinds.GEARS,
+    "socket": {"distances": _pairs},
+    "camera": kinds.CAMERAS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
 Kinds: TypeAlias = Mapping[str, "Mapping[str, Kind] | Kind"]
@@ -107,7 +122,7 @@ class Document:
             raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
 
     def row(self, section: str, key: str = "") -> int | None:
-        """Return the line of a section or key, ``None`` where it is written in some unusual way."""
+        """Line number of a section or key, ``None`` where it cannot be located."""
         current = ""
         for number, line in enumerate(self.text.splitlines(), start=1):
             if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
@@ -123,7 +138,7 @@ class Document:
         return None
 
     def _error(self, problem: str, section: str, key: str = "", column: str = "", **told: str) -> CampaignError:
-        """Return an error of a section or of its key, with the line."""
+        """Error at a section or its key, with the line."""
         column = column or (f"{section}.{key}" if key else section)
         return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
 
@@ -142,7 +157,7 @@ class Document:
                 raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
-        """Return the values of a section; what is not of its kind is told with its line."""
+        """Return the validated values of a section; errors name the line."""
         known = self.kinds[section]
         kind = record(known, may_lack=known) if isinstance(known, Mapping) else known
         try:
@@ -155,7 +170,7 @@ class Document:
         return values
 
     def required(self, section: str, key: str) -> Any:
-        """Return a value that must be stated."""
+        """Value of a required key."""
         if key in self.sections.get(section, {}):
             return self.sections[section][key]
         known = self.kinds[section]
@@ -177,7 +192,7 @@ _MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 @dataclass(frozen=True)
 class Declaration:
-    """What campaign.toml says."""
+    """Content of campaign.toml."""
 
     file: Path  # path of the file as the user gave it
     table: Path  # path of the table
@@ -188,7 +203,7 @@ class Declaration:
 
 
 def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
-    """Read campaign.toml, or that of a directory; its paths are resolved against ``folder``, by default its own.
+    """Read campaign.toml, or that of a directory; its paths are relative to ``folder``, by default its own.
 
     Raises
     ------
@@ -250,12 +265,12 @@ WITH_YAML = 'pip install "thermal-robot[yaml]"'
 
 
 def is_yaml(file: Path) -> bool:
-    """Return whether a file is YAML by its name."""
+    """Whether a file is YAML by its name."""
     return file.suffix.lower() in (".yaml", ".yml")
 
 
 def read_yaml(file: Path) -> list[Any]:
-    """Return the documents of a YAML file, of plain values alone; the empty ones are left out."""
+    """Non-empty documents of a YAML file, of plain values only."""
     try:
         import yaml
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""New rows of a campaign: a table is read as the campaign was, and rows of another robot or kind are refused."""
+"""Further rows of a campaign: read as the campaign was; rows of another robot or kind are refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME_PLACE = 1e-9  # m: by which the tool frame differs between readings of one 
 
 
 def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ...]) -> Campaign:
-    """Return new rows, a campaign or a table of the old one's columns and units, as a campaign to be appended to it.
+    """Further rows, a campaign or a table of the old one's columns and units, as a campaign to append.
 
     Raises :class:`CampaignError` if they are of another robot or kind, or lack a column that is needed.
     """
@@ -45,7 +45,7 @@ def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ..
 
 
 def _stated(campaign: Campaign) -> dict[str, object]:
-    """Return what must be the same of old and new rows, by its name."""
+    """Return the declarations that old and new rows must share, by name."""
     own = campaign.simulated_position is not None
     return {
         "kind of measurement": campaign.measures,
@@ -60,7 +60,7 @@ def _stated(campaign: Campaign) -> dict[str, object]:
 
 
 def _require_same_robot(old: Campaign, rows: Campaign) -> None:
-    """Refuse rows of another chain: other joints, or the same joints put the tool frame elsewhere."""
+    """Refuse rows of another chain: other joints, or another forward kinematics."""
     mine, theirs = old.robot, rows.robot
     if theirs is mine:
         return

@@ -1,4 +1,4 @@
-"""The table's column names: which the format defines, what a typing error was probably meant to be."""
+"""Column names of the format, and suggestions for typing errors."""
 
 from __future__ import annotations
 
@@ -10,6 +10,24 @@ ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose", "path")
+KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "position": (POSITION, ()),
+    "pose": ((*POSITION, *ORIENTATION), ()),
+    "socket": ((), ("stand", "socket")),
+    "plane": ((), ("plane",)),
+    "distance": (("distance",), ("anchor",)),
+    "pixel": (("u", "v"), ("camera",)),
+    "controller": ((*POSITION, *ORIENTATION), ()),
+}
+"""Columns of each kind of measurement: its figures and its labels."""
+KIND = "kind"  # Column that says which kind each row is
+OPTIONAL = {
+    "plane": ("height",),
+    "pixel": ("board.x", "board.y", "board.z"),
+}
+"""Figures that rows of a kind may have, 0 where they have none."""
+OF_KINDS = tuple(dict.fromkeys(label for _, labels in KINDS.values() for label in labels))
+PIXELS = ("u", "v")
 NOISE = "noise"  # Column of the instrument's one sigma of each row
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
@@ -29,7 +47,7 @@ decides only what a message proposes, never what is accepted, so it lies below t
 
 
 def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float = _LIKE) -> list[str]:
-    """Return the candidates most like ``name``, best first; upper and lower case count as equal."""
+    """Known names most similar to ``name``, best first, case-insensitive."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
         by_lower.setdefault(candidate.lower(), candidate)
@@ -38,20 +56,20 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float 
 
 
 def did_you_mean(name: str, candidates: Iterable[str], cutoff: float = _LIKE) -> str:
-    """Return ``"; did you mean 'elbow_joint'?"``, or nothing when no candidate is like ``name``."""
+    """Suggestion ``"; did you mean 'elbow_joint'?"``, or empty without a similar name."""
     close = nearest(name, candidates, count=1, cutoff=cutoff)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def listed(names: Iterable[str], limit: int = 12) -> str:
-    """Return names in quotes, separated by commas, cut off after ``limit``."""
+    """Names in quotes, separated by commas, cut off after ``limit``."""
     quoted = [repr(name) for name in names]
     more = f" and {len(quoted) - limit} more" if len(quoted) > limit else ""
     return ", ".join(quoted[:limit]) + more
 
 
 def tilted(column: str) -> str | None:
-    """Return the link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
+    """Link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
     if column in TILT:
         return ""
     quantity, place = split_name(column)
@@ -60,7 +78,7 @@ def tilted(column: str) -> str | None:
 
 
 def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
-    """Return the columns of conditions that the format defines for a robot, in order: keys of a dict."""
+    """Condition columns of the format for a robot, in order, as keys of a dict."""
     joints, links = tuple(joints), tuple(links)
     per_joint = (f"{quantity}.{joint}" for quantity in PER_JOINT for joint in joints)
     per_link = (f"{quantity}.{link}" for quantity in PER_LINK for link in links)
@@ -68,18 +86,29 @@ def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
 
 
 def target_of(column: str) -> tuple[str, int] | None:
-    """Return axis and number of ``x.1``; ``None`` for other columns."""
+    """Axis and number of ``x.1``; ``None`` for other columns."""
     axis, number = split_name(column)
     plain = axis in POSITION and number.isascii() and number.isdigit() and not number.startswith("0")
     return (axis, int(number)) if plain else None
 
 
 def axes_of(target: int) -> tuple[str, str, str]:
-    """Return the columns of one of several targets."""
+    """Position columns of one of several targets."""
     return f"x.{target}", f"y.{target}", f"z.{target}"
 
 
+def of_kinds() -> set[str]:
+    """Return the columns of all kinds of measurement."""
+    optional = {column for columns in OPTIONAL.values() for column in columns}
+    return optional | {column for groups in KINDS.values() for group in groups for column in group}
+
+
+def reading_scale(column: str, length: float) -> float:
+    """Return the SI size of one unit of a measured figure, lengths in a unit of ``length`` m."""
+    return 1.0 if column in (*ORIENTATION, *PIXELS) else length
+
+
 def split_name(column: str) -> tuple[str, str]:
-    """Return quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
+    """Quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
     quantity, _, place = column.partition(".")
     return quantity, place

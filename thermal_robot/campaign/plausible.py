@@ -1,4 +1,4 @@
-"""Plausibility checks of a campaign: a plain sentence each, for the user to judge; marks and copied rows.
+"""Plausibility checks of a campaign, a sentence each; marks of missing values and copied rows.
 
 Marks of a lost beam, old readings and copies of other rows. Instruments write −9999, 999, 0 0 0 or their last reading
 where they see no target. Such a figure stands in several rows to the last digit, and it does not follow the robot:
@@ -36,7 +36,7 @@ RARE = 0.05  # expected number of repeats that agree by chance, above which equa
 
 
 def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
-    """Return the (N,) rows that hold a figure for a place that was not seen, and a sentence for each such figure."""
+    """Rows (N,) with a mark of a missing value instead of a measurement, and a sentence for each mark."""
     places = [] if campaign.position is None else [(XYZ, campaign.position)]
     if campaign.targets is not None:
         axes = map(axes_of, campaign.targets.numbers)
@@ -50,7 +50,7 @@ def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
 
 
 def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Iterator[tuple[Mask, str]]:
-    """Yield the rows of each mark and a sentence, of the places (N, 3) in some columns, m; NaN where none was seen."""
+    """Yield rows and a sentence for each mark among the positions (N, 3) of some columns, m; NaN where not seen."""
     q, scale = campaign.q, campaign.units.length_scale
     seen = np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
@@ -73,7 +73,7 @@ def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Ite
 
 
 def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
-    """Return the rows of each value that stands with several commands, the most frequent first."""
+    """Rows of each value that occurs at several commands, the most frequent first."""
     _, group, counts = np.unique(values[seen], axis=0, return_inverse=True, return_counts=True)
     groups = np.full(len(seen), -1)
     groups[seen] = group.reshape(-1)
@@ -82,12 +82,12 @@ def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
 
 
 def _moved(q: Array, rows: Mask) -> bool:
-    """Tell whether rows have different commands."""
+    """Whether rows have different commands."""
     return bool(rows.sum() > 1 and np.ptp(q[rows], axis=0).max() > SAME_COMMAND)
 
 
 def _astray(away: Array, rows: Mask, seen: Mask, times: float) -> bool:
-    """Tell whether rows are farther from the regression than the others, and a minority."""
+    """Whether rows are farther from the regression than the others, and a minority."""
     others = seen & ~rows
     return bool(rows.sum() < others.sum() and np.median(away[rows]) > times * np.median(away[others]))
 
@@ -114,7 +114,7 @@ def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
 
 
 def copies(campaign: Campaign) -> Mask:
-    """Duplicated rows, (N,): those that say what an earlier one says in every column, and are no repeats.
+    """Duplicated rows (N,): equal to an earlier one in every column, and not repeats.
 
     A repeat may well measure the same digits, but not at the same time. Where none is recorded, equal rows are repeats
     if the figures are so coarse that some would agree by chance.
@@ -123,7 +123,7 @@ def copies(campaign: Campaign) -> Mask:
 
 
 def doubled(campaign: Campaign) -> Iterator[str]:
-    """Yield a sentence that names the rows that are copies of another."""
+    """Yield a sentence that names duplicated rows."""
     if campaign.position is None:
         return
     original = _originals(campaign)
@@ -137,10 +137,11 @@ def doubled(campaign: Campaign) -> Iterator[str]:
 
 
 def _originals(campaign: Campaign) -> NDArray[np.int64]:
-    """(N,) the first row that says the same as each; the row itself where none does before."""
+    """First row (N,) equal to each; the row itself where none is earlier."""
     recorded = [values[:, None] for name, values in campaign.covariates.items() if name not in campaign.derived]
     labels = [np.unique(label, return_inverse=True)[1][:, None] for label in campaign.labels.values()]
     measured = [part for part in (campaign.position, campaign.orientation) if part is not None]
+    measured += [values[:, None] for values in campaign.readings.values()]
     table = np.hstack([campaign.q, *measured, *recorded, *labels])
     _, first, same = np.unique(table, axis=0, return_index=True, return_inverse=True)
     timed = any(name in campaign.covariates for name in CLOCK)
@@ -150,7 +151,7 @@ def _originals(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def _by_chance(campaign: Campaign) -> float:
-    """Return how many pairs of repeats are expected to agree in all figures, which may be coarser than they scatter."""
+    """Return the expected number of pairs of repeats with equal values, which may be coarser than their scatter."""
     _, pose, counts = np.unique(campaign.q, axis=0, return_inverse=True, return_counts=True)
     position, pose = np.asarray(campaign.position), pose.reshape(-1)
     middle = np.array([np.bincount(pose, axis) for axis in position.T]).T / counts[:, None]
@@ -209,7 +210,7 @@ ANOTHER_ROBOT = 0.02  # reaches: a simulator of the same robot, however measured
 
 
 def doubts(campaign: Campaign) -> list[str]:
-    """Return the sentences of all plausibility checks, none for an ordinary campaign."""
+    """Sentences of all plausibility checks, none for an ordinary campaign."""
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
     checks = (_limits, _time, _speed, _pose_labels, _temperature, _payload, _noise, _slides)
@@ -227,7 +228,7 @@ def doubts(campaign: Campaign) -> list[str]:
 
 
 def _beside(campaign: Campaign) -> Iterator[str]:
-    """Say which joints of the chain are moved by one that is no part of it."""
+    """Note on joints of the chain that follow a joint outside it."""
     robot = campaign.robot
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
@@ -261,7 +262,7 @@ def _reach(campaign: Campaign) -> float:
 
 
 def another_unit(campaign: Campaign) -> float | None:
-    """Return by what the URDF's lengths have to be multiplied to be m; ``None`` where an arm may be so long.
+    """Factor that converts the URDF's lengths to m; ``None`` where an arm may be so long.
 
     Examples
     --------
@@ -283,7 +284,7 @@ def another_unit(campaign: Campaign) -> float | None:
 
 
 def in_another_unit(factor: float) -> str:
-    """Say in which unit a URDF stands whose lengths have to be multiplied by a factor to be m.
+    """Describe the unit of a URDF whose lengths times a factor are m.
 
     Examples
     --------
@@ -297,7 +298,7 @@ def in_another_unit(factor: float) -> str:
 
 
 def _length_unit(campaign: Campaign) -> Iterator[str]:
-    """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
+    """Compare lengths with the arm's reach, to detect a wrong unit."""
     robot, reach, factor = campaign.robot, _reach(campaign), another_unit(campaign)
     if factor is not None:
         yield f"{in_another_unit(factor)}, {reach:.3g} m together"
@@ -320,7 +321,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
 
 
 def _apart(campaign: Campaign) -> Iterator[str]:
-    """Compare distances of measured points with what commands and target allow: no rigid base changes them."""
+    """Compare distances between measured points with the commanded ones, which no base frame changes."""
     reach = _reach(campaign)
     simulated = campaign.simulated_position is not None
     if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):

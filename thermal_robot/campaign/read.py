@@ -1,4 +1,4 @@
-"""From files, or from a pandas data frame, to a campaign: every value checked, converted to SI, gaps filled."""
+"""Readers of campaigns, from files or a pandas data frame: validated, converted to SI, gaps filled."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ MINIMUM_POSES = 3  # Distinct configurations without which a rigid frame can tur
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
-    """Validate a table and return the campaign; what cannot be used is refused with row and column.
+    """Validate a table and build the campaign; errors name row and column.
 
     Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
     """
     units = settings.units
     table = named(table, robot, units)
-    columns = recognise(table, robot, measured=measured)
+    columns = recognise(table, robot, measured=measured, kind=settings.kind)
     told: Posed | None = None
     left_out: list[str] = []
     if columns.targets:
@@ -59,9 +59,12 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         settings = replace(settings, tool_known=False)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
     q = _commands(table, robot, units)
-    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if measured and not told else None}
-    for key, group in (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION)):
-        poses[key] = _quaternions(table, group) if group in columns.groups else None
+    settings, columns = framed(settings, columns)
+    plain = measured and not told and columns.kinds in ((), ("controller",))
+    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
+    poses["readings"], labels = readings(table, columns, settings)
+    turns = (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION))
+    poses |= {key: _quaternions(table, group) if group in columns.groups else None for key, group in turns}
     simulated = names.SIMULATED_POSITION in columns.groups
     poses["simulated_position"] = _vectors(table, names.SIMULATED_POSITION, units) if simulated else None
     poses |= {"position": told.position, "orientation": told.orientation} if told else {}
@@ -72,7 +75,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         **poses,
         covariates=covariates,
         extra=columns.extra,
-        labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
+        labels=labels,
         **settings.of_rows(),
         priors=settings.priors,
         urdf=settings.urdf,
@@ -86,7 +89,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
 
 
 def arrived(campaign: Campaign) -> Campaign:
-    """Return the campaign with the directions of approach, where nobody recorded any but the order tells them."""
+    """Campaign with directions of approach derived from the order of rows where none are recorded."""
     recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
     if recorded or campaign.moves != "direct":
         return campaign
@@ -95,8 +98,50 @@ def arrived(campaign: Campaign) -> Campaign:
     return replace(campaign, covariates={**campaign.covariates, **found}, derived=tuple(found))
 
 
+def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
+    """Return what is declared of the frames where it follows from what was measured, and the columns that are read."""
+    if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
+        groups = (*columns.groups, names.ORIENTATION)
+        return replace(settings, base_known=True, tool_known=True), replace(columns, groups=groups)
+    # nothing but an instrument says where the base stands: without one it stands where the URDF has it
+    alone = bool(columns.kinds) and not {"position", "pose"} & {*columns.kinds}
+    return replace(settings, base_known=settings.base_known or alone), columns
+
+
+def readings(
+    table: Table, columns: Columns, settings: Settings
+) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
+    """Return by column what rows of other kinds than position and pose read, and all labels, the kinds among them."""
+    labels = {label: np.array(table.text(label), dtype=np.str_) for label in columns.labels}
+    if not columns.kinds:
+        return {}, labels
+    if columns.kinds == ("controller",):
+        return {}, labels | {names.KIND: np.full(len(table.rows), "controller")}
+    stated = table.text(names.KIND) if names.KIND in table.columns else [columns.kinds[0]] * len(table.rows)
+    kind, figures = np.array(stated, dtype=np.str_), dict[str, Array]()
+    for own in columns.kinds:
+        numeric, texts = names.KINDS[own]
+        here = kind == own
+        for column in numeric:
+            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
+            row = first_true(np.asarray(here & np.isnan(values)))
+            if row is not None:
+                raise table.error("a value is missing", column, row, found="an empty cell", expected="a number")
+            figures[column] = np.where(here, values, figures.get(column, 0.0))
+        for column in (name for name in names.OPTIONAL.get(own, ()) if name in table.columns):
+            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
+            figures[column] = np.where(here & ~np.isnan(values), values, 0.0)
+        for column in texts:
+            cells = np.array(table.text(column), dtype=np.str_)
+            row = first_true(np.asarray(here & (cells == "")))
+            if row is not None:
+                raise table.error("a value is missing", column, row, found="an empty cell", expected="a label")
+            labels[column] = cells
+    return figures, labels | {names.KIND: kind}
+
+
 def _commands(table: Table, robot: Robot, units: Units) -> Array:
-    """(N, n) rad or m."""
+    """Joint positions (N, n), rad or m."""
     joints = zip(robot.joint_names, robot.joint_types, strict=True)
     commands = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
     index = first_beyond(commands, LARGEST_COMMAND)
@@ -110,7 +155,7 @@ def _commands(table: Table, robot: Robot, units: Units) -> Array:
 def _covariates(
     table: Table, columns: Columns, robot: Robot, units: Units
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_]], list[str]]:
-    """Return the covariates in SI without gaps, where they had gaps, and how those were filled, in words."""
+    """Covariates in SI with gaps imputed, masks of the gaps, and sentences on the imputation."""
     covariates: dict[str, Array] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
     warnings: list[str] = []
@@ -129,19 +174,19 @@ def _covariates(
 
 
 def _vectors(table: Table, group: Sequence[str], units: Units) -> Array:
-    """(N, 3) m."""
+    """Vectors (N, 3), m."""
     return np.column_stack([table.numbers(column) for column in group]) * units.length_scale
 
 
 def _quaternions(table: Table, group: Sequence[str]) -> Array:
-    """(N, 4) unit quaternions wxyz."""
+    """Return the unit quaternions (N, 4) wxyz."""
     quaternions = np.column_stack([table.numbers(column) for column in group])
     check_quaternions(table.file, group[0], quaternions, table.rows)
     return np.asarray(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
 
 
 def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:
-    """Return what a campaign says of its noise, and its targets: of several, their noise tells that of their pose."""
+    """Stated noise of a campaign and its targets; of several targets, propagated to their pose."""
     place, turn, targets = settings.noise_position, settings.noise_orientation, told.targets if told else None
     if targets is not None:
         place, turn = (None, None) if place is None else told_by(place, targets)
@@ -151,7 +196,7 @@ def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | Non
 
 
 def _noise_of_rows(table: Table, settings: Settings) -> Array:
-    """(N,) m: one sigma of each row; an empty cell is that of all rows, where it is stated."""
+    """Noise (N,) of each row, m; an empty cell takes that of all rows, where stated."""
     cells = table.numbers(names.NOISE, gaps=True)
     sigmas = cells * settings.units.length_scale
     if settings.noise_position is not None:
@@ -168,6 +213,8 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
     """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
+    if campaign.position is None:  # what rows of other kinds share is counted with them
+        return []
     equations = 6 if campaign.measures == "pose" else 3
     # of the tool: the target's orientation is fitted where it is measured
     unknowns = {"base": 0 if campaign.base_known else 6, "tool": 0 if campaign.tool_known else equations}
@@ -191,10 +238,10 @@ LOOSE = 2.0  # Times the stated noise from which on targets are said to move aga
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
-    """Return the rows that tell a pose, what they tell, and what is left out or doubtful, in sentences.
+    """Poses of the rows from several targets, with sentences on what is left out or doubtful.
 
-    Refused are targets beside a simulator's, a place of which one or two figures lack, targets on a line in all rows,
-    and one that is never seen beside the others.
+    Errors: a simulator's prediction, incomplete coordinates, collinear targets in all rows, a target never seen with
+    the others.
     """
     several = columns.targets
     if names.SIMULATED_POSITION in columns.groups:
@@ -223,7 +270,7 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
 
 
 def _points(table: Table, number: int) -> Array:
-    """(N, 3) of one target, in the file's unit; NaN where it was not seen."""
+    """Positions (N, 3) of one target, in the file's unit; NaN where it was not seen."""
     axes = names.axes_of(number)
     found = np.column_stack([table.numbers(column, gaps=True) for column in axes])
     gaps = np.isnan(found)
@@ -311,7 +358,7 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
     Returns
     -------
     Campaign
-        In SI units; what is doubtful but was accepted stands in its ``warnings``.
+        Campaign in SI units; doubtful but accepted data are in its ``warnings``.
 
     Raises
     ------
@@ -341,7 +388,7 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
 def read_samples(
     path: str | Path | pd.DataFrame | Table, settings: Settings | Campaign, robot: Robot | None = None
 ) -> Campaign:
-    """Read a table of commands and conditions to predict.
+    """Read a table of commands and conditions to be predicted.
 
     Parameters
     ----------
@@ -349,7 +396,7 @@ def read_samples(
         CSV or Parquet, or the table itself, already read or a data frame, with the columns and units of the campaign.
         Measured columns are ignored.
     settings
-        Of the campaign that the model was fitted to, or that campaign itself.
+        Settings of the model's campaign, or that campaign itself.
     robot
         The robot; may be left out when a campaign is given.
 
@@ -410,7 +457,7 @@ def campaign_from_table(
     name: str = "table",
     measured: bool = True,
 ) -> Campaign:
-    """Make a campaign from a pandas data frame, with the columns and the validation of a campaign's file.
+    """Build a campaign from a pandas data frame, with the columns and the validation of a file.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which column is what, given the robot: headers of other programs are translated, the ambiguous is refused.
+"""Recognition of columns: headers of other programs are translated, ambiguous ones refused.
 
 A name that the format defines counts first. Where it is not there, ``X [mm]``, ``X (mm)`` or ``x_mm`` is x,
 ``joint_1/position`` is joint_1 (what ros2_controllers and PlotJuggler write), and as many numbered columns as the chain
@@ -48,14 +48,14 @@ _STEMS = (*_COMMANDED, "q", "joint", "j", "a", "axis", "rax", "theta", *_REPORTE
 
 
 class Heading(NamedTuple):
-    """What a header says: the column as the file calls it, and the unit that it names, ``None`` for none."""
+    """Column name as the file has it, and the unit in it, ``None`` for none."""
 
     column: str
     unit: str | None
 
 
 def bare(column: str) -> Heading:
-    """Return a header without its unit, and that unit as this program spells it."""
+    """Header without its unit, and that unit as this program spells it."""
     for pattern in (_IN_BRACKETS, _BEHIND):
         if found := pattern.fullmatch(column.strip()):
             unit = _unit(found["square"] or found.groupdict().get("round") or "")
@@ -65,7 +65,7 @@ def bare(column: str) -> Heading:
 
 
 def _unit(word: str) -> str | None:
-    """Return a unit as this program spells it; ``None`` for a word that is none."""
+    """Return the unit as this program spells it; ``None`` for an unknown word."""
     word = word.strip().lower()
     end = next((end for end in _RATES if word.endswith(end)), "")
     word = word.removesuffix(end)
@@ -74,7 +74,7 @@ def _unit(word: str) -> str | None:
 
 
 def size(unit: str | None, other: str) -> float | None:
-    """Return how many of another unit one is, 1 where a header names none; ``None`` where they are of two kinds."""
+    """Conversion factor between units, 1 where a header names none; ``None`` for different quantities."""
     if unit is None or unit == other:
         return 1.0
     (one, rate), (base, other_rate) = unit.partition("/")[::2], other.partition("/")[::2]
@@ -83,12 +83,12 @@ def size(unit: str | None, other: str) -> float | None:
 
 
 def wanted(name: str, robot: Robot, units: Units = SI) -> str:
-    """Return the unit in which a campaign's column stands in a file, those of several targets as that of one."""
+    """Return the unit of a campaign's column in a file; columns of several targets count as one's."""
     return unit_of((names.target_of(name) or (name,))[0], robot, units)
 
 
 def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, str]:
-    """Return the column of each joint that is there by name: its own, ``<joint>/position``, ``…/<joint>/position``."""
+    """Column of each joint found by name: its own, ``<joint>/position``, ``…/<joint>/position``."""
     there = list(dict.fromkeys(columns))
     found = {}
     for joint in joints:
@@ -100,7 +100,7 @@ def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, st
 
 
 def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
-    """Return what is found in a table under another name or with a unit, by the campaign's names for a robot.
+    """Columns under another name or with a unit, by the campaign's names for a robot.
 
     Columns that have the campaign's own name are not in it; nor is what two columns could be, or whose unit is of
     another kind.
@@ -130,7 +130,7 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
 
 
 def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Heading]:
-    """Return the columns of joints that are known by their numbers, from 0 or from 1; nothing where none are."""
+    """Columns of joints named by their numbers, from 0 or from 1; empty where there are none."""
     stems: dict[str, dict[int, Heading]] = {}
     for column, (own, unit) in plain.items():
         if known := _NUMBERED.fullmatch(own):
@@ -151,7 +151,7 @@ def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Hea
 
 
 def named(table: Table, robot: Robot, units: Units) -> Table:
-    """Return a table in the campaign's names and in the declared units, with what was found out as warnings.
+    """Table with the campaign's column names and declared units; translations are among its warnings.
 
     Raises
     ------
@@ -192,7 +192,7 @@ _COVARIATE, _EXTRA, _IGNORED = "covariate", "extra", "ignored"
 
 @dataclass(frozen=True)
 class Columns:
-    """A table's columns by their part in the campaign."""
+    """Columns of a table by their role in the campaign."""
 
     covariates: tuple[str, ...]  # those that the format defines, except empty ones
     extra: tuple[str, ...]  # numeric columns that the format does not define
@@ -201,10 +201,13 @@ class Columns:
     has_noise: bool  # whether the noise of each row is there
     targets: tuple[int, ...]  # numbers of several targets of one pose, in their order; empty where there is one
     warnings: tuple[str, ...]  # columns left out, and names that look like typing errors
+    kinds: tuple[str, ...] = ()  # of measurement; none where all rows are positions, or poses
 
 
-def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
-    """Sort a table's columns for a robot; ``measured`` requires positions, without it measured columns are ignored.
+def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> Columns:
+    """Sort a table's columns for a robot; ``measured`` requires what each kind of measurement reads.
+
+    Rows are of the ``kind`` stated, unless a column says it. Without ``measured`` these columns are ignored.
 
     Raises
     ------
@@ -216,16 +219,23 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
     more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
     _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
-    targets, warnings = _targets(table, robot) if measured else ((), [])
-    if measured and not targets:
+    kinds = _kinds(table, kind) if measured else ()
+    plain = measured and not kinds
+    targets, warnings = _targets(table, robot) if plain else ((), [])
+    if plain and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
-    turned = [names.ORIENTATION] if measured and not targets else []
+    for own in kinds:
+        _require(table, [c for group in names.KINDS[own] for c in group], f"rows of the kind {own!r} need it")
+    turned = [names.ORIENTATION] if plain and not targets else []
     asked = (*turned, names.SIMULATED_POSITION, names.SIMULATED_ORIENTATION)
     groups = tuple(group for group in asked if _whole_group(table, group))
     if names.SIMULATED_ORIENTATION in groups and names.SIMULATED_POSITION not in groups:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
     has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
+    taken |= (
+        names.of_kinds() | {names.KIND} if kinds or kind or _by_columns(table) or names.KIND in table.columns else set()
+    )
     taken |= {names.NOISE} if has_noise or not measured else set()
     parts: dict[str, list[str]] = {_COVARIATE: [], _EXTRA: [], _IGNORED: []}
     for column in table.columns:
@@ -235,13 +245,36 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
             warnings += [doubt] if doubt else []
     labels = tuple(label for label in names.LABELS if label in table.columns)
     sorted_out = tuple(parts[_COVARIATE]), tuple(parts[_EXTRA])
-    return Columns(*sorted_out, labels, groups, has_noise, targets, tuple(warnings))
+    return Columns(*sorted_out, labels, groups, has_noise, targets, tuple(warnings), kinds)
+
+
+def _kinds(table: Table, stated: str) -> tuple[str, ...]:
+    """Return the kinds of measurement of the rows; none where all are positions or poses by the columns there."""
+    if not stated and names.KIND not in table.columns:
+        stated = _by_columns(table)
+    cells = table.text(names.KIND) if names.KIND in table.columns else [stated] * len(table.rows)
+    for row, cell in enumerate(cells):
+        if cell not in (*names.KINDS, ""):
+            expected = f"one of {', '.join(names.KINDS)}"
+            raise table.error("unknown kind of measurement", names.KIND, row, found=repr(cell), expected=expected)
+        if not cell and any(cells):
+            raise table.error("a value is missing", names.KIND, row, found="an empty cell", expected="a kind")
+    found = tuple(sorted({*cells} - {""}))
+    return () if set(found) <= {"position"} or set(found) == {"pose"} else found
+
+
+def _by_columns(table: Table) -> str:
+    """Return the one kind whose labels are there, in a table without measured positions; else none."""
+    if any(name in names.POSITION or names.target_of(name) for name in table.columns):
+        return ""
+    there = [k for k, (figures, labels) in names.KINDS.items() if labels and {*figures, *labels} <= {*table.columns}]
+    return there[0] if len(there) == 1 else ""
 
 
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
-    """Return the numbers of several targets, and what is left out for them; none where there is one.
+    """Numbers of several targets, with warnings on those left out; empty where there is one.
 
-    Refused are an axis that lacks, too few targets, and one without a number beside them.
+    Errors: a missing axis, too few targets, a target without a number among numbered ones.
     """
     named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
     numbers = sorted({target[1] for target in named if target})
@@ -267,7 +300,7 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
 
 
 def _judge(table: Table, column: str, robot: Robot) -> tuple[str, str]:
-    """Say which part a column has that is neither a joint nor a pose nor a label, and what is doubtful about it."""
+    """Role of a column that is neither a joint nor a pose nor a label, and a warning if it is doubtful."""
     quantity, place = split_name(column)
     if table.is_empty(column):
         return _IGNORED, f"column {column!r} is empty and counts as absent"
@@ -290,7 +323,7 @@ def _judge(table: Table, column: str, robot: Robot) -> tuple[str, str]:
 
 
 def _doubt_of_extra(column: str, robot: Robot) -> str:
-    """Say what is doubtful about a numeric column that the format does not define; empty where nothing is."""
+    """Warning on a numeric column outside the format; empty without one."""
     if column in robot.urdf_joints:
         follows = any(segment.name == column and segment.movable for segment in robot.segments)
         which = "that mimics another" if follows else "outside the chain"
@@ -314,7 +347,7 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
 
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:
-    """Refuse a table that lacks one of the columns, with the names that come nearest to it."""
+    """Refuse a table that lacks a column, with the most similar names."""
     spare = [column for column in table.columns if column not in wanted]
     for name in wanted:
         if name not in table.columns:
@@ -325,7 +358,7 @@ def _require(table: Table, wanted: Sequence[str], why: str) -> None:
 
 
 def _whole_group(table: Table, group: Sequence[str]) -> bool:
-    """Return whether all columns of a group are there; some of them only is an error."""
+    """Whether all columns of a group are there; an incomplete group is an error."""
     here = [name for name in group if name in table.columns]
     if here and len(here) < len(group):
         lacking = next(name for name in group if name not in table.columns)

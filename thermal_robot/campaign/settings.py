@@ -1,4 +1,4 @@
-"""What a campaign says once about all its rows: units, frames, noise, payload; no table."""
+"""Settings of a campaign for all its rows: units, frames, noise, payload."""
 
 from __future__ import annotations
 
@@ -49,11 +49,22 @@ SIGMA = number(
 _ABOVE = "a number above 0"
 PRIORS = mapping(number(above=0.0, expected=_ABOVE, problem="the expected size of an effect must be positive"))
 GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio must be positive"))
+_PIXELS = number(above=0.0, expected="a number of pixels above 0")
+CAMERAS = mapping(
+    record(
+        {
+            **dict.fromkeys(("fx", "fy", "cx", "cy"), _PIXELS),
+            "mount": word(("hand", "room"), WORD),
+            "refine": boolean,
+        },
+        may_lack=("refine",),
+    )
+)
 """What the values of a campaign may be, whoever states them: campaign.toml, a call, a model file."""
 
 
 def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> Any:
-    """Return an argument of a call as its kind wants it; refuse another by the argument's name.
+    """Argument of a call, validated against its schema; errors name the argument.
 
     Raises
     ------
@@ -70,7 +81,7 @@ def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> A
 
 @dataclass(frozen=True)
 class Settings:
-    """The part of a campaign that is not in the table, in SI units; a model file stores it as a plain dict.
+    """Settings of a campaign that are not in the table, SI; a model file stores them as a plain dict.
 
     Attributes
     ----------
@@ -81,8 +92,10 @@ class Settings:
         Ends of the chain; ``root_frame`` ``None`` for the URDF's root.
     gravity
         m/s², in the root frame; ``None`` for the robot's default.
-    moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned
+    moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned, facts
         As in a :class:`~thermal_robot.Campaign`.
+    kind
+        What all rows measure, where the table has no column ``kind``; empty for position or pose.
     units
         Units of the table's columns; everything else here is SI.
     noise_position, noise_orientation
@@ -105,21 +118,27 @@ class Settings:
     priors: Mapping[str, float] = field(default_factory=dict)
     gears: Mapping[str, float] = field(default_factory=dict)
     turned: tuple[str, ...] = ()
+    kind: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
-        own = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "turned" or self.turned}
+        spare = {"turned", "kind", "facts"}  # left out where nothing is said
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        own = {name: value for name, value in own.items() if value or name not in spare}
         own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
 
     def of_rows(self) -> dict[str, Any]:
-        """Return the fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
+        """Fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
         frames = ("base_known", "tool_known", "target", "payload_com")
-        return {key: getattr(self, key) for key in (*frames, "moves", "reference_temperature", "gears", "units")}
+        return {
+            key: getattr(self, key) for key in (*frames, "moves", "reference_temperature", "gears", "units", "facts")
+        }
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
-        """Return the settings of values by section and key, as campaign.toml has them, lengths in its unit.
+        """Return the settings by section and key as in campaign.toml, lengths in its unit.
 
         ``sections`` state both units at least; ``ends`` are the robot's reference, the ends of the chain and gravity.
         """
@@ -138,11 +157,13 @@ class Settings:
             payload_com=as_vector(scale * value for value in payload.get("com", zero)),
             priors=sections.get("priors", {}),
             gears=sections.get("gears", {}),
+            kind=sections["measurements"].get("kind", ""),
+            facts=facts_of(sections, scale),
         )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
-        """Build settings from what :meth:`to_dict` returned, possibly after a journey through JSON.
+        """Build settings from the output of :meth:`to_dict`, possibly after a round trip through JSON.
 
         Raises
         ------
@@ -170,18 +191,44 @@ _KEYS: dict[str, Kind] = {
     "priors": PRIORS,
     "gears": GEARS,
     "turned": listed(text("the name of a quantity")),
+    "kind": text(empty=True),
+    "facts": lambda value, path: dict(value),
 }
 
 
 def settings_kind(value: Any, path: str) -> Settings:
-    """Kind of the settings in a file (:mod:`thermal_robot.schema`)."""
+    """Validate the settings in a file (:mod:`thermal_robot.schema`)."""
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
-    values = record(_KEYS)({"moves": "unknown", "turned": (), **value} if isinstance(value, Mapping) else value, path)
+    values = record(_KEYS)(
+        {"moves": "unknown", "turned": (), "kind": "", "facts": {}, **value} if isinstance(value, Mapping) else value,
+        path,
+    )
     sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
     return Settings(**{**values, **sigmas, "units": Units(**values["units"])})
 
 
+def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[str, Any]:
+    """Return what the tables of kinds of measurement state, lengths in m."""
+    found: dict[str, Any] = {}
+    if socket := sections.get("socket"):
+        pairs = ((str(one), str(other), length * scale) for one, other, length in socket.get("distances", ()))
+        found["socket"] = {"distances": tuple(pairs)}
+    if camera := sections.get("camera"):
+        found["camera"] = {name: dict(own) for name, own in camera.items()}
+    return found
+
+
+def facts_in(facts: Mapping[str, Any], scale: float) -> dict[str, Any]:
+    """Return the tables of campaign.toml that state facts, lengths in a unit of ``scale`` m."""
+    found: dict[str, Any] = {}
+    if socket := facts.get("socket"):
+        found["socket"] = {"distances": [[one, other, length / scale] for one, other, length in socket["distances"]]}
+    if camera := facts.get("camera"):
+        found["camera"] = {name: dict(own) for name, own in camera.items()}
+    return found
+
+
 def as_vector(values: Any) -> Vector:
-    """Return three floats; ``ValueError`` for any other number of them."""
+    """Three floats; ``ValueError`` for any other number of them."""
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -1,4 +1,4 @@
-"""A table as text or numbers, with its row numbers; and how CSV, Parquet, spreadsheets and data frames become one.
+"""Tables of text or numbers with row numbers, from CSV, Parquet, spreadsheets and data frames.
 
 It knows nothing of robots or of what columns mean.
 """
@@ -34,7 +34,7 @@ _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
 
 
 def without_names(header: Iterable[str], file: str) -> str:
-    """Say that a header holds numbers alone, so that it was a row of the table; empty where it does not."""
+    """Warning if a header holds numbers alone and hence is a row; else empty."""
     try:
         figures = [float(name.replace(",", ".").replace("−", "-")) for name in header]
     except ValueError:
@@ -46,7 +46,7 @@ def without_names(header: Iterable[str], file: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of equal length with the row number of each entry."""
+    """Columns of equal length with row numbers."""
 
     file: str  # name of the file as the user gave it, for messages
     columns: Mapping[str, Cells]  # cells by name, names stripped of blanks
@@ -57,7 +57,7 @@ class Table:
 
     @property
     def headless(self) -> str:
-        """What :func:`without_names` says of its header."""
+        """Warning of :func:`without_names` on its header."""
         return "" if self.header is None else without_names(self.columns, self.file)
 
     @property
@@ -66,16 +66,16 @@ class Table:
         return self.header is None and all(name == str(k) for k, name in enumerate(self.columns, start=1))
 
     def error(self, problem: str, column: str, index: int | None = None, **told: str) -> CampaignError:
-        """Return an error of a column: in the row of an index from 0, else in the header."""
+        """Error at a column, in the row of an index from 0, else in the header."""
         row = self.header if index is None else int(self.rows[index])
         return CampaignError(self.file, problem, row=row, column=column, **told)
 
     def told(self, chosen: NDArray[np.bool_]) -> str:
-        """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
+        """Count chosen rows (N,) and list a few of their numbers: ``3 rows (4, 7, 9)``."""
         return told_rows(self.rows[chosen])
 
     def numbers(self, column: str, *, gaps: bool = False) -> Array:
-        """Return a column as (N,) numbers in the file's unit; ``gaps`` accepts empty cells, as NaN.
+        """Column as (N,) numbers in the file's unit; with ``gaps`` empty cells are NaN.
 
         Raises
         ------
@@ -102,14 +102,14 @@ class Table:
         raise self.error(empty if np.isnan(value) else finite, column, wrong, found=found, expected="a number")
 
     def text(self, column: str) -> list[str]:
-        """Return a column as N strings; numbers as short as they can be, empty cells as ``""``."""
+        """Column as N strings; numbers in shortest form, empty cells as ``""``."""
         cells = self.columns[column]
         if isinstance(cells, np.ndarray):
             return ["" if np.isnan(value) else f"{value:.15g}" for value in cells]
         return ["" if cell.lower() in _EMPTY else cell for cell in cells]
 
     def take(self, kept: NDArray[np.bool_]) -> Table:
-        """Return the table of some of the rows, of (N,) booleans; they keep their numbers."""
+        """Subset of the rows, of (N,) booleans, with their numbers."""
         index = np.flatnonzero(kept)
         columns: dict[str, Cells] = {
             name: cells[index] if isinstance(cells, np.ndarray) else [cells[int(i)] for i in index]
@@ -118,7 +118,7 @@ class Table:
         return replace(self, columns=columns, rows=self.rows[index])
 
     def frame(self, *, numbers: bool = False) -> pd.DataFrame:
-        """Return the table as a data frame: cells as they stand, or ``numbers`` where a column has nothing else.
+        """Return the data frame of the cells, with ``numbers`` where a column has nothing else.
 
         Decimal commas become numbers in any case.
         """
@@ -129,11 +129,11 @@ class Table:
         return pd.DataFrame({**self.columns, **plain})
 
     def first_text(self, column: str) -> int | None:
-        """Return the index of the first cell that is not a number, ``None`` for a numeric column."""
+        """Index of the first cell that is not a number, ``None`` for a numeric column."""
         return _first_text(self._values(column))
 
     def is_empty(self, column: str) -> bool:
-        """Return whether no cell of the column holds anything."""
+        """Whether all cells of the column are empty."""
         cells = self.columns[column]
         if isinstance(cells, np.ndarray):
             return bool(np.isnan(cells).all())
@@ -169,7 +169,7 @@ def _number(cell: str, comma: bool) -> float | None:
 
 
 def told_rows(numbers: NDArray[np.int64]) -> str:
-    """Say how many rows, and a few of them by number: ``3 rows (4, 7, 9)``."""
+    """Count rows and list a few of their numbers: ``3 rows (4, 7, 9)``."""
     more = "" if len(numbers) <= _FEW else " …"
     return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
 
@@ -192,7 +192,7 @@ SPACE = " "  # A separator of which any number is one, as of blanks and tabs in 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out that other programs wrote."""
+    """Layout of a foreign text file: separators, header and comments."""
 
     # one character, :data:`SPACE`, or empty: the first line that holds anything tells, and blanks separate where it has
     # no other separator and the next line falls into as many parts
@@ -247,7 +247,7 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
 
 
 def _encoding(path: Path) -> str:
-    """Return how a text may be encoded by its first bytes; refuse what is no text by them."""
+    """Detect the encoding of a text by its first bytes; binary data are refused."""
     with path.open("rb") as stream:
         head = stream.read(4)
     if head == b"PK\x03\x04":
@@ -267,7 +267,7 @@ def _read_text(path: Path, layout: Layout, encoding: str) -> Table:
 
 
 def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = True) -> Table:
-    """Return the table that lines of fields make."""
+    """Table of lines of fields."""
     header, cells, numbers = _records(file, lines, named)
     if len(numbers) < 2:
         raise CampaignError(file, "has a header but no rows", expected=_ONE_ROW)
@@ -281,7 +281,7 @@ def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = Tru
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
-    """Return a pandas data frame as a table; refuse one without rows, or with a column twice.
+    """Table of a pandas data frame; one without rows, or with a duplicate column, is refused.
 
     Rows are numbered from ``first_row``; without it they are known by an integer index of the frame, so that
     ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
@@ -306,7 +306,7 @@ def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: i
 
 
 def _as_text(cell: object) -> str:
-    """Return any value as one line of text; what cannot say itself by its type."""
+    """Value as one line of text, or its type where that fails."""
     try:
         return str(cell).strip()
     except Exception:  # a cell may hold anybody's object, and Python writes no whole number of 5000 digits
@@ -336,7 +336,7 @@ def _read_parquet(path: Path) -> Table:
 
 
 def _read_workbook(path: Path, layout: Layout) -> Table:
-    """Return the first sheet of a workbook; its rows are counted as the spreadsheet does."""
+    """First sheet of a workbook, with the spreadsheet's row numbers."""
     import pandas as pd
 
     file = str(path)
@@ -360,7 +360,7 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
-    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``.
+    """Yield lines; skipped ones are blank, so that each keeps its number; runs of blanks shrink if ``even``.
 
     Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
     """
@@ -383,7 +383,7 @@ def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[st
 
 
 def _separator(lines: Iterator[str]) -> str:
-    """Return the separator of the header, the first line that holds anything: blanks where no other is in it."""
+    """Detect the separator in the header: white space where no other is in it."""
     held = (line for line in lines if line.strip())
     header, line = next(held, ""), next(held, "")
     parts = header.split()
@@ -393,7 +393,7 @@ def _separator(lines: Iterator[str]) -> str:
 
 
 def _records(file: str, lines: Iterable[list[str]], named: bool) -> tuple[list[str], list[list[str]], list[int]]:
-    """Return the header, the cells by column, and the numbers of the lines where header and rows start.
+    """Header, cells by column, and the line numbers of header and rows.
 
     Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
     """

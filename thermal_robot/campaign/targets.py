@@ -47,7 +47,7 @@ class Targets:
     sigma: float  # one sigma per axis by which the targets move against each other, m: the median over the rows
 
     def take(self, rows: NDArray[np.int64] | Mask) -> Targets:
-        """Return those of some rows; places and what is typical stay."""
+        """Subset of the rows; positions and typical noise stay."""
         return Targets(self.numbers, self.points[rows], self.places, self.spread[rows], self.typical, self.sigma)
 
 
@@ -63,7 +63,7 @@ class Posed:
 
 
 def telling(points: Array) -> Mask:
-    """(N,) the rows in which three or more of the targets (N, K, 3) are seen that do not lie on a line."""
+    """Mask (N,) of rows with three or more of the targets (N, K, 3) that are not collinear."""
     return _wide(points, _seen(points))
 
 
@@ -104,7 +104,7 @@ def _seen(points: Array) -> Mask:
 
 
 def _wide(points: Array, seen: Mask) -> Mask:
-    """(N,) whether what is seen of (N, K, 3) points is three or more of them, and wider than a line."""
+    """Mask (N,) of rows in which the seen ones of (N, K, 3) points are three or more, and wider than a line."""
     points, count = np.where(seen[:, :, None], points, 0.0), seen.sum(axis=1)
     middle = points.sum(axis=1) / np.maximum(count, 1)[:, None]
     extent = np.linalg.svd(np.where(seen[:, :, None], points - middle[:, None], 0.0), compute_uv=False)
@@ -147,7 +147,7 @@ def _spread(places: Array, seen: Mask) -> Array:
 
 
 def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
-    """Root mean square standard deviation of positions, m, and where several targets tell it of turns, rad.
+    """Root mean square standard deviation of positions, m, and with several targets of rotations, rad.
 
     ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
@@ -156,12 +156,12 @@ def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float |
 
 
 def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
-    """Return one sigma of positions, m, and where several targets tell it of turns, rad, from that of a point."""
+    """Propagate the standard deviation of a point to positions, m, and with several targets to rotations, rad."""
     return (sigma, None) if targets is None else (sigma * float(targets.typical[0]), sigma * float(targets.typical[1]))
 
 
 def of_a_point(sigma: float, targets: Targets | None) -> float:
-    """Return one sigma of a point, m, from that of positions."""
+    """Return the standard deviation of a point, m, from that of positions."""
     return sigma if targets is None else sigma / float(targets.typical[0])
 
 

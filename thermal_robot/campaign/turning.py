@@ -18,7 +18,7 @@ same for every campaign, so that a law that was found in one can be told in anot
 
 
 def moves(q: Array) -> NDArray[np.bool_]:
-    """Tell which joints move, (n,) of positions (N, n) in rad or m; one answer of one joint's (N,).
+    """Mask (n,) of the joints that move, of positions (N, n) in rad or m; one boolean for one joint's (N,).
 
     One that stays within :data:`~thermal_robot.campaign.settings.STILL` is held, whatever its encoder reads.
 
@@ -58,7 +58,7 @@ def since_turns(
 def arrivals(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Directions of approach, (N,) by ``approach.<joint>``, as the order of rows tells them.
+    """Directions of approach, (N,) by ``approach.<joint>``, from the order of rows.
 
     +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
     keeps the side that it had. 0 at the first row of a session, where nothing is known. It holds for a robot that goes
@@ -72,14 +72,14 @@ def arrivals(
 
 
 def clock_of(covariates: Mapping[str, Array]) -> Array | None:
-    """Return the (N,) column that tells when each row was measured; ``None`` where there is none."""
+    """Clock column (N,) by which rows are ordered; ``None`` without one."""
     return next((covariates[name] for name in CLOCK if name in covariates), None)
 
 
 def _runs(
     covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int
 ) -> Iterator[NDArray[np.int64]]:
-    """Yield the rows of each uninterrupted run in their order; none where nothing tells the order."""
+    """Yield the rows of each uninterrupted run in order; none where the order is unknown."""
     clock = clock_of(covariates)
     if clock is None or not samples or not np.ptp(clock) > 0.0:
         return
@@ -89,7 +89,7 @@ def _runs(
 
 
 def strained(joint: str, slip: float) -> str:
-    """Return the name of the strain of a joint's element that slips after so many rad or m."""
+    """Name of the strain of a stop operator of a joint that slips after a distance, rad or m."""
     return f"{joint}, slips at {slip:.6g}"
 
 
@@ -103,7 +103,7 @@ def _strains(path: Array) -> Array:
 
 
 def _since_turn(path: Array) -> Array:
-    """(N,) signed distance of one joint from its last turn, which passes positions (N,) in this order."""
+    """Signed distance (N,) of one joint from its last reversal, from positions (N,) in order."""
     moved = np.diff(path)
     if not len(moved):
         return np.zeros(len(path))

@@ -1,4 +1,4 @@
-"""The units of a file, what they are in SI, and the unit in which every recorded quantity is kept."""
+"""Units of a file, their SI factors, and the SI unit of every recorded quantity."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OF_A_JOINT = {"velocity": "{}/s", "acceleration": "{}/s²", "encoder": "{}"}
 
 @dataclass(frozen=True)
 class Units:
-    """The units of a file. SI value = value in the file × scale.
+    """Units of a file: SI value = value in the file × scale.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Units:
         return self.length_scale if joint_type == "prismatic" else self.angle_scale
 
     def joint_unit(self, joint_type: str) -> str:
-        """Word for the unit of a joint's column."""
+        """Name of the unit of a joint's column."""
         return self.length if joint_type == "prismatic" else self.angle
 
 
@@ -68,7 +68,7 @@ SI = Units()  # What everything is in once it has been read
 
 
 def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
-    """Say in which unit a column of a robot's table is: in those of the file, else in SI, as a campaign's values are.
+    """Return the unit of a column of a robot's table: in those of a file, else SI.
 
     It is empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
     quaternion) and for a column that the format does not define.
@@ -91,7 +91,7 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
 
 
 def covariate_scale(column: str, robot: Robot, units: Units) -> float:
-    """SI value of one unit of a covariate's column; 1 where it is in SI, in °C, or as given."""
+    """SI factor of a covariate's column; 1 where it is in SI, in °C, or dimensionless."""
     if tilted(column) is not None:
         return units.angle_scale
     quantity, place = split_name(column)

@@ -1,4 +1,4 @@
-"""The calibration that a robot of Universal Robots brings from the factory, as ROS has it: kinematics.yaml, in and out.
+"""Factory calibration of Universal Robots as the ROS file kinematics.yaml, read and written.
 
 Source: github.com/UniversalRobots/Universal_Robots_ROS2_Description, ``config/<model>/default_kinematics.yaml`` and
 ``urdf/inc/ur_common.xacro``; ``ur_calibration`` of the driver extracts one from a robot. Under ``kinematics`` each of
@@ -37,7 +37,7 @@ and of two models or of two conventions at least one origin differs by more."""
 
 
 def elements(robot: Robot, file: str) -> dict[str, int]:
-    """Return the chain's element of each link's joint; refuse a chain that lacks one, or whose axis is not z."""
+    """Chain element of each link's joint; a chain that lacks one, or whose axis is not z, is refused."""
     chain = robot.chain
     found = {}
     for link, ending in LINKS.items():
@@ -53,7 +53,7 @@ def elements(robot: Robot, file: str) -> dict[str, int]:
 
 
 def with_kinematics(robot: Robot, file: str | Path) -> Robot:
-    """Return a robot of ur_description, whole from base to flange, with the joint origins of a kinematics.yaml.
+    """Robot of ur_description, from base to flange, with the joint origins of a kinematics.yaml.
 
     Refused are a file that is none, one of another model, and a robot of other frames.
     """
@@ -80,7 +80,7 @@ def with_kinematics(robot: Robot, file: str | Path) -> Robot:
 
 
 def _pose(given: Any, file: str, link: str) -> Array:
-    """Return (4, 4) of a link's six figures."""
+    """Pose (4, 4) of a link's six numbers."""
     from scipy.spatial.transform import Rotation
 
     try:

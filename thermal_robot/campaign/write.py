@@ -1,4 +1,4 @@
-"""From a campaign to files: campaign.toml, table and robot; the table of predictions."""
+"""Writers of campaigns: campaign.toml, table and robot; tables of predictions."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, table_columns
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
+from thermal_robot.campaign.settings import facts_in
 from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
@@ -32,7 +33,7 @@ TABLE_NAME, PLAN_NAME, ROBOT_NAME = "measurements.csv", "plan.csv", "robot.urdf"
 
 @contextmanager
 def _writing(path: Path) -> Iterator[None]:
-    """Say of what cannot be written that it cannot."""
+    """Turn a failure to write into an error with the path."""
     try:
         yield
     except OSError as error:
@@ -40,7 +41,7 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Sequence[str] = ()) -> Path:
-    """Write a campaign so that reading it again gives the same arrays.
+    """Write a campaign so that reading it gives the same arrays.
 
     Filled gaps are written with the values that filled them.
 
@@ -49,14 +50,14 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     campaign
         With measured positions.
     directory
-        Is made if need be; campaign.toml, measurements.csv and robot.urdf in it are replaced.
+        Folder, created if missing; campaign.toml, measurements.csv and robot.urdf in it are replaced.
     comments
         Sentences that campaign.toml begins with.
 
     Returns
     -------
     Path
-        Of the campaign.toml.
+        Path of the campaign.toml.
 
     Raises
     ------
@@ -74,7 +75,7 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     require("write_campaign()", campaign, (Campaign,), "a campaign")
     require("write_campaign()", directory, (str, os.PathLike), "the path of a folder")
     folder = Path(directory)
-    if campaign.position is None:
+    if not campaign.measured:
         raise CampaignError(str(folder), "samples without measured positions are no campaign")
     file = _declare(campaign, folder, comments)
     write_table(campaign, folder / TABLE_NAME)
@@ -84,7 +85,7 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
 def write_planned(
     commands: Campaign, directory: str | Path, *, comments: Sequence[str] = (), derived: Sequence[str] = ()
 ) -> Path:
-    """Write the folder of a campaign that is still to be measured; return the path of its campaign.toml.
+    """Write the folder of a campaign still to be measured; return the path of its campaign.toml.
 
     Beside campaign.toml and the robot stand plan.csv, all that is planned, and measurements.csv, the same with empty
     cells where something is to be recorded: the target's place and the temperatures.
@@ -106,7 +107,7 @@ def write_planned(
 def write_commands(
     commands: Campaign, path: str | Path, *, derived: Sequence[str] = (), recorded: bool = False
 ) -> None:
-    """Write the table of what is to be commanded, with empty cells for what will be measured.
+    """Write a table of commands, with empty cells for the measurements.
 
     ``derived`` are columns that are left out; where temperatures are ``recorded`` their cells stay empty, too.
     """
@@ -165,7 +166,7 @@ def with_prediction(
     outside: Sequence[Sequence[str]],
     units: Units,
 ) -> pd.DataFrame:
-    """Return N samples of a robot with what is predicted of them; measured columns of theirs go, all others stay.
+    """N samples of a robot with predicted columns in place of measured ones; other columns stay.
 
     ``position`` and ``std`` are (N, 3) m, of the target and one standard deviation per axis, and are given in the
     length unit; ``orientation`` (N, 4) unit quaternions wxyz; ``outside`` names per row the columns in which it leaves
@@ -185,7 +186,7 @@ def with_commands(
     direction: ArrayLike,
     units: Units,
 ) -> pd.DataFrame:
-    """Return N samples of a robot with corrected commands, (N, n) rad or m, in the place of their joint positions.
+    """N samples of a robot with corrected commands, (N, n) rad or m, as joint positions.
 
     ``std`` (N, 3) m and ``outside`` are as of :func:`with_prediction`; ``direction`` (N,) rad is by how much the
     target's direction is missed. All is given in the units of the table.
@@ -202,13 +203,13 @@ def with_commands(
 
 
 def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:
-    """Return the columns that say how far a place may be off, and where nobody measured."""
+    """Columns of the predictive uncertainty and of extrapolation."""
     columns: dict[str, Any] = dict(zip(names.STD, np.asarray(std).T / units.length_scale, strict=True))
     return {**columns, names.OUTSIDE: [" ".join(left) for left in outside]}
 
 
 def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[str, Any]) -> pd.DataFrame:
-    """Return samples with further columns; theirs of these names, and measured ones, whatever they are called, go."""
+    """Return the samples with further columns, in place of those of these names and of measured ones."""
     called = {heading.column: name for name, heading in found.items()}
     meant = [called.get(str(name).strip(), str(name).strip()) for name in samples.columns]
     goes = [name in names.MEASURED or names.target_of(name) is not None or name in columns for name in meant]
@@ -216,7 +217,7 @@ def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[s
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
-    """Write what :func:`with_prediction` returns, as CSV with all digits or, by its ending, as Parquet.
+    """Write the result of :func:`with_prediction` as CSV with all digits or, by its ending, as Parquet.
 
     Raises
     ------
@@ -234,7 +235,7 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
 
 
 def _document(campaign: Campaign) -> dict[str, Any]:
-    """Return campaign.toml as a dict, lengths in the campaign's unit."""
+    """Content of campaign.toml as a dict, lengths in the campaign's unit."""
     settings, several = campaign.settings, campaign.targets
     scale = settings.units.length_scale
     noise: dict[str, float] = {}
@@ -262,5 +263,6 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "payload": {"com": [value / scale for value in settings.payload_com]},
         "priors": dict(settings.priors),
         "gears": dict(settings.gears),
+        **facts_in(settings.facts, scale),
     }
     return {section: content for section, content in document.items() if content}

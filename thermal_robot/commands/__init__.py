@@ -1,1 +1,1 @@
-"""The commands, a file each: what it does, the options that it takes, and what it runs."""
+"""Commands of the program, a file each: description, options, action."""

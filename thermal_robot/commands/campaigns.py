@@ -34,7 +34,7 @@ def check(options: argparse.Namespace) -> None:
 
 
 def effects(options: argparse.Namespace) -> None:
-    """Print the effects, and what a campaign lacks for each."""
+    """Run ``effects``: list the effects, with the columns that a campaign lacks for each."""
     from thermal_robot.diagnosis import Finding
     from thermal_robot.effects import gate, library
     from thermal_robot.effects.catalogue import random_effects
@@ -99,7 +99,7 @@ def _diagnose_motion(options: argparse.Namespace) -> None:
 
 
 def demo(options: argparse.Namespace) -> None:
-    """Diagnose the demo's campaign, print it and draw it."""
+    """Run ``demo``: diagnose the demo's campaign, print and draw it."""
     from thermal_robot.report import html
 
     options.campaign = demo_directory()
@@ -111,7 +111,7 @@ def demo(options: argparse.Namespace) -> None:
 
 
 def iso9283(options: argparse.Namespace) -> None:
-    """Compute the criteria, print them and write what is asked for."""
+    """Run ``iso9283``: compute the criteria, print them and write the requested files."""
     from thermal_robot.iso9283 import performance
 
     require_free((options.json, options.csv), read_from(options.campaign, Path() if options.piped else None))
@@ -121,7 +121,7 @@ def iso9283(options: argparse.Namespace) -> None:
 
 
 def view(options: argparse.Namespace) -> None:
-    """Serve the scene until it is interrupted."""
+    """Run ``view``: serve the scene until interrupted."""
     try:
         import viser  # noqa: F401
     except ImportError as error:

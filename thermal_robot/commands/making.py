@@ -12,7 +12,7 @@ from thermal_robot.robot import ENDS, load_robot
 
 
 def plan(options: argparse.Namespace) -> None:
-    """Plan, write what was asked for, and say what to expect."""
+    """Run ``plan``: plan a campaign, write it, and print the expected precision."""
     from thermal_robot.planning import plan, text, write_plan
 
     found = plan(
@@ -37,7 +37,7 @@ def plan(options: argparse.Namespace) -> None:
 
 
 def import_files(options: argparse.Namespace) -> None:
-    """Import the files and say what became of them."""
+    """Run ``import``: import files and report what was read and left out."""
     from thermal_robot.campaign.importers.plan import Plan, planned, read_mapping
     from thermal_robot.campaign.importers.run import import_files
     from thermal_robot.motion.importers import MOTION_FORMATS
@@ -72,7 +72,7 @@ def _import_motion(options: argparse.Namespace) -> None:
 
 
 def paper(options: argparse.Namespace) -> None:
-    """Print the ledger, and write it where that is asked for."""
+    """Run ``paper``: print or write the ledger."""
     from thermal_robot.paper import PaperInputs, ledger
 
     found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))

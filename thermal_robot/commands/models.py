@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def predict(options: argparse.Namespace) -> None:
-    """Predict a table of samples and write it."""
+    """Run ``predict``: predict a table of samples and write it."""
     require_free((options.output,), (options.model, options.samples))
     model = CorrectedModel.load(options.model)
 
@@ -33,7 +33,7 @@ def predict(options: argparse.Namespace) -> None:
 
 
 def correct(options: argparse.Namespace) -> None:
-    """Write the corrected commands, and what is asked for of the calibrated robot."""
+    """Run ``correct``: write corrected commands and files of the calibrated robot."""
     if bool(options.poses) != bool(options.output):
         raise CampaignError("correct", "poses and -o go together", expected="both, as in poses.csv -o commands.csv")
     named = [options.output, *(getattr(options, name) for name in OUTPUTS)]
@@ -57,7 +57,7 @@ def _table(
     file: str,
     filled: Callable[[pd.DataFrame, Campaign], pd.DataFrame],
 ) -> Output:
-    """Return the table of a file's rows, filled in by the model."""
+    """Return the samples in a file, completed by the model's defaults."""
     read = read_table(Path(file))
     samples = model.samples(read)
     _tell_unseen(options, model, samples, Path(file).name)
@@ -66,7 +66,7 @@ def _table(
 
 
 def _tell_unseen(options: argparse.Namespace, model: CorrectedModel, samples: Campaign, file: str) -> None:
-    """Say so where the order of a table's rows counts anew, and where the model has not seen their session."""
+    """Note where the order of rows counts anew, or a session is unknown to the model."""
     if model.counts_anew(samples):
         note(f"order in {file} counts its own rows; predicted as after the campaign", options.loudness)
     left = model.spread.outside(samples, model.effects) if model.spread else ()

@@ -1,4 +1,4 @@
-"""What `thermal-robot correct` writes of the calibrated robot itself: URDF, MJCF, Denavit-Hartenberg, zero offsets."""
+"""Files of the calibrated robot that `thermal-robot correct` writes: URDF, MJCF, Denavit-Hartenberg, zero offsets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OF_USE_WITH = {"from_mjcf": ("mjcf",), "modified": ("dh",), "min_sigma": OUTPUT
 
 
 def require_of_use(options: argparse.Namespace) -> None:
-    """Refuse an option that bears on no file that was asked for."""
+    """Refuse an option that affects no requested file."""
     for name, outputs in _OF_USE_WITH.items():
         given = getattr(options, name)
         if given is not None and given is not False and not any(getattr(options, output) for output in outputs):
@@ -31,7 +31,7 @@ def require_of_use(options: argparse.Namespace) -> None:
 
 
 def robot_files(options: argparse.Namespace, model: CorrectedModel) -> list[Output]:
-    """Return each file of the calibrated robot that was asked for; what they hold is computed here."""
+    """Contents of the requested files of the calibrated robot."""
     how = {"temperature": options.temperature, "min_sigma": options.min_sigma}
     robot = to.calibrated(model, **how)
     if robot.beyond:

@@ -37,7 +37,7 @@ def compare(options: argparse.Namespace) -> None:
 
 
 def wear(options: argparse.Namespace) -> None:
-    """Follow the robot, print what moved and write what is asked for."""
+    """Run ``wear``: analyse changes over time, print them and write the requested files."""
     from thermal_robot.fleet.wear import wear
 
     files = [file for one in options.campaigns for file in read_from(one)]
@@ -61,7 +61,7 @@ def _limit(text: str) -> tuple[str, float]:
 
 
 def fleet(options: argparse.Namespace) -> None:
-    """Diagnose the campaigns, print what they have in common, and write table, page and summary."""
+    """Run ``fleet``: diagnose the campaigns, print the summary, and write table, page and summary."""
     from thermal_robot.fleet.many import diagnose_many
 
     with counted(options.loudness) as progress:

@@ -1,4 +1,4 @@
-"""What several commands have in common: a campaign that is named, a text that is printed, a page that is written."""
+"""Shared parts of commands: reading a campaign, printing a text, writing a page."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Output = tuple[str | None, Callable[[Path], object]]
 
 
 def tell(options: argparse.Namespace, text: str, brief: str = "") -> None:
-    """Print the text, or what is left of it where little was asked for; nothing where a file takes its place."""
+    """Print a text, or its short form under ``-q``; nothing where a file is printed instead."""
     said = brief if options.loudness == QUIET else text
     if said and not options.printed:
         print(said)
 
 
 def deliver(options: argparse.Namespace, outputs: Sequence[Output], text: str = "", brief: str = "") -> None:
-    """Write what was asked for, then tell the text: files come first, who reads what is printed may stop early.
+    """Write the requested files, then print the text, as the reader of a pipe may stop early.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def deliver(options: argparse.Namespace, outputs: Sequence[Output], text: str = 
 
 
 def as_json(target: str | None, plain: Any) -> Output:
-    """Return the output of plain values as JSON."""
+    """Output of plain values as JSON."""
     text = json.dumps(plain, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return target, lambda path: write_text(path, text)
 
@@ -53,7 +53,7 @@ def as_page(
     files: Iterable[Path] = (),
     name: Callable[..., str] = str,
 ) -> Output:
-    """Return the output of a page; in its footer the hour, and SHA-256 of the files that it was made from, by name."""
+    """Output of a page, with the time and the SHA-256 of its input files in the footer."""
 
     def write(path: Path) -> None:
         # a pipe was read once, and is no file
@@ -64,12 +64,12 @@ def as_page(
 
 
 def read(options: argparse.Namespace) -> Campaign:
-    """Read the campaign that was named; on standard input its paths start from the current folder."""
+    """Read the named campaign; on standard input its paths are relative to the current folder."""
     return read_campaign(options.campaign, folder=Path() if options.piped else None)
 
 
 def read_from(campaign: str | Path, folder: Path | None = None) -> list[Path]:
-    """Return the files that a campaign is read from."""
+    """Input files of a campaign."""
     declaration = read_declaration(Path(campaign), folder)
     robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
     return [declaration.file, declaration.table, *robot]

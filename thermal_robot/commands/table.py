@@ -1,4 +1,4 @@
-"""Every command in one table: what it does, an example, its options and what it runs.
+"""Table of all commands: description, example, options, action.
 
 The table is light: what a command computes with is imported once it runs.
 """
@@ -25,7 +25,7 @@ _LAST_PORT = 65535
 
 
 class Option(NamedTuple):
-    """Arguments of ``add_argument``, and whether the option is a file ``in`` or ``out`` that may be ``-``."""
+    """Arguments of ``add_argument``, and whether the option is an input or output file that may be ``-``."""
 
     names: tuple[str, ...]
     how: dict[str, Any]
@@ -62,7 +62,7 @@ class Command:
     define: Callable[[argparse.ArgumentParser], None] | None = None
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Define the options, and what is run."""
+        """Define the options and the action."""
         if self.define:
             self.define(parser)
             return
@@ -77,7 +77,7 @@ class Command:
 
 
 def _taken_back(options: argparse.Namespace) -> Iterator[str]:
-    """Yield campaigns that `--only a b campaign.toml` took for names of effects, the last first."""
+    """Yield campaigns that `--only a b campaign.toml` took for effect names, the last first."""
     for names in (options.only, options.without):
         while names and (names[-1] == "-" or Path(names[-1]).exists()):
             yield names.pop()
@@ -98,7 +98,7 @@ def _need_two(options: argparse.Namespace) -> None:
 
 
 def _port(text: str) -> int:
-    """Return the number of a port; 0 asks for any that is free."""
+    """Parse a port number; 0 asks for any free one."""
     if not text.isascii() or not text.isdigit() or int(text) > _LAST_PORT:
         raise argparse.ArgumentTypeError(f"{text!r} is no port; expected a number from 0, for any, to {_LAST_PORT}")
     return int(text)
@@ -109,7 +109,7 @@ def _option(*names: str, **how: Any) -> Option:
 
 
 def _value(metavar: str, *names_and_help: str, **how: Any) -> Option:
-    """Return an option that takes a value; its help comes last."""
+    """Option with a value; its help comes last."""
     *names, text = names_and_help
     return Option(tuple(names), {"metavar": metavar, "help": text, **how})
 

@@ -1,4 +1,4 @@
-"""The command ``thermal-robot map``."""
+"""Command ``thermal-robot map``."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SHOWN = (
 
 
 def run(options: argparse.Namespace) -> None:
-    """Map, draw what was asked for, and tell the best places."""
+    """Run ``map``: map the workspace, draw it, and print the best places."""
     if options.figure:
         _require_picture(options.figure)
     robot = load_robot(options.robot, options.tool, root_frame=options.root)
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _require_picture(figure: str) -> None:
-    """Refuse an ending that is no picture's, before anything is computed."""
+    """Refuse a file ending that is no picture's, before anything is computed."""
     known = FigureCanvasBase.get_supported_filetypes()
     ending = Path(figure).suffix.lower().removeprefix(".")
     if ending and ending not in known:
@@ -88,7 +88,7 @@ def _question(options: argparse.Namespace) -> Question:
 
 
 def _numbers(name: str, given: list[str]) -> float | dict[str, float]:
-    """Return one number, or numbers by name."""
+    """Parse one number, or numbers by name."""
     pairs = [word.rpartition("=") for word in given]
     try:
         if len(pairs) == 1 and not pairs[0][1]:
@@ -112,7 +112,7 @@ def _rule(text: str) -> tuple[str, tuple[float | None, float | None]]:
 
 
 def _text(found: Map, robot: Robot, best: pd.DataFrame, by: str) -> str:
-    """Say where the robot is best, in mm and degrees."""
+    """Best places of the map, in mm and degrees."""
     # the postures of a place stand in one chunk
     counts = np.array([(len(c["place"]), len(np.unique(c["place"]))) for c in found.chunks(["place"])])
     rows, reached = counts.sum(axis=0)

@@ -1,4 +1,4 @@
-"""The robot as it really is: the corrected model, and what follows from it for commands and for robot files."""
+"""The corrected model, and what follows from it for commands and for robot files."""
 
 from thermal_robot.correction.constant import determined, zero_offsets
 from thermal_robot.correction.model import Commands, CorrectedModel

@@ -1,8 +1,8 @@
-"""What of a model is constant: the same in all configurations and conditions, so that a robot file can hold it.
+"""Constant part of a corrected model, which a robot file can hold.
 
-No effect is asked for by name: each parameter's unit responses are read in rows that differ in everything, and are
-constant where they are one number, or one twist, in all. Others are so at one temperature that has lasted: they are
-read again in rows of that one, and must change with it.
+No effect is known by name: the unit responses of each parameter are evaluated in rows in which everything varies, and
+are constant where they are equal in all. Others are constant at a steady temperature: they are evaluated again in rows
+at that temperature, and must depend on it.
 
 **Undetermined** constants can be taken out: each is set to zero as a piece of knowledge. What the posterior of frames
 and parameters, N(m, C), says of the others once θ_k = 0 is their conditional mean m − C_k m_k / C_kk and covariance
@@ -58,7 +58,7 @@ _WARMER = 1.0
 
 @dataclass(frozen=True)
 class Told:
-    """One parameter of a model, in its own unit; its standard deviation is NaN where the model does not tell."""
+    """One parameter of a model, in its own unit; its standard deviation is NaN where unknown."""
 
     effect: str
     parameter: str
@@ -74,11 +74,11 @@ class Told:
 
 @dataclass(frozen=True, eq=False)
 class Constant:
-    """The part of a model that is the same in all configurations, at one temperature.
+    """Part of a model that is the same in all configurations, at one temperature.
 
-    Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): what one unit of
-    each does in the joints, the segments, the base and the tool; zero where it is not constant. At ``temperature``, °C
-    of the robot, lengths hold; ``grows`` where any of it follows that.
+    Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): unit response of
+    each in the joints, the segments, the base and the tool; zero where it is not constant. ``temperature``, °C of the
+    robot, is that of the lengths; ``grows`` if any of it depends on that.
     """
 
     temperature: float
@@ -90,18 +90,17 @@ class Constant:
 
     @property
     def displacement(self) -> Displacement:
-        """What all of it does in the chain: each channel for one row."""
+        """Displacement of each channel by all constants, one row."""
         moved = np.array([told.value for told in self.parameters]) @ self.responses
         joint, segment, base, tool = np.split(moved, [self.joints, -12, -6])
         return Displacement(joint, segment.reshape(-1, 6), base, tool)
 
 
 def constant(model: CorrectedModel, temperature: float | None = None) -> Constant:
-    """Find what of a model is constant; of an effect in one place all is, or nothing.
+    """Constant part of a model: an effect at one place is constant as a whole, or not at all.
 
-    ``temperature``, °C, is that of all links, for long enough that they have it; by default that at which the URDF's
-    lengths hold. What a model takes for settled in all rows to come (a law of the session, or of the row's number)
-    counts as it was at the end of the campaign.
+    ``temperature``, °C, is the steady temperature of all links; by default that of the URDF's lengths. Laws of the
+    session or of the row's number count as at the end of the campaign.
     """
     degrees = float(model.settings.reference_temperature if temperature is None else temperature)
     if not ABSOLUTE_ZERO <= degrees < np.inf:
@@ -129,9 +128,9 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
 
 
 def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, rows: int = ROWS) -> Observations:
-    """Return rows in which everything differs but, where it is given, a temperature that has lasted.
+    """Test rows in which everything varies but, where given, a steady temperature.
 
-    Joints and conditions are drawn where the model was measured; within the joints' limits where it does not say.
+    Joints and conditions are drawn from the measured range, or within the joints' limits where it is unknown.
     """
     robot, rng = model.robot, np.random.default_rng(0)
     ranges = {} if model.spread is None else model.spread.ranges
@@ -163,7 +162,7 @@ def _size(robot: Robot) -> int:
 
 
 def _one_for_all(robot: Robot, parameter: Parameter) -> Array | None:
-    """(n + 6 S + 12,) what a parameter does in every row; ``None`` where rows differ, or it acts outside the chain."""
+    """Constant response (n + 6 S + 12,) of a parameter; ``None`` where rows differ, or it acts outside the chain."""
     first = {"joint": 0, "segment": robot.n, "base": _size(robot) - 12, "tool": _size(robot) - 6}
     found = np.zeros(_size(robot))
     for r in parameter.responses:
@@ -179,7 +178,7 @@ def _one_for_all(robot: Robot, parameter: Parameter) -> Array | None:
 
 
 def _deviations(model: CorrectedModel) -> Array:
-    """(P,) standard deviation of each parameter; NaN where the model does not tell."""
+    """Return the standard deviation (P,) of each parameter; NaN where unknown."""
     count = sum(len(values) for _, values in model.effects)
     if model.spread is None or len(model.spread.covariance) < count:
         return np.full(count, np.nan)
@@ -189,7 +188,7 @@ def _deviations(model: CorrectedModel) -> Array:
 def determined(
     model: CorrectedModel, min_sigma: float, temperature: float | None = None
 ) -> tuple[CorrectedModel, tuple[Told, ...]]:
-    """Leave out of a model the constants that the data do not determine.
+    """Remove the constants that the data do not determine from a model.
 
     Parameters
     ----------
@@ -203,9 +202,9 @@ def determined(
     Returns
     -------
     CorrectedModel
-        The same effects; those parameters are zero, frames and other parameters what they are without them.
+        Model with these parameters at zero, and all others conditional on that.
     tuple of Told
-        What was left out, as it was fitted.
+        Removed parameters with their fitted values.
 
     Raises
     ------
@@ -273,7 +272,7 @@ TOLD, UNSEEN, NONE = "determined", "not determined", "not in the model"
 def zero_offsets(
     model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
 ) -> pd.DataFrame:
-    """Return what to enter in a controller as the zeros of its joints.
+    """Joint zeros to enter in a controller.
 
     Parameters
     ----------
@@ -334,9 +333,9 @@ def zero_offsets(
 
 
 def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64], change: Array) -> tuple[Array, Array]:
-    """(n,) standard deviation of each joint's zero, NaN where the model does not tell, and what it was before the data.
+    """Posterior standard deviation (n,) of each joint's zero, NaN where unknown, and the prior one.
 
-    A model of an older program does not say how large its parameters were expected to be: the effects do.
+    For models without prior deviations, the effects' expected sizes are used.
     """
     spread, count = model.spread, len(known.parameters)
     if spread is None or len(spread.covariance) < count:
@@ -351,7 +350,7 @@ def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
 
 
 def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]) -> tuple[Array, list[str]]:
-    """Return (n, U) the zero of each joint a unit of each used parameter, and what is said of each zero."""
+    """Joint zeros (n, U) per unit of each used parameter, and a status for each zero."""
     robot, observations = model.robot, rows_of_every_kind(model, rows=_ROWS)
     own = [_acting(robot, known, int(k)) for k in used]
     zeros = [Parameter("zero", "", 1.0, "joint", name, (at_joint(j, 1.0),)) for j, name in enumerate(robot.joint_names)]
@@ -382,7 +381,7 @@ def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
 
 
 def _acting(robot: Robot, known: Constant, k: int) -> Parameter:
-    """Return a constant with what it does in joints and segments alone."""
+    """Constant restricted to its response in joints and segments."""
     joints, twists = known.responses[k, : robot.n], known.responses[k, robot.n : -12].reshape(-1, 6)
     turned = [at_joint(int(j), joints[j]) for j in np.flatnonzero(joints)]
     placed = [at_segment(int(s), twists[s]) for s in np.flatnonzero(twists.any(axis=1))]

@@ -1,4 +1,4 @@
-"""The corrected model: nominal robot, frames and effects; it predicts, corrects commands, and is saved as JSON.
+"""The corrected model: nominal robot, frames and effects; predicts, corrects commands, saved as JSON.
 
 Samples to predict are made from a table or from arrays and conditions, and must bring what the model needs.
 
@@ -63,7 +63,7 @@ lies at a singular pose, or is another posture, whose way there nobody has looke
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Joint positions to command, and what will be reached.
+    """Corrected commands, and the residual that they leave.
 
     Attributes
     ----------
@@ -94,9 +94,9 @@ class Commands:
 
 
 def _nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
-    """(N, n) joint positions, rad or m, at which the nominal robot brings the target to poses (N, 4, 4), root frame.
+    """Nominal inverse kinematics: joint positions (N, n), rad or m, for target poses (N, 4, 4), root frame.
 
-    One that is out of reach is refused by its row among them, which count from 1.
+    A pose out of reach is an error with its row, counted from 1.
     """
     expected = "an array (N, 4, 4) of poses, m"
     try:
@@ -115,7 +115,7 @@ def _nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
 
 
 def _require_within_limits(samples: Campaign, q: Array) -> None:
-    """Refuse rows beyond a limit that no correction brings back: only such have commands (N, n) beyond one."""
+    """Refuse rows whose commands (N, n) are beyond a joint limit, which no correction brings back."""
     robot = samples.robot
     wrong = np.argwhere(np.maximum(robot.lower - q, q - robot.upper) > ROUNDED)
     if len(wrong):
@@ -133,7 +133,7 @@ def _require_within_limits(samples: Campaign, q: Array) -> None:
 
 
 def _in_units(samples: Campaign, joint: int, position: float) -> str:
-    """Return a joint's position as the campaign's tables have it, and as arrays have it where that differs."""
+    """Position of a joint in the campaign's unit, and in SI where that differs."""
     kind = samples.robot.joint_types[joint]
     units = dict.fromkeys((samples.units, SI))
     own, *si = dict.fromkeys(f"{position / u.joint_scale(kind):.6g} {u.joint_unit(kind)}" for u in units)
@@ -153,7 +153,7 @@ def _depends(effect: Effect, seen: Observations, column: str) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CorrectedModel:
-    """Nominal robot, fitted frames, and effects with their parameter values; predicts where the target is.
+    """Corrected model: nominal robot, fitted frames, and effects with parameter values.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class CorrectedModel:
     last_order
         First and last ``order`` of the campaign, where it had that column.
     spread
-        How far its predictions may be off; ``None`` where a file of version 0.2 does not say.
+        Predictive uncertainty; ``None`` for a file of version 0.2, which lacks it.
 
     Examples
     --------
@@ -197,7 +197,7 @@ class CorrectedModel:
     @overload
     def predict(self, samples: pd.DataFrame) -> pd.DataFrame: ...
     def predict(self, samples: Campaign | str | Path | pd.DataFrame) -> tuple[Array, Array | None] | pd.DataFrame:
-        """Predict what the instrument would measure.
+        """Predict the measurement.
 
         Parameters
         ----------
@@ -232,20 +232,20 @@ class CorrectedModel:
         return self.predicted(samples, self.prediction(samples))
 
     def predicted(self, samples: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
-        """Return the samples with what is predicted of them, in the units of the campaign.
+        """Return the samples with predicted columns, in the units of the campaign.
 
         Parameters
         ----------
         samples
             Their own columns are kept as they stand, but for those of measurements.
         prediction
-            Of them.
+            Prediction of these samples.
 
         Returns
         -------
         pandas.DataFrame
-            Then x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and in ``outside`` the
-            columns in which the row leaves what was measured, separated by blanks.
+            Samples with columns x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and
+            ``outside``: columns in which the row leaves the measured range, separated by blanks.
 
         Examples
         --------
@@ -256,14 +256,14 @@ class CorrectedModel:
         return with_prediction(samples, self.robot, *prediction, self.settings.units)
 
     def prediction(self, samples: Campaign | str | Path | pd.DataFrame, *, noise: bool = False) -> Prediction:
-        """Predict what the instrument would measure, and how far that may be off.
+        """Predict the measurement with its standard deviation.
 
         Parameters
         ----------
         samples
             As for :meth:`predict`.
         noise
-            Whether the standard deviations hold the instrument's noise: what a measurement differs by, not the target.
+            Whether the standard deviations include the instrument's noise, so that they are those of a measurement.
 
         Raises
         ------
@@ -298,7 +298,7 @@ class CorrectedModel:
         poses: Campaign | str | Path | pd.DataFrame | ArrayLike,
         conditions: Mapping[str, ArrayLike] | None = None,
     ) -> Commands:
-        """Return the commands that bring the real target to nominal poses.
+        """Commands that bring the real target to nominal poses.
 
         Parameters
         ----------
@@ -335,20 +335,21 @@ class CorrectedModel:
         return self._commands(self._ready(self.samples_at(poses, conditions)))
 
     def commanded(self, samples: pd.DataFrame, commands: Commands) -> pd.DataFrame:
-        """Return samples with the commands in the place of their joint positions, in the units of the campaign.
+        """Return the samples with corrected commands as joint positions, in the units of the campaign.
 
         Parameters
         ----------
         samples
             Their other columns are kept as they stand, but for those of measurements.
         commands
-            Of them.
+            Corrected commands of these samples.
 
         Returns
         -------
         pandas.DataFrame
-            Then std.x std.y std.z, in ``outside`` the columns in which the row leaves what was measured, separated by
-            blanks, and in ``miss.direction`` the angle by which the target's direction is missed.
+            Samples with corrected joint positions and the columns std.x std.y std.z, ``outside``: columns in which the
+            row leaves the measured range, separated by blanks, and ``miss.direction``: error angle of the target's
+            direction.
 
         Examples
         --------
@@ -360,7 +361,7 @@ class CorrectedModel:
         return with_commands(samples, self.robot, q, std, outside, missed, self.settings.units)
 
     def _commands(self, samples: Campaign) -> Commands:
-        """Solve for the commands; refuse, by its row, a joint beyond its limit and a pose that is out of reach."""
+        """Solve for the commands; joint limits and unreachable poses are errors with the row."""
         robot, frames, effects = samples.robot, self.frames, self.effects
         farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
         # a row beyond a limit is solved as it stands; the correction may bring it back
@@ -394,14 +395,14 @@ class CorrectedModel:
         return Commands(q, std, outside, found.turned)
 
     def samples_at(self, q: Any, conditions: Mapping[str, ArrayLike] | None = None) -> Campaign:
-        """Return samples to predict, from arrays instead of a table.
+        """Return the samples to predict, from arrays instead of a table.
 
         Parameters
         ----------
         q
             (N, n) joint positions, rad or m; (n,) counts as one row.
         conditions
-            By column name, one value for all rows or (N,), SI.
+            Conditions by column name, one value for all rows or (N,), SI.
 
         Raises
         ------
@@ -432,7 +433,7 @@ class CorrectedModel:
         return Campaign(name=_NAME, robot=self.robot, q=rows, covariates=given, **self.settings.of_rows())
 
     def _ready(self, samples: Any) -> Campaign:
-        """Return samples with what the model reads, and nothing else that a table may hold."""
+        """Return the samples with only the columns that the model reads."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
         rows: Campaign = read_alike(samples, self.robot, self.settings.turned)
@@ -444,7 +445,7 @@ class CorrectedModel:
         return replace(rows, covariates=read)
 
     def _require_needed(self, samples: Campaign) -> None:
-        """Refuse samples that lack a column, or a cell of it; the error names the column, and the row of the cell."""
+        """Refuse samples that lack a column, or a cell of it, naming column and row."""
         for column in self.needs:
             gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
             if column in samples.covariates and not gaps.size:
@@ -469,9 +470,10 @@ class CorrectedModel:
             )
 
     def counts_anew(self, samples: Campaign) -> bool:
-        """Tell whether the ``order`` of the samples merely numbers the rows of their own file.
+        """Whether the ``order`` of the samples merely numbers the rows of their own file.
 
-        It does if it starts where the campaign's did, has no gaps, and ends earlier. False if the model needs none.
+        It does if it starts at the campaign's first value, has no gaps, and ends earlier. False if the model does not
+        use it.
 
         Examples
         --------
@@ -503,7 +505,7 @@ class CorrectedModel:
         return replace(samples, name=table.file) if isinstance(table, Table) else samples
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything, the URDF's text and a checksum included, as plain values.
+        """Plain values, the URDF's text and a checksum included.
 
         Examples
         --------
@@ -516,7 +518,7 @@ class CorrectedModel:
     def from_dict(
         cls, plain: dict[str, Any], effects: Sequence[Effect] = (), *, file: str = "<model>"
     ) -> CorrectedModel:
-        """Return the model that :meth:`to_dict` wrote; ``effects`` are your own effects that it may hold.
+        """Model from the output of :meth:`to_dict`; ``effects`` are your own effects that it may hold.
 
         Raises
         ------
@@ -533,7 +535,7 @@ class CorrectedModel:
         return cls(**fields_of(plain, effects, file))
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a JSON file that stands alone; it appears whole or not at all.
+        """Write the model to a self-contained JSON file by an atomic replace.
 
         Examples
         --------

@@ -1,7 +1,7 @@
-"""MuJoCo as somebody's simulator: models are compiled, asked where their bodies are, written with all digits.
+"""Simulation models in MuJoCo: MJCF compiled, posed, and written with all digits.
 
-A campaign is compared with what the user's own model predicts; the calibrated robot is written back to it, or as an
-MJCF of its own, translated from its URDF.
+A campaign is compared with the predictions of the user's own model; the calibrated robot is written into that model, or
+converted from its URDF.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _NO_MASS = {"boundmass": 1e-9, "boundinertia": 1e-12, "balanceinertia": True, "f
 
 
 def mujoco_or_error() -> Any:
-    """Return the package ``mujoco``, or say how to install it."""
+    """Import ``mujoco``, or say how to install it."""
     try:
         import mujoco
     except ImportError as error:
@@ -39,7 +39,7 @@ def mujoco_or_error() -> Any:
 
 
 def compiled(mjcf: str | Path) -> Any:
-    """Return the ``mujoco.MjModel`` of an MJCF: a file, with what it includes, or its text."""
+    """Compile an MJCF, a file or its text, to a ``mujoco.MjModel``."""
     mujoco = mujoco_or_error()
     try:
         if isinstance(mjcf, Path):
@@ -51,7 +51,7 @@ def compiled(mjcf: str | Path) -> Any:
 
 
 def mjcf_of_urdf(urdf: str) -> str:
-    """Translate a URDF by MuJoCo's compiler, with all digits; joints and links keep their names.
+    """Convert a URDF by MuJoCo's compiler, with all digits; joints and links keep their names.
 
     Meshes are left out, as their files are named in ways that MuJoCo does not know; a joint that mimics another becomes
     an equality.
@@ -94,7 +94,7 @@ def mjcf_of_urdf(urdf: str) -> str:
 
 
 def _with_all_digits(root: Any, model: Any) -> None:
-    """Give the bodies and joints of a model that MuJoCo wrote, in six digits, all of them."""
+    """Rewrite the poses of bodies and joints in a model saved by MuJoCo, whose six digits are too few."""
     usual = {"pos": [0.0, 0.0, 0.0], "quat": [1.0, 0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0], "range": [0.0, 0.0]}
     for kind, names in (("body", ("pos", "quat")), ("joint", ("axis", "range"))):
         for element in root.iterfind(f"worldbody//{kind}"):
@@ -105,26 +105,26 @@ def _with_all_digits(root: Any, model: Any) -> None:
 
 
 def digits(values: Any) -> str:
-    """Return numbers as MJCF has them, with all digits."""
+    """Format numbers for MJCF, with all digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def moved(model: Any, data: Any, positions: Mapping[str, float]) -> None:
-    """Put joints of a ``mujoco.MjData`` to positions (rad or m) by name; the others stay."""
+    """Set joints of a ``mujoco.MjData`` to positions (rad or m) by name; the others stay."""
     for name, position in positions.items():
         data.qpos[model.joint(name).qposadr[0]] = position
     mujoco_or_error().mj_kinematics(model, data)
 
 
 def pose_of(placed: Any) -> Array:
-    """(4, 4) in the world, m, of a body or a site of a ``mujoco.MjData``."""
+    """World pose (4, 4), m, of a body or a site of a ``mujoco.MjData``."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = placed.xmat.reshape(3, 3), placed.xpos
     return pose
 
 
 def known(model: Any, kind: str, name: str) -> int | None:
-    """Return the number of a body, joint or site; ``None`` where a model has none of this name."""
+    """Index of a body, joint or site; ``None`` where a model has none of this name."""
     mujoco = mujoco_or_error()
     number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
     return None if number < 0 else int(number)
@@ -147,7 +147,7 @@ _BEYOND = (
 
 
 def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
-    """Return the MJCF of the calibrated robot.
+    """MJCF of the calibrated robot.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Patched:
-    """A model of the user's own beside the robot, both with all joints at zero.
+    """User's MJCF model to be calibrated beside the robot, both with all joints at zero.
 
     ``root`` is the root element of its ``text``; ``base`` (4, 4) the pose of the robot's root frame in its world.
     """
@@ -216,7 +216,7 @@ class _Patched:
         return cls(robot, name, text, tree(text), model, data, np.eye(4) if base is None else pose_of(data.body(base)))
 
     def place(self) -> None:
-        """Place the bodies of joints and the tool frame anew, and add the target."""
+        """Set the poses of joint bodies and tool frame, and add the target."""
         chain, placed = self.robot.robot.chain, self.robot.placements
         nominal = np.tile(np.eye(4), (len(placed), 1, 1))
         nominal[:, :3, :3], nominal[:, :3, 3] = chain.rotations, chain.translations
@@ -247,7 +247,7 @@ class _Patched:
         self._set_target(last, np.linalg.inv(pose_of(self.data.body(last))) @ stands @ change @ target)
 
     def _carrier(self, joint: str, at: Array, k: int) -> int:
-        """Return the body of a joint, whose axis must lie where the robot has it."""
+        """Body of a joint, after a check that its axis is that of the robot."""
         number = int(known(self.model, "joint", joint) or 0)
         chain, there = self.robot.robot.chain, self.data.joint(number)
         axis = at[:3, :3] @ chain.axes[k]
@@ -260,7 +260,7 @@ class _Patched:
         return int(self.model.jnt_bodyid[number])
 
     def _move(self, joint: str, body: int, change: Array) -> None:
-        """Place a body anew: N X N⁻¹ L takes the place of L.
+        """Set the pose of a body: N X N⁻¹ L replaces L.
 
         N is the body's pose in its parent while its joint is at zero, which is L only where the joint has no ``ref``.
         """
@@ -272,7 +272,7 @@ class _Patched:
         _set_pose(self._tag(joint, body), inside @ change @ np.linalg.inv(inside) @ own)
 
     def _tag(self, joint: str, body: int) -> Any:
-        """Return the element of a body: by its name, or by the joint in it."""
+        """XML element of a body, by its name or by the joint in it."""
         name = self.model.body(body).name
         found = self.root.xpath(
             "(//worldbody//joint[$joint and @name=$joint]/.. | //body[$name and @name=$name])"
@@ -290,7 +290,7 @@ class _Patched:
         return found[0]
 
     def _set_target(self, body: int, pose: Array) -> None:
-        """Put the target into the body of the last joint."""
+        """Add the target as a site of the last joint's body."""
         joint, tool = _moving(self.robot.robot)[-1], target_link(self.robot.robot.tool_frame)
         carrier = self._tag(joint, body)
         for site in self.root.xpath("(//site[@name=$tool])[1]", tool=tool):
@@ -305,7 +305,7 @@ class _Patched:
 
 
 def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
-    """(4, 4) X = C⁻¹ R⁻¹ R' C: how what a joint's frame holds moves, in its own frame, as R becomes R'."""
+    """Pose change (4, 4), X = C⁻¹ R⁻¹ R' C, of a body held by a joint's frame, in its own frame, as R becomes R'."""
     if np.array_equal(before, after):
         return np.eye(4)
     behind = np.linalg.inv(at) @ held
@@ -313,7 +313,7 @@ def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
 
 
 def _set_pose(element: Any, pose: Array) -> None:
-    """Place a body or a site in its parent; a quaternion takes the place of any other way of turning it."""
+    """Set position and quaternion of an element, in place of any other orientation attribute."""
     for name in ("euler", "axisangle", "xyaxes", "zaxis"):
         element.attrib.pop(name, None)
     element.set("pos", digits(pose[:3, 3]))
@@ -326,7 +326,7 @@ def _moving(robot: Robot) -> list[str]:
 
 
 def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
-    """Return what to call an MJCF, its ``mujoco.MjModel`` and its file; it must have the robot's joints."""
+    """Name of an MJCF, its ``mujoco.MjModel`` and its file; it must have the robot's joints."""
     path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
     name, model = str(path or "the MJCF"), compiled(path or mjcf)
     for joint in _moving(robot):
@@ -337,7 +337,7 @@ def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
 
 
 def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
-    """Return a campaign with what a MuJoCo model predicts of its target, as ``sim.*`` columns would bring it.
+    """Campaign with a MuJoCo model's prediction of the target as ``sim.*`` columns.
 
     The model's joints are put where they were commanded, and those that mimic another where that one takes them; no
     motor and no gravity is at work. A diagnosis then compares the robot with this simulator, not with the URDF, and
@@ -386,7 +386,7 @@ def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
 
 
 def _target(name: str, model: Any, campaign: Campaign) -> tuple[str, int, Array]:
-    """Return the kind and number of what carries the target, and (4, 4) the target's pose on it."""
+    """Kind and index of the element that carries the target, and the target's pose (4, 4) on it."""
     declared = np.eye(4)
     declared[:3, 3] = campaign.target
     tool = campaign.robot.tool_frame

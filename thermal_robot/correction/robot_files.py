@@ -1,4 +1,4 @@
-"""The calibrated robot: what of a model a robot file can hold; as URDF, kinematics.yaml and Denavit-Hartenberg table.
+"""Calibrated robot as URDF, kinematics.yaml and Denavit-Hartenberg table: the constant part of a corrected model.
 
 A kinematics.yaml of Universal Robots is read by ur_description and the driver for ROS; many controllers hold Denavit
 and Hartenberg's parameters instead of a URDF. From the axis of a joint to the next one four numbers lead where the two
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A robot with what of a corrected model is the same in all configurations, at one temperature.
+    """Robot with the constant part of a corrected model, at one temperature.
 
     Attributes
     ----------
     robot
         The nominal one.
     displacement
-        What displaces its joints (n,) and segments (S, 6); nothing of the base and the tool.
+        Displacement of joints (n,) and segments (S, 6); base and tool are not displaced.
     base
         (4, 4) pose of the root frame in the measurement frame.
     target
@@ -62,7 +62,7 @@ class Calibrated:
         (4, 4) the target on the tool frame as the campaign declares it, where the robot was compared with a simulator
         of the user's own, which has it; ``None`` where it was compared with the URDF.
     beyond
-        In a sentence, that the temperature lies outside those that were measured; empty where it does not.
+        Warning if the temperature is outside the measured range; else empty.
 
     Examples
     --------
@@ -87,12 +87,12 @@ class Calibrated:
 
     @property
     def joints(self) -> Array:
-        """(M,) rad or m by which each movable joint stands elsewhere; one that mimics another follows that one."""
+        """Zero offset (M,) of each movable joint, rad or m; a mimicking one follows its leader."""
         return np.asarray(self.robot.chain.coupling.matrix @ np.asarray(self.displacement.joint))
 
     @property
     def placements(self) -> Array:
-        """(K, 4, 4) of the chain's elements in the frames of their parent links: P exp(ξ) exp(axis · zero offset)."""
+        """Poses (K, 4, 4) of the chain's elements in their parent links: P exp(ξ) exp(axis · zero offset)."""
         chain, segments = self.robot.chain, np.asarray(self.displacement.segment)
         placed = np.tile(np.eye(4), (len(chain.names), 1, 1))
         placed[:, :3, :3], placed[:, :3, 3] = chain.rotations, chain.translations
@@ -106,7 +106,7 @@ class Calibrated:
 
     @property
     def origins(self) -> Mapping[str, Array]:
-        """(4, 4) placement by name of the joints that stand elsewhere than on the nominal robot."""
+        """Calibrated poses (4, 4) by joint name, of the joints that differ from the nominal robot."""
         chain = self.robot.chain
         moved = {*chain.placed[np.asarray(self.displacement.segment).any(axis=1)], *chain.movable[self.joints != 0.0]}
         placed = enumerate(zip(chain.names, self.placements, strict=True))
@@ -114,12 +114,12 @@ class Calibrated:
 
     @property
     def links(self) -> Mapping[str, tuple[str, Array]]:
-        """The link of the target, where that is not the tool frame itself: what carries it, and its placement there."""
+        """Link of the target where it is not the tool frame: its parent, and its pose there."""
         tool = self.robot.tool_frame
         return {target_link(tool): (tool, self.target)} if (self.target != np.eye(4)).any() else {}
 
     def notes(self, holds: str) -> list[str]:
-        """Return what a reader of a robot file must know, in lines; ``holds`` names such a file."""
+        """Remarks for the reader of a robot file, in lines; ``holds`` names such a file."""
         xyz, rpy = xyz_rpy(self.base)
         warm = "" if self.temperature is None else f", its lengths at {self.temperature:g} °C"
         lines = [
@@ -146,7 +146,7 @@ class Calibrated:
 def calibrated(
     model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
 ) -> Calibrated:
-    """Return the calibrated robot of a corrected model.
+    """Calibrated robot of a corrected model.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def calibrated(
 
 
 def _beyond(model: CorrectedModel, temperature: float) -> str:
-    """Say where a temperature lies outside those that were measured."""
+    """Warning where a temperature is outside the measured range."""
     ranges = {} if model.spread is None else model.spread.ranges
     known = [ends for column, ends in ranges.items() if split_name(column)[0] in PER_LINK]
     low, high = min((low for low, _ in known), default=-np.inf), max((high for _, high in known), default=np.inf)
@@ -210,12 +210,12 @@ def _beyond(model: CorrectedModel, temperature: float) -> str:
 
 
 def target_link(tool_frame: str) -> str:
-    """Name of the link (body, site) that is the measured target, where a robot file has one."""
+    """Name of the link (body, site) of the measured target in a robot file."""
     return f"{tool_frame}_target"
 
 
 def calibrated_urdf(robot: Calibrated) -> str:
-    """Return the URDF of the calibrated robot.
+    """URDF of the calibrated robot.
 
     Zeros and placements are put into the origins of the joints between root and tool frame, by which all that follows
     moves with them. The measured target becomes a link of its own, ``<tool_frame>_target``, where it is not the tool
@@ -249,7 +249,7 @@ def calibrated_urdf(robot: Calibrated) -> str:
 
 
 def ur_kinematics(robot: Calibrated) -> str:
-    """Return the kinematics.yaml of the calibrated robot; zeros and placements of joints are in its six origins.
+    """Calibration of a Universal Robots arm as kinematics.yaml; all is in its six joint origins.
 
     A fixed frame before a joint that is displaced counts to that joint's origin. Where the frames behind the last joint
     are displaced, or the target sits elsewhere, the file cannot hold it: the controller's tool does.
@@ -315,7 +315,7 @@ _ANGLES = ("theta", "alpha", "beta", "roll", "pitch", "yaw")
 
 
 def dh_table(robot: Calibrated, convention: Convention = "standard", units: Units | None = None) -> pd.DataFrame:
-    """Return the parameters of Denavit and Hartenberg of the calibrated robot.
+    """Denavit-Hartenberg-Hayati parameters of the calibrated robot.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
     convention
         ``standard`` or ``modified``; the module's docstring has the equation of each.
     units
-        Of the angles and lengths; rad and m where absent.
+        Units of angles and lengths; rad and m by default.
 
     Returns
     -------
@@ -383,7 +383,7 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
 
 
 def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Array, Array]:
-    """Return (4, 4) the base, (M, 5) θ, d, a, α, β of each joint, and (4, 4) the tool; m and rad.
+    """Return the base pose (4, 4), θ, d, a, α, β of each joint (M, 5), and tool pose (4, 4); m and rad.
 
     A common normal has two senses: that of the table ``like``, or that with the distance a not negative.
     """
@@ -412,7 +412,7 @@ def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Ar
 
 
 def link(theta: float, d: float, a: float, alpha: float, beta: float) -> Array:
-    """Denavit-Hartenberg-Hayati transform (4, 4) from one axis to the next: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
+    """Denavit-Hartenberg-Hayati transform (4, 4) between consecutive axes: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
     pose, turned = np.eye(4), _turned(2, theta)
     pose[:3, 3] = turned @ np.array([a, 0.0, d])
     pose[:3, :3] = turned @ _turned(0, alpha) @ _turned(1, beta)
@@ -420,12 +420,12 @@ def link(theta: float, d: float, a: float, alpha: float, beta: float) -> Array:
 
 
 def _turned(axis: int, angle: float) -> Array:
-    """(3, 3) rotation about the x, y or z axis (0, 1, 2)."""
+    """Rotation (3, 3) about the x, y or z axis (0, 1, 2)."""
     return exp3(angle * np.eye(3)[axis])
 
 
 def _first(point: Array, axis: Array) -> Array:
-    """(4, 4) frame on the first axis, z along it: at the foot of the root frame's origin, x as the root's is."""
+    """Frame (4, 4) on the first axis, z along it, at the point nearest to the root frame's origin."""
     frame = np.eye(4)
     along = np.eye(3)[0] if abs(axis[0]) < 1.0 - NEARLY_PARALLEL else np.eye(3)[1]
     x = along - (along @ axis) * axis
@@ -436,7 +436,7 @@ def _first(point: Array, axis: Array) -> Array:
 
 
 def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
-    """(5,) θ, d, a, α, β from a frame on one axis to the axis after it, a point and a direction in the root frame."""
+    """Parameters (5,) θ, d, a, α, β from a frame on one axis to the next axis, a point and a direction."""
     origin = frame[:3, :3].T @ (line[0] - frame[:3, 3])
     axis = frame[:3, :3].T @ line[1]
     across = float(np.hypot(axis[0], axis[1]))
@@ -461,7 +461,7 @@ def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
 
 
 def _last(frame: Array, end: Array) -> Array:
-    """(5,) θ and d of the last joint, which bring its frame to the foot of the target, x turned as the target's is."""
+    """Parameters (5,), θ and d, of the last joint, to the foot of the target with the target's x direction."""
     seen = np.linalg.inv(frame) @ end
     across = seen[:2, 0] if np.linalg.norm(seen[:2, 0]) > NEARLY_PARALLEL else seen[:2, 1]
     return np.array([float(np.arctan2(across[1], across[0])), seen[2, 3], 0.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""Where, which and how far: the answer to a campaign."""
+"""Diagnosis of a campaign: where the gap lies, which effects cause it, how far a correction shrinks it."""
 
 from thermal_robot.diagnosis.diagnose import diagnose
 from thermal_robot.diagnosis.result import Diagnosis

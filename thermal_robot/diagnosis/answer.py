@@ -1,4 +1,4 @@
-"""The diagnosis that a final fit is: gap, findings, places, shrinkage, corrected model, next measurement."""
+"""Diagnosis of a final fit: gap, findings, places, held-out shrinkage, corrected model, next measurement."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.data_checks import cautions
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
+from thermal_robot.diagnosis.gauges import unseen
 from thermal_robot.diagnosis.next_measurement import wanted
 from thermal_robot.diagnosis.residual_tests import Examined
 from thermal_robot.diagnosis.result import Diagnosis
@@ -33,18 +34,19 @@ from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.observables import components, kinds_of, of_model
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
 
 
 def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
-    """Criteria of ISO 9283 of a campaign with repeats, in the frames that the gap is told in; ``None`` without repeats.
+    """ISO 9283 criteria of a campaign with repeats, in the frames of the gap; ``None`` without repeats.
 
-    AP after the correction is of rows while they were held out: all repeats of a pose are held out together, so that no
-    figure is of a pose that the model was fitted to. Every cycle counts, those set aside, too, as the standard has it.
+    AP after the correction is cross-validated: all repeats of a pose are held out together. Every cycle counts,
+    outliers too, as the standard requires.
     """
     campaign = fit.campaign
-    if not repeats(campaign)[0]:
+    if campaign.position is None or not repeats(campaign)[0]:
         return None
     frames, left = fit.nominal.frames, shrinkage.left
     base = frames.base[:3, :3]
@@ -58,7 +60,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
 
 
 def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple[Fit, Shrinkage, tuple[Discovery, ...]]:
-    """Name the laws of a fit anew wherever they stand: the largest held-out share first, those not lasting last."""
+    """Renumber the laws of a fit: by held-out share, the largest first; laws outside the fit last."""
     held = {effect.name for effect, _ in fit.effects}
     names = [name for name in dict.fromkeys(fit.families) if name.startswith(PREFIX)]
     names.sort(key=lambda name: (name not in held, -shrinkage.shares.get(name, (0.0,))[0]))
@@ -84,8 +86,8 @@ def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple
 def prior_sensitivity(fit: Fit) -> Sensitivity:
     """Prior sensitivity: probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
-    The scale of each effect is learnt from the data; where the verdict depends on the stated sizes all the same, the
-    data do not decide. The leading combinations alone are compared.
+    The scale of each effect is estimated from the data; a verdict that still depends on the stated sizes is not decided
+    by the data. Only the leading combinations are compared.
     """
     e = fit.explanation
     problem = e.problem
@@ -107,7 +109,7 @@ class Conclusion:
 
     ``unexplained`` is the residual of the known effects alone, with the place and quantity of the laws that explain it;
     ``left`` that of the whole fit; ``chance`` its random part beyond the instrument's noise; ``refused`` effects that
-    were taken out again; ``misfit`` why nothing can be said of the robot.
+    cross-validation removed; ``misfit`` the mismatch of robot and table, if any.
     """
 
     fit: Fit
@@ -129,10 +131,10 @@ def answer(
     left_out: Sequence[str],
     notes: Sequence[str],
 ) -> Diagnosis:
-    """Put a diagnosis together of the last explanation and its held-out shrinkage.
+    """Build the diagnosis of the last explanation and its held-out shrinkage.
 
-    ``asked`` tells whether the user asked for an effect of this name, systematic or random; ``left_out`` are the names
-    that were left out; ``notes`` say what was left out of the campaign, one sentence each.
+    ``asked`` returns whether the user admits an effect of this name, fixed or random; ``left_out`` are the names that
+    the user excluded; ``notes`` are sentences on the rows and columns left out.
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(fit, last.left, shrinkage)
@@ -141,7 +143,8 @@ def answer(
     held = [effect.name for effect, _ in fit.effects]
     systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in laws}, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    found, harms = _no_surer(by_share(titled((*systematic, *chance), (*candidates, *random_effects()))), gap)
+    every = titled((*systematic, *chance), (*candidates, *random_effects()), of_model(campaign))
+    found, harms = _no_surer(by_share(every), gap)
     groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,
@@ -160,7 +163,7 @@ def answer(
         separates=groups,
         model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *cautions(fit, last.refused, sensitivity)),
+        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *_last_words(fit, last, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
@@ -169,18 +172,24 @@ def answer(
         wanted=wanted(fit, found, groups, remaining, last.unexplained, probability),
         misfit=last.misfit,
         performance=None if last.misfit else criteria(fit, shrinkage),
+        says=", ".join(kind.says for kind, _ in kinds_of(campaign)),
     )
 
 
+def _last_words(fit: Fit, last: Conclusion, sensitivity: Sensitivity) -> tuple[str, ...]:
+    """Return what the readings cannot see, and the cautions of the final fit."""
+    return (*unseen(fit), *cautions(fit, last.refused, sensitivity))
+
+
 def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:
-    """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
+    """Posterior probability of exactly the effects of the fit, the refused ones not at work."""
     exactly = fit.probability_of_just({effect.name for effect, _ in fit.effects})
     exactly = min([exactly, *(1.0 - out.probability for out in refused.values())])
     return exactly if gap.worse is None else min(exactly, settings.DECIDED)
 
 
 def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
-    """Cap the probabilities of what harms rows held out by session or region, and say why."""
+    """Cap the probability of effects that make held-out sessions or regions worse, and give the reason."""
     if gap.worse is None:
         return found, []
     most = settings.DECIDED
@@ -207,10 +216,10 @@ def _gap(fit: Fit, left: Examined, shrinkage: Shrinkage) -> Gap:
 
 
 def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
-    """Model that predicts as a fit does.
+    """Corrected model of a fit.
 
-    ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told
-    how far predictions may be off.
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` omits the predictive
+    uncertainty.
     """
     campaign = fit.campaign
     needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))
@@ -220,7 +229,7 @@ def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
         settings=campaign.settings,
         frames=fit.corrected.frames,
         effects=registered(fit, [(gate.delivered(effect, fit.nominal), values) for effect, values in fit.effects]),
-        measures=campaign.measures,
+        measures="pose" if components(campaign) == 6 else "position",
         needs=needs,
         simulated=campaign.simulated_position is not None,
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),

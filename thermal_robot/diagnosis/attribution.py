@@ -7,8 +7,8 @@ there, in units of the noise:
 
     before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
 
-A constant error that the unknown frames take up as well is a matter of convention, and may be a hundred times what the
-error changes by: it is left out, so that the change can be seen.
+A constant error that the unknown frames also explain is a convention and may be a hundred times the variation: it is
+subtracted.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from thermal_robot.percents import percent
 
 
 def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
-    """Residual of the known effects of a fit, given that of the whole fit, its laws included.
+    """Residual of the known effects of a fit, from the residual of the whole fit with its laws.
 
     What the laws do to the target is added in quadrature, with the unknown frames projected out. The p-value is at most
     the posterior probability that none of a law's rivals is at work.
@@ -120,7 +120,7 @@ def _determination(gap: Array, laws: dict[str, Array]) -> dict[str, float]:
 
 
 def explained(fit: Fit, effect: str) -> Explained:
-    """Tell what one effect of the fit explains at each place, outliers left out; :class:`EffectError` if not in it."""
+    """Partial residuals of one effect of the fit, place by place, without outliers (:class:`EffectError` if absent)."""
     held = {e.name: (e, values) for e, values in fit.effects}
     if effect not in held:
         listed = ", ".join(held) or "no effect"
@@ -167,7 +167,7 @@ def _at(fit: Fit, effect: Effect, place: Location, parameters: list[tuple[Parame
 
 
 def _undetermined(frames: Array, direction: Array, error: Array) -> float:
-    """Return the constant of (n,) errors that nobody knows, and that hides how they change; 0 where there is none.
+    """Constant of (n,) errors that the unknown frames take up; 0 where there is none.
 
     It is known to 1 / |D⊥|, with D⊥ the (n, m) displacement for a unit error beyond the span of (n, m, F) frames, both
     in units of the noise. One that is known worse than the errors differ from each other is left out where all errors
@@ -181,7 +181,7 @@ def _undetermined(frames: Array, direction: Array, error: Array) -> float:
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
-    """(N,) error at a place along its first singular vector, (N, m) displacement of the target per unit, and unit."""
+    """Error (N,) at a place along its first singular vector, displacement (N, m) of the target per unit, and unit."""
     samples, measures = observations.gap.shape
     parts: dict[tuple[Channel, int], Array] = {}
     for parameter, value in parameters:
@@ -211,9 +211,9 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
 
 
 def _driver(observations: Observations, effect: Effect, parameters: list[Parameter], error: Array) -> Driver:
-    """Return the quantity that drives an effect at a place, or else the one that its error follows best.
+    """Quantity that drives an effect at a place, else the quantity with the largest R² of its error.
 
-    That is the one with the least mean variance of the error among rows with neighbouring values.
+    R² is from the mean variance of the error among rows with neighbouring values.
     """
     if known_driver := driver(effect, observations, parameters, error):
         return known_driver
@@ -228,7 +228,7 @@ def _driver(observations: Observations, effect: Effect, parameters: list[Paramet
 
 
 def _line(values: Array, error: Array) -> Array:
-    """(2, k) the fitted law over its quantity; means of neighbouring rows where it depends on others, too."""
+    """Fitted law (2, k) over its quantity; means of neighbouring rows where it depends on other quantities, too."""
     levels = np.unique(values)
     if len(levels) <= FEW_LEVELS:
         return np.array([levels, [error[values == level].mean() for level in levels]])

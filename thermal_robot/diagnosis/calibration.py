@@ -1,4 +1,4 @@
-"""Calibration: effects are named, not selected; their parameters and what they leave are told."""
+"""Calibration: fit of effects that the user names, without model selection."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit_named
+from thermal_robot.observables import components
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
@@ -47,14 +48,14 @@ class Calibrated:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """What named effects are in a robot, and what they leave.
+    """Result of a calibration: parameters of named effects of a robot, and the residual.
 
     Attributes
     ----------
     campaign, robot, tool_frame, samples, measures
-        What was calibrated.
+        Names of campaign, robot and tool frame, number of rows, and kind of measurement.
     names
-        Of the effects that were asked for.
+        Names of the calibrated effects.
     outliers
         Row numbers in the file of the measurements set aside.
     rms_before, rms_after, turned_before, turned_after
@@ -63,7 +64,7 @@ class Calibration:
     noise
         One sigma per axis of positions, as it was estimated beside the effects, m.
     warnings, fit
-        What a reader should know of the data; the fit.
+        Warnings on the data, one sentence each; the fit behind the result.
 
     Examples
     --------
@@ -101,14 +102,14 @@ class Calibration:
 
     @property
     def unexplained(self) -> bool:
-        """Whether what is left is larger, or more structured, than noise: something else is at work."""
+        """Whether the residual is larger, or more structured, than noise."""
         return self._examined.unexplained.flagged
 
     @cached_property
     def effects(self) -> tuple[Calibrated, ...]:
-        """The effects with their parameters: what is told inside a larger one before the rest of that.
+        """Effects with their parameters; an effect contained in a larger one comes before the rest of that.
 
-        Where what is left is :attr:`unexplained`, deviations hold what that may do to parameters, beside the noise.
+        With an :attr:`unexplained` residual, the standard deviations are inflated for it.
         """
         fit = as_remainder_says(self.fit) if self.unexplained else self.fit
         titles = {name: own[0].title for name, own in fit.variants.items()}
@@ -156,9 +157,9 @@ def calibrate(
     *,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Calibration:
-    """Fit named effects and the unknown frames, whether or not the data speak for them; rows far off are set aside.
+    """Fit named effects and the unknown frames without model selection; outlying rows are set aside.
 
-    What is at work, and how sure that is, and faults of the table are asked of :func:`~thermal_robot.diagnose`.
+    Model selection, probabilities and tests of the table are those of :func:`~thermal_robot.diagnose`.
 
     Parameters
     ----------
@@ -204,14 +205,14 @@ def calibrate(
         campaign = read_campaign(campaign)
     if campaign.priors:
         check_priors(campaign, {*library(), *(effect.name for effect in chosen)})
-    if campaign.position is None or not campaign.samples:
+    if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
         fit = fit_named(as_counted(campaign), chosen, progress)
     campaign, e = fit.campaign, fit.explanation
     before, after = (seen.gap[~e.outliers] for seen in (fit.nominal, fit.corrected))
-    poses = campaign.measures == "pose"
+    poses = components(campaign) == 6
     return Calibration(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -235,7 +236,7 @@ _libraries = cache(ThreadpoolController)
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Return the effects that were asked for, each once."""
+    """Effects that were asked for, without duplicates."""
     where, what = "calibrate(), effects", "names of effects, or effects of your own"
     require(where, effects, (str, Effect, list, tuple), what)
     given = (effects,) if isinstance(effects, (str, Effect)) else tuple(effects)

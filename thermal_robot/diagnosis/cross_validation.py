@@ -33,7 +33,7 @@ from thermal_robot.inference.algebra import equations_of, ridge, whitener
 from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import Labels, blocks, each, neighbourhoods
+from thermal_robot.inference.grouping import STAND, Labels, blocks, each, held_together, neighbourhoods
 from thermal_robot.inference.kernels import chunks
 from thermal_robot.inference.problem import Linear, Whitening
 
@@ -43,12 +43,12 @@ Share = tuple[float, tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A linear model whose frames and K parameters can be fitted to any rows by ridge regression.
+    """Ridge regression of frames and K parameters on any subset of the rows.
 
     ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
-    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows on which
-    it is judged; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations count by what
-    is left of each, as where frames are registered, not in the ratio of their noise.
+    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows that count
+    in the score; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations are weighted
+    by their own residuals, as in a registration, and not by their noise.
     """
 
     linear: Linear
@@ -61,7 +61,7 @@ class Model:
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
-        """Return the model of an explanation, not judged by outliers; ``further`` blocks with scales come last."""
+        """Model of an explanation without its outliers; ``further`` blocks with their scales come last."""
         e = explanation
         own = {b: e.held(b) / e.linear.blocks[b].sizes for b in e.best.blocks}
         scales: dict[int, Array | float] = {**own, **(further or {})}
@@ -69,10 +69,10 @@ class Model:
         return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
 
     def partial(self, nominal: Linear, values: Sequence[Array] = ()) -> Model:
-        """Return the model for fits of a part of its effects: linearised at the nominal robot, with a block for each.
+        """Model for fits of subsets of the effects: linearised at the nominal robot, a block for each effect.
 
-        Each is held to the size of its ``values`` in the whole model. What such a fit leaves counts as noise: a smooth
-        discrepancy is small beside it. At the corrected robot frames that are aliases could seem apart, and stretch.
+        The prior size of each is that of its ``values`` in the whole model. The residual counts as noise, which exceeds
+        a smooth discrepancy. At the corrected robot, frames that are exact aliases would seem separable.
         """
         pairs = list(zip(values, nominal.blocks, strict=True))
         sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in pairs]
@@ -105,7 +105,7 @@ class Model:
         return np.asarray(self.whitening.weights > 0)
 
     def products(self, rows: Rows) -> Array:
-        """(G, K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
+        """Gram matrices (G, K + 1, K + 1) Xᵀ V⁻¹ X of columns and gap over some rows with covariance V; cached.
 
         G is two where positions and orientations count apart, else one. Where rows have a smooth discrepancy in common,
         V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
@@ -119,15 +119,46 @@ class Model:
             if smooth is not None:
                 which = np.flatnonzero(self._used)
                 products = products - smooth.taken(used[which], lambda n: self._white(which[n]), settings.UNHEARD)
+            hidden = np.flatnonzero(~self._touched[used].any(axis=0))  # a difference of sums leaves rounding there
+            products[:, hidden], products[:, :, hidden] = 0.0, 0.0
             self._known[key] = products
         return self._known[key]
+
+    @cached_property
+    def _touched(self) -> Rows:
+        """(N, flat) which rows have to do with which of the frames' columns."""
+        return np.asarray((self.linear.frames != 0.0).any(axis=1))
+
+    def alone(self, test: Rows) -> NDArray[np.int64]:
+        """Return the numbers of the frames' columns that only rows held out have to do with: their own artefacts."""
+        others = self._touched[~test & self._used].any(axis=0)
+        return np.flatnonzero(self._touched[test].any(axis=0) & ~others)
+
+    def judged(self, test: Rows) -> Array:
+        """(n, m, K + 1) columns and gap of rows held out, less what artefacts of theirs alone take up of each.
+
+        Where a stand stands is no property of the robot: of a stand held out, its rows are judged by how they spread.
+        """
+        key = test.tobytes()
+        if key not in self._told:
+            found, own = self.linear.stack[test], self.alone(test)
+            if len(own):
+                root = np.sqrt(self.whitening.weights[test])[:, None, None] / self.whitening.sigma(test)[:, :, None]
+                white = equations_of(found * root)
+                found = found - found[:, :, own] @ np.linalg.lstsq(white[:, own], white, rcond=settings.ALIAS)[0]
+            self._told[key] = found
+        return self._told[key]
+
+    @cached_property
+    def _told(self) -> dict[bytes, Array]:
+        return {}
 
     @cached_property
     def _of_all(self) -> Array:
         return self._summed(self._used)
 
     def _white(self, rows: NDArray[np.int64]) -> Array:
-        """(r, m, K + 1) columns and gap of some rows, whitened as if independent."""
+        """Whitened columns and gap (r, m, K + 1) of some rows, as if rows were independent."""
         root = np.sqrt(self.whitening.weights[rows])[:, None] / self.whitening.sigma(rows)
         return np.asarray(self.linear.stack[rows] * root[:, :, None])
 
@@ -143,26 +174,26 @@ class Model:
 
     @cached_property
     def whole(self) -> Array:
-        """(G, K + 1, K + 1) the same over all rows."""
+        """Gram matrices (G, K + 1, K + 1) over all rows."""
         return self.products(np.ones(len(self.block), dtype=bool))
 
     def determines(self, rows: Rows) -> bool:
-        """Tell whether some rows determine as much of the frames as all rows do."""
+        """Tell whether some rows determine as much of the frames as all rows do, but what the others alone share."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
-        return bool(some.shape[1] >= every.shape[1])
+        return bool(some.shape[1] + len(self.alone(~rows)) >= every.shape[1])
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
-        """(k + 1,) numbers of the columns of the frames and of some blocks, and of the gap."""
+        """Numbers (k + 1,) of the columns of the frames, of some blocks and of the gap."""
         gap = np.array([self.whole.shape[1] - 1])
         return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), gap])
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> Array:
-        """(S, k + 1) −θ and 1 by ridge regression on each set of rows; what all rows leave is noise to priors."""
+        """Ridge estimates (S, k + 1), −θ and 1, on each subset of rows; the noise is that of all rows."""
         picked = self.columns(chosen)
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
         whole = self.whole[own]
-        equations = max(int(self._used.sum()) * self.linear.measures, 1) / len(whole)
+        equations = max(int(self._used.sum()) * self.linear.measures - self.whitening.unseen, 1) / len(whole)
         # the gap of the nominal robot is what registration leaves
         variance = np.maximum(whole[:, -1, -1] / equations if self.apart else 0.0, np.full(len(whole), self.variance))
         for _ in range(settings.FOLD_ROUNDS):
@@ -181,25 +212,25 @@ def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A model fitted without each fold, and what it leaves there; ``tests`` are (N,) the rows that each holds out."""
+    """Leave-one-fold-out fits and their residuals on the fold; ``tests`` are the rows (N,) of each fold."""
 
     model: Model
     tests: tuple[Rows, ...]
 
     @classmethod
     def over(cls, model: Model, tests: Sequence[Rows]) -> Walk:
-        """Cross-validate over folds but those without rows, and those without which frames are not determined."""
+        """Cross-validate over all folds that have rows and whose other rows determine the frames."""
         kept = [t for t in tests if (t & model.kept).any() and (~t).sum() > 1]
         return cls(model, tuple(t for t in kept if model.determines(~t)))
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """(1 + B,) how many rows are held out, one in two folds counted twice: of all, and without each block."""
+        """Numbers (1 + B,) of held-out rows, one in two folds counted twice: of all, and without each block of rows."""
         held = np.sum(self.tests, axis=0) * self.model.kept
         return np.append(held.sum(), held.sum() - np.bincount(self.model.block, held)).astype(np.int64)
 
     def squares(self, chosen: Sequence[int]) -> Array:
-        """(1 + B,) held-out sums of squared distances with some blocks, m²: in all, and repeated without each block."""
+        """Held-out sums of squares (1 + B,), m², of a model with some blocks: of all rows, and without each block."""
         model, picked, own = self.model, self.model.columns(chosen), each(self.model.block)
         every = np.ones(len(model.block), dtype=bool)
         fits = model.fits([*(~rows for rows in (*self.tests, *own)), every], chosen)
@@ -209,7 +240,9 @@ class Walk:
         total = np.zeros(1 + len(own))
         for test, fit, resting in zip(self.tests, fits, shared, strict=True):
             judged = test & model.kept
-            left = model.linear.stack[judged, :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
+            left = (
+                model.judged(test)[judged[test], :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
+            )
             squares = (left**2).sum(axis=1)
             squares[np.arange(len(squares)), 1 + model.block[judged]] = 0.0
             total += squares.sum(axis=0)
@@ -217,24 +250,24 @@ class Walk:
 
     def residuals(self, chosen: Sequence[int]) -> Array:
         """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
-        picked, stack = self.model.columns(chosen), self.model.linear.stack
+        picked, stack = self.model.columns(chosen), self.model.judged
         fits = self.model.fits([~test for test in self.tests], chosen)
-        return np.concatenate([stack[test][:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
+        return np.concatenate([stack(test)[:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
 
     @property
     def numbers(self) -> NDArray[np.int64]:
-        """(H,) the number of each row held out, fold after fold, outliers too."""
+        """Row numbers (H,) of the held-out residuals, fold after fold, outliers included."""
         return np.concatenate([np.flatnonzero(test) for test in self.tests])
 
 
 def jackknife(values: Array) -> Array:
-    """(K, K) covariance of K figures, or variance of one, from their (G, K) or (G,) values without each group."""
+    """Jackknife covariance (K, K) of K figures, or variance of one, from (G, K) or (G,) leave-one-group-out values."""
     apart = values - values.mean(axis=0)
     return np.asarray((len(values) - 1) / len(values) * (apart.T @ apart))
 
 
 def share(part: Array, whole: Array) -> Share:
-    """Return what part one sum of squares (1 + B,) is of another, 0 of nothing, with a 95 % interval.
+    """Ratio of two sums of squares (1 + B,), 0 where the second is 0, with its 95 % jackknife interval.
 
     The interval is that of Student's law about ln(1 − part/whole), with the jackknife's variance: one minus a share is
     a ratio of mean squares, so that its logarithm is nearly normal. It is not exact for a handful of blocks.
@@ -252,7 +285,7 @@ def share(part: Array, whole: Array) -> Share:
 
 
 def _half(values: Array) -> float:
-    """Half the width of a 95 % interval of a figure from its (B,) values without each block.
+    """Half width of the 95 % jackknife interval of a figure from its (B,) leave-one-block-out values.
 
     Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance told by B values of kurtosis κ has
     2 B/(κ − 1). A normal law's are about B; where a block or two make up most of the variance, few.
@@ -268,7 +301,7 @@ def _half(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Shrinkage:
-    """Held-out shrinkage of the gap, overall and per effect; all with the noise of the held-out rows in it.
+    """Held-out shrinkage of the gap, overall and per effect; the noise of the held-out rows is included.
 
     ``overall``: rms before and after. ``before`` and ``after`` (N,): distance of each row while it was held out, m, NaN
     where set aside. ``shares`` of the gap's mean square, with 95 % intervals: for an effect of the fit the Shapley
@@ -284,25 +317,26 @@ class Shrinkage:
 
 
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
-    """Cross-validate in blocks of consecutive measurements, one block held out at a time.
+    """Leave-one-block-out cross-validation, blocks being consecutive measurements.
 
-    Frames and parameters come from the training rows alone. What was chosen stays that of all rows: effects, laws,
-    constants, prior scales, the point of linearisation, noise, and outliers. Choosing anew in each fold is further off
-    as an estimate for the model that is saved. The price is that an effect chosen by chance from noise alone seems
-    worth a little; :func:`~thermal_robot.diagnosis.prune.earned` asks for more than that. The intervals are of what
-    fresh rows of the same kind would say of the saved model, noise included. Raises :class:`EstimationError` if all
-    rows repeat one pose.
+    Frames and parameters are refitted to the training rows. The selection stays that of all rows: effects, laws,
+    constants, prior scales, linearisation point, noise, outliers. The estimate is then that of the saved model; an
+    effect selected from noise alone seems to gain a little: :func:`~thermal_robot.diagnosis.prune.earned` requires
+    more. The intervals are those of fresh rows of the same kind under the saved model, noise included. Raises
+    :class:`EstimationError` if all rows repeat one pose.
     """
-    block = blocks(fit.campaign)
+    block, scheme = held_together(fit.campaign)
     count = int(block.max()) + 1
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     progress(f"held out: {count} blocks, one at a time")
     before = replace(fit.before, blocks=tuple(columns(fit.nominal, effect) for effect, _ in fit.effects))
-    return shrinkage(fit.explanation, before, fit.families, block)
+    return shrinkage(fit.explanation, before, fit.families, block, scheme)
 
 
-def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> Shrinkage:
+def shrinkage(
+    explanation: Explanation, before: Linear, families: Sequence[str], block: Labels, scheme: str = "blocked"
+) -> Shrinkage:
     """Cross-validate an explanation, linearised at the corrected model; see :func:`held_out`.
 
     ``before`` is the problem at the nominal robot with the blocks of the best combination, in their order; rows of one
@@ -336,13 +370,13 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     )
     value, interval = share(none - squares(players), none)
     folds = int(block.max()) + 1
-    overall = HeldOut("blocked", folds, before_kept, after_kept, value, interval, before_all, after_all)
+    overall = HeldOut(scheme, folds, before_kept, after_kept, value, interval, before_all, after_all)
     far[~kept] = near[~kept] = np.nan
     return Shrinkage(overall, far, near, shares, after)
 
 
 def _beside(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
-    """Return of each effect outside the model the setting that the evidence likes best beside it, and its scale."""
+    """Most probable setting beside the model, and its scale, of each effect outside the model."""
     best = explanation.best.blocks
     found: dict[int, float] = {}
     for rival in sorted(explanation.combinations, key=lambda c: -c.log_evidence):
@@ -365,7 +399,7 @@ def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
-    """Cross-validate by time, session, temperature, region, reach and range; the largest rms after comes first.
+    """Cross-validate by time, session, temperature, region, reach and range; sorted by rms, the largest first.
 
     Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. A scheme is left out if
     the campaign lacks its column; a fold if its training rows do not determine the frames.
@@ -393,9 +427,10 @@ def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> F
 
 
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
-    """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
+    """Models of the frames alone and of a fit, with the fitted events subtracted from the gap.
 
-    Other rows do not tell what stood elsewhere in a whole session or region: it must be known, as by registering anew.
+    A displacement throughout a held-out session or region cannot be predicted from other rows; in use it is removed by
+    a new registration.
     """
     e = fit.explanation
     events = [(b, effect) for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True) if is_event(effect)]
@@ -410,12 +445,12 @@ def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
 
 
 def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
-    """Return the least favourable scheme where it leaves clearly more than the average; ``None`` where it does not."""
+    """Scheme with the largest held-out rms where that clearly exceeds the average; else ``None``."""
     return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
 
 
 def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
-    """Return the scheme, by session or region, that the correction harms; ``None`` where there is none."""
+    """Scheme, by session or region, in which the correction increases the held-out rms; else ``None``."""
     return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 
@@ -426,6 +461,8 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     session = campaign.labels.get("session")
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
+    if held_together(campaign)[1] == STAND:
+        yield STAND, "one stand after the other", each(held_together(campaign)[0])
     temperature = _temperature(campaign)
     if temperature is not None and np.ptp(temperature) > 0.0:
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)

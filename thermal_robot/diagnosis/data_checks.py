@@ -1,9 +1,8 @@
 """Checks of the data before the diagnosis: rows to leave out, quantities of the wrong sign, and warnings at its end.
 
 Rows were not executed as written where the pose of another command was measured: a robot that waits at a limit, a
-program that is a line behind, an instrument that repeats its last reading. They say nothing of the robot, and nothing
-that is wrong with a robot looks like them. Where so many are behind that the table was paired wrong, that is a fault of
-the data.
+program that is a line behind, an instrument that repeats its last reading. They carry no information on the robot. If
+very many rows are shifted, the table was paired wrongly, which is a data fault.
 
 An elastic joint yields to its load, lost motion stops short, a warm link grows: such parameters have one sign. They are
 fitted once as if they could have either, beside all known effects. A quantity is read with the other sign where it
@@ -65,7 +64,7 @@ STRAIGHT = (
 
 def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out rows whose measured pose is that of another row's command, with a sentence for each run of them."""
-    if campaign.samples <= faults.DRAWN:
+    if campaign.samples <= faults.DRAWN or campaign.position is None:
         return campaign, ()
     order = in_order(campaign)
     readings = Readings.of(campaign).take(order)
@@ -87,7 +86,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
-    """Yield the runs in which the measured place stays that of the row before, or any, while the commands go on."""
+    """Yield runs in which the measured position stays the same while the commands change."""
     k, rows = 0, len(far)
     while k < rows - 1:
         away = np.linalg.norm(readings.position[k + 1 :] - readings.position[k], axis=1)
@@ -100,7 +99,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
 
 
 def _behind(readings: Readings, far: Flags, near: float, frames: Placed) -> Iterator[tuple[Rows, str]]:
-    """Yield the runs, of few of the rows, in which the measured pose belongs to a command some rows away."""
+    """Yield short runs in which the measured pose belongs to the command of a row up to some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)
         shifted = replace(readings, q=readings.q[own])
@@ -113,7 +112,7 @@ def _behind(readings: Readings, far: Flags, near: float, frames: Placed) -> Iter
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out rows that measured nothing, and an orientation that the simulator does not predict; say so."""
+    """Leave out copied rows, marks of missing values, and orientations that the simulator lacks, with notes."""
     notes = []
     simulated = campaign.simulated_position is not None and campaign.simulated_orientation is None
     if campaign.orientation is not None and simulated:
@@ -133,7 +132,7 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def contradicted(campaign: Campaign) -> list[str]:
-    """Return warnings where encoder readings contradict the commands: the log is wrong, not the robot."""
+    """Warnings where encoder readings contradict the commands, so that the log is wrong and not the robot."""
     found = []
     for j, name in enumerate(campaign.robot.joint_names):
         read = campaign.covariates.get(f"encoder.{name}")
@@ -154,7 +153,7 @@ def contradicted(campaign: Campaign) -> list[str]:
 
 
 def as_counted(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
-    """Read with the other sign what counts the other way, and say so first; ``own`` are the user's effects."""
+    """Reverse quantities that were recorded with the opposite sign, with a note; ``own`` are the user's effects."""
     tried: set[str] = set()
     while (quantity := _against(campaign, own, tried)) is not None:
         tried.add(quantity)
@@ -166,7 +165,7 @@ def as_counted(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
 
 
 def _against_gravity(campaign: Campaign) -> Iterator[str]:
-    """Say where reported torques have the sign of none that hold the arm."""
+    """Note on reported torques whose sign is opposite to the holding torque against gravity."""
     robot = campaign.robot
     columns = {j: f"torque.{name}" for j, name in enumerate(robot.joint_names)}
     joints = [j for j, column in columns.items() if column in campaign.covariates]
@@ -185,7 +184,7 @@ def _against_gravity(campaign: Campaign) -> Iterator[str]:
 
 
 def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str | None:
-    """Return the quantity of those not tried that counts the other way most clearly."""
+    """Untried quantity with the strongest evidence of the opposite sign."""
     linear, sides = _linear(campaign, own)
     if not any((names != "").any() for names in sides):
         return None
@@ -196,14 +195,14 @@ def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str 
     against = [q for q, z in _votes(free, sides).items() if q not in tried and _agree(z)]
     if not against:
         return None
-    read, clear = _best(linear, free), {}
+    read, clear = _keeping_signs(linear, free), {}
     weight = bool([*_against_gravity(campaign)])  # that the URDF's masses say so, too, is a witness
     for quantity in against:
         turned = (
             replace(b, source=b.columns * np.where(names == quantity, -1.0, 1.0))
             for b, names in zip(blocks, sides, strict=True)
         )
-        best = _best(replace(linear, blocks=tuple(turned)), free)
+        best = _keeping_signs(replace(linear, blocks=tuple(turned)), free)
         less = best.noise < diagnosis_settings.LEAVES_LESS * read.noise or (quantity == "torque" and weight)
         if less and best.log_evidence - read.log_evidence > diagnosis_settings.INSISTS:
             clear[quantity] = best.log_evidence
@@ -211,7 +210,7 @@ def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str 
 
 
 def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDArray[np.str_]]]:
-    """Return all known effects at the nominal robot, each in its first setting, and what gives each parameter its sign.
+    """Linear problem of all known effects at the nominal robot, and the quantity that gives each parameter its sign.
 
     The latter is the first quantity that is there, empty where a parameter may have either sign.
     """
@@ -230,7 +229,7 @@ def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDA
 
 
 def _votes(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
-    """Return by quantity the z scores of the parameters that have their sign by it."""
+    """Z scores, by quantity, of the parameters whose sign that quantity decides."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():
         deviation = np.sqrt(np.maximum(np.diag(covariance), settings.TINY))
@@ -241,14 +240,14 @@ def _votes(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Ar
 
 
 def _agree(z: Array) -> bool:
-    """Tell whether all parameters that can tell are negative: each for itself, or, where none can, all together."""
+    """Whether all significant z scores are negative, or, where none is, their sum is significantly negative."""
     least = diagnosis_settings.WRONG_SIDE
     sure = z[np.abs(z) > least]
     return bool((sure < 0.0).all() if len(sure) else z.sum() < -least * np.sqrt(len(z)))
 
 
-def _best(linear: Linear, free: Explanation) -> Combination:
-    """Return the best explanation that keeps all signs; rows set aside are heard, as what is denied may do that."""
+def _keeping_signs(linear: Linear, free: Explanation) -> Combination:
+    """Most probable combination whose parameters keep their signs; rows set aside count with their weights."""
     problem = gram(linear, replace(heard(free), smooth=None))
     effects = [item.effect for item in linear.blocks]
     apart = contained(problem) | settings_of_one([effect.name for effect in effects])
@@ -261,7 +260,7 @@ def cautions(
     refused: Mapping[str, Refused] = MappingProxyType({}),
     sensitivity: Sensitivity | None = None,
 ) -> tuple[str, ...]:
-    """Warnings about the diagnosis by its final fit, refused effects and sensitivity to priors; one sentence each."""
+    """Warnings, one sentence each, from the final fit, the refused effects and the sensitivity to priors."""
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
     remains = float(e.whitening.noise[0] * e.best.noise)

@@ -1,4 +1,4 @@
-"""One verb: a campaign goes in, a diagnosis comes out."""
+"""The diagnosis of a campaign."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit, require_enough
 from thermal_robot.inference.scatter import random_gap
+from thermal_robot.observables import of_model
 
 
 def diagnose(
@@ -37,7 +38,7 @@ def diagnose(
     effects: Sequence[Effect] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """Say where the gap between a robot and its model lies, which effects cause it, and how far it shrinks.
+    """Diagnose a campaign: where the gap between robot and model lies, which effects cause it, how far it shrinks.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def diagnose(
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    candidates = choose(only, without, effects)
+    candidates = _asked_of(campaign, choose(only, without, effects))
     # where nothing was left out the candidates are all; installed packages are looked up once
     everything = {effect.name for effect in (*effects, *candidates)}
     if only or without:
@@ -91,7 +92,7 @@ def diagnose(
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
 
-    if campaign.position is None or not campaign.samples:
+    if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     campaign, left = not_executed(campaign)
@@ -113,9 +114,14 @@ def diagnose(
         return diagnosis
 
 
+def _asked_of(campaign: Campaign, effects: Sequence[Effect]) -> Sequence[Effect]:
+    """Return the effects that may be at work: where the rows are a model's word, those that a model holds."""
+    return [effect for effect in effects if effect.in_model] if of_model(campaign) else effects
+
+
 @contextmanager
 def solvable(campaign: Campaign) -> Iterator[None]:
-    """Say in a sentence that equations have no solution in floating point: figures of very different sizes."""
+    """Turn a failure of linear algebra into an :class:`EstimationError` about values of very different sizes."""
     try:
         yield
     except np.linalg.LinAlgError as error:
@@ -145,7 +151,7 @@ def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
 def _concluded(
     campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
+    """Explain the gap, unless robot and table do not match: data faults are tested before faults of the robot."""
     misfit = unfit(campaign, progress)
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
@@ -159,9 +165,9 @@ def _concluded(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Let terms that nobody listed join the known effects, prune by one rule, then ask what is random."""
+    """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
     fit = known
-    for number in range(1, settings.SELECTIONS):
+    for number in range(1, 1 if of_model(known.campaign) else settings.SELECTIONS):
         wider = grown(fit, number, progress)
         if wider is None:
             break
@@ -177,7 +183,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:
-    """Refuse a campaign that states the size of an effect that nobody knows, and say what was probably meant."""
+    """Refuse a campaign that states the prior size of an unknown effect, and suggest the name that was meant."""
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))

@@ -1,4 +1,4 @@
-"""Model selection, told effect by effect: status, posterior probability and estimates of every candidate."""
+"""Status, posterior probability and estimates of every candidate effect."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _NO_SHARE = (0.0, (0.0, 0.0))
 
 @dataclass(frozen=True)
 class Inside:
-    """Estimates of an effect's part of one that was fitted (``container``), or the rest of that.
+    """Estimates of the part of a fitted effect (``container``) that a smaller effect describes, or of its rest.
 
     ``unseen`` are parameters that the data do not tell from those before them, or from the frames.
     """
@@ -43,7 +43,7 @@ class Inside:
 
 
 def told_inside(fit: Fit) -> dict[str, Inside]:
-    """Return by name the effects of the fit that are told in parts, and the parts."""
+    """Fitted effects that are reported in parts, by name, with these parts."""
     found = {}
     for effect, _ in fit.effects:
         for part in divided(fit, effect.name):
@@ -53,18 +53,18 @@ def told_inside(fit: Fit) -> dict[str, Inside]:
 
 
 def estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
-    """Return the estimates of one block of the best combination, in its own parameters."""
+    """Estimates of one block of the best combination in its own parameters."""
     parameters = fit.explanation.linear.blocks[block].parameters
     return _estimates(parameters, fitted_values(fit, block), *_deviations(fit, block))
 
 
 def fitted_values(fit: Fit, block: int) -> Array:
-    """(P,) values of one block of the best combination, as they were refined, SI."""
+    """Refined values (P,) of one block of the best combination, SI."""
     return fit.effects[fit.explanation.best.blocks.index(block)][1]
 
 
 def _deviations(fit: Fit, block: int) -> tuple[Array, Array]:
-    """(P,) posterior and prior standard deviations of one block of the best combination, SI."""
+    """Posterior and prior standard deviations, (P,) each, of one block of the best combination, SI."""
     e = fit.explanation
     return np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0)), e.linear.blocks[block].sizes * e.best.scales[block]
 
@@ -78,9 +78,9 @@ def _estimates(parameters: Iterable[Parameter], values: Array, spread: Array, pr
 
 
 def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
-    """Covariance of the identified parameters of the fit, by (effect, parameter), in the product of their SI units.
+    """Covariance matrix of the identified parameters, by (effect, parameter), in products of SI units.
 
-    Deviations are those of :func:`estimates`, widened to what the remainder says of each effect
+    Deviations are those of :func:`estimates`, inflated for the residual
     (:func:`~thermal_robot.diagnosis.uncertainty.as_remainder_says`); correlations those of the ``joint`` (K, K)
     posterior of all frames and parameters, those of the effects last, frames marginalised.
     """
@@ -99,7 +99,7 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
 
 
 def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
-    """Return a finding for every random effect; none shrinks the gap, as a correction predicts a mean.
+    """Return the finding of every random effect; its shrinkage is 0, since a correction predicts a mean.
 
     Scatter between poses (encoder steps) and scatter between visits (repeatability) are told apart by repeated poses.
     Without repeats, scatter between visits is not testable, and scatter between poses is confounded with it unless the
@@ -144,12 +144,12 @@ def _scatter(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
 
 
 def unknown_frames(fit: Fit) -> tuple[str, ...]:
-    """Return the names of the frame effects whose frame is unknown and therefore fitted."""
+    """Names of the frame effects whose frame is unknown, and hence fitted."""
     return tuple(name for name in FRAMES if gate.missing(named(name), fit.nominal))
 
 
 def within_frames(fit: Fit, block: int) -> bool:
-    """Tell whether the columns of an effect lie in the span of those of the unknown frames."""
+    """Whether the columns of an effect lie in the span of the columns of the unknown frames."""
     item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
     if not linear.frames.size or not item.parameters:
         return False
@@ -158,11 +158,11 @@ def within_frames(fit: Fit, block: int) -> bool:
     return bool(np.linalg.norm(left) < settings.ALIAS * np.linalg.norm(columns))
 
 
-def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
-    """Confounding by posterior probability: by effect of the fit (with its block), those it is confounded with.
+def confounding(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
+    """Confounded effects by posterior probability: for each effect of the fit (with its block) its alternatives.
 
-    That is a known one outside the fit that, fitted anew in its place, is nearly as probable: by more than
-    ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
+    An alternative is a known effect outside the fit. The models with it in place of the effect, and otherwise
+    unchanged, have a posterior probability above ``IN_ITS_PLACE``.
     """
     best, found = frozenset(explained), dict[tuple[str, str], float]()
     for combination, p in zip(fit.explanation.combinations, fit.explanation.probabilities, strict=True):
@@ -185,13 +185,13 @@ def findings(
     laws: Mapping[str, float],
     refused: Mapping[str, Refused],
 ) -> tuple[Finding, ...]:
-    """Return a finding for every candidate; those that are not testable come last.
+    """Return the findings of all candidates, untestable ones last.
 
-    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability that what a
-    discovered law follows, where, is right.
+    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability of the place
+    and quantity of each discovered law.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
-    apart, inside = rivals(fit, explained), told_inside(fit)
+    apart, inside = confounding(fit, explained), told_inside(fit)
     found = []
     for name in dict.fromkeys(fit.families):
         if name in explained:
@@ -216,7 +216,7 @@ def findings(
 
 
 def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
-    """Return the fields of a finding that only a law has, in words, or an effect that is a curve of each joint."""
+    """Fields of a finding that only laws or effects with a curve for each joint have."""
     e, values = fit.explanation, fitted_values(fit, block)
     law, _ = fit.effects[e.best.blocks.index(block)]
     parameters, spread = e.linear.blocks[block].parameters, e.values[block][1]
@@ -236,16 +236,16 @@ def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
 
 
 def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...]:
-    """Return the unknown frames that hold all that an effect outside the fit could do; empty where they do not."""
+    """Unknown frames whose span contains an effect outside the fit; empty where it is not contained."""
     inside = name not in explained and all(within_frames(fit, b) for b in fit.blocks_of(name))
     return unknown_frames(fit) if inside else ()
 
 
-def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Return the findings with titles: that of the effect, or the name of a discovered law."""
+def titled(found: Sequence[Finding], effects: Iterable[Effect], model: bool = False) -> tuple[Finding, ...]:
+    """Return the findings with titles: of the effect, in another ``model`` or the robot, or of a discovered law."""
     known = {effect.name: effect for effect in effects}
     return tuple(
-        replace(f, title=known[f.name].title, random=known[f.name].random)
+        replace(f, title=known[f.name].in_model if model else known[f.name].title, random=known[f.name].random)
         if f.name in known
         else replace(f, title=f.title or f.describes or "")
         for f in found
@@ -253,14 +253,14 @@ def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding
 
 
 def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Sort by held-out share, then by probability; what is not testable comes last."""
+    """Sort findings by held-out share, then by probability; untestable ones last."""
     return tuple(
         sorted(found, key=lambda f: (f.status == "not_testable", -(f.shrinkage or 0.0), -(f.probability or 0.0)))
     )
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """Return the groups of effects that the data cannot tell apart; one with an unknown frame only if it is alone."""
+    """List groups of effects that the data cannot separate; one with an unknown frame only if it is the only one."""
     confounded = [tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded"]
     groups = tuple(dict.fromkeys(confounded))
     return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

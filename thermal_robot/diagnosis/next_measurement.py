@@ -1,4 +1,4 @@
-"""Optimal design of the next measurement: samples that tell the leading explanations apart, or the column that lacks.
+"""Optimal design of the next measurement: samples that discriminate between explanations, or a missing column.
 
 Each leading explanation k is a linear model with a normal posterior, y = A f + Σ_b X_b θ_b + e: what it expects of
 samples S is N(μ_k, V_k), V_k = A_S Σ_k A_S' + noise. Under explanation i, samples S are expected to bring a log Bayes
@@ -55,7 +55,7 @@ def most_informative(
     """Greedy D-optimal Bayesian design beside unknown frames (Chaloner and Verdinelli, *Statistical Science* 10, 1995).
 
     Each choice maximises I(y; θ) = I(y; θ, f) − I(y; f | θ), f the frames: half the difference of two log determinants,
-    given those before. Returned are the candidates, and the information gained so far, nats.
+    given those before. Returns the chosen candidates, and the cumulative information, nats.
 
     ``root`` (K, m, p) and ``frames`` (K, m, f): root of the covariance of what is expected of each candidate's m
     components, in units of the noise, and of its part from the frames, were the parameters known. Of candidates with
@@ -81,7 +81,7 @@ def _log_det(root: Array) -> Array:
 
 
 def _learnt(root: Array, row: Array) -> Array:
-    """(K, m, p) the root once a sample (m, p) was measured: root (1 + row' row)^(−½)."""
+    """Square root (K, m, p) of the covariance after a sample (m, p): root (1 + row' row)^(−½)."""
     if not row.size:
         return root
     _, value, along = np.linalg.svd(row, full_matrices=False)
@@ -107,7 +107,7 @@ class NextSample:
 
 @dataclass(frozen=True, eq=False)
 class NextSamples:
-    """Samples to measure, most informative first.
+    """Designed samples, the most informative first.
 
     ``commands`` are the same as a campaign without measurements, with a value in every column.
     """
@@ -116,7 +116,7 @@ class NextSamples:
     commands: Campaign
 
     def to_list(self) -> list[dict[str, Any]]:
-        """Return the list that stands in the JSON under ``next.samples``."""
+        """List under ``next.samples`` of the JSON."""
         return [
             {
                 "joints": dict(sample.position),
@@ -128,7 +128,7 @@ class NextSamples:
         ]
 
     def to_table(self) -> pd.DataFrame:
-        """Return a table in the campaign's units, with the columns of its file, ``separates`` and ``gain``."""
+        """Return the data frame in the campaign's units with its file's columns, ``separates`` and ``gain``."""
         import pandas as pd
 
         robot, units = self.commands.robot, self.commands.units
@@ -145,7 +145,7 @@ class NextSamples:
 
 
 def next_samples(fit: Fit, count: int = 10, seed: int = 0, loads: Sequence[float] = ()) -> NextSamples:
-    """Choose the samples to measure next from :func:`candidates`; none where none would be informative.
+    """Greedy model discrimination over :func:`candidates`; no samples where none would be informative.
 
     Raises :class:`CampaignError` if ``count`` is no whole number above 0.
     """
@@ -176,7 +176,7 @@ def next_samples(fit: Fit, count: int = 10, seed: int = 0, loads: Sequence[float
 
 
 def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int = 400) -> Campaign:
-    """Draw a pool of samples that could be measured next: a campaign without measurements.
+    """Candidate pool of samples that could be measured next, as a campaign without measurements.
 
     Joint positions are uniform within the limits, and within 2.4 rad for a joint that can turn once round; the
     range of the campaign is always included. Temperatures are the campaign's lowest and highest, and 5 K beyond them,
@@ -236,7 +236,7 @@ def _effects(fit: Fit, combination: Combination) -> Effects:
 
 
 def _leading(fit: Fit) -> tuple[list[Combination], Array]:
-    """Return the leading explanations, each with its most probable settings, and their probabilities."""
+    """Leading explanations with their most probable settings, and their probabilities."""
     e = fit.explanation
     best: dict[Effects, Combination] = {}
     total: dict[Effects, float] = {}
@@ -319,7 +319,7 @@ class _Conditional:
 
 
 def _increase(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
-    """(K,) increase of KL(i, j) by each candidate, as sums of products; ``apart`` is μ_i − μ_j."""
+    """Increase (K,) of the Kullback-Leibler divergence KL(i, j) by each candidate; ``apart`` is μ_i − μ_j."""
     left = apart - j.gain @ apart[list(chosen)].ravel()
     trace = (j.inverse * i.own).sum(axis=(1, 2)) + ((j.inverse @ left[:, :, None])[:, :, 0] * left).sum(axis=1)
     if len(chosen):
@@ -330,7 +330,7 @@ def _increase(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[i
 def _chosen(
     models: Sequence[_Predictive], probability: Array, count: int
 ) -> tuple[list[int], list[tuple[int, ...]], list[float]]:
-    """Choose rows greedily; return them, the explanations that each tells apart best, and the cumulative gain."""
+    """Greedy choice of rows, the pair of explanations that each separates best, and the cumulative gain."""
     number = len(models)
     if number == 1:
         alone, gained = most_informative(models[0].root, models[0].frames, count)
@@ -368,10 +368,10 @@ def wanted(
     laws: Unexplained,
     probability: float,
 ) -> Wanted | None:
-    """Return the next measurement that would help most; ``None`` where the data determine the explanation.
+    """Most useful next measurement; ``None`` where the data determine the explanation.
 
-    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: what the whole fit leaves, and what the
-    known effects leave, which laws may explain; ``probability`` of the explanation.
+    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: residuals of the whole fit, and of the
+    known effects alone; ``probability`` of the explanation.
     """
     if groups:
         group = groups[0]
@@ -390,9 +390,9 @@ def wanted(
 
 
 def _pose(fit: Fit, group: Effects) -> Wanted | None:
-    """Return the sample that tells explanations apart best, or another load where samples with it tell clearly more.
+    """Sample that separates explanations best, or another payload where that separates clearly more.
 
-    ``None`` where no sample tells enough, or tells other effects apart than those of the group.
+    ``None`` where no sample gains enough, or only samples that separate effects outside the group.
     """
     plain = loaded = next_samples(fit)
     if fit.campaign.robot.has_masses and not fit.nominal.varies("payload"):
@@ -409,7 +409,7 @@ def _pose(fit: Fit, group: Effects) -> Wanted | None:
 
 
 def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:
-    """Return the effects that only one of the two explanations has that the first sample tells apart, and the gain."""
+    """Effects of only one of the two explanations that the first sample separates, and the gain."""
     if not samples.samples or len(samples.samples[0].separates) < 2:
         return (), 0.0
     one, other = map(set, samples.samples[0].separates)
@@ -418,7 +418,7 @@ def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:
 
 
 def _column(fit: Fit, found: Sequence[Finding], left: Unexplained) -> Wanted | None:
-    """Return the column that would tell what a remainder is; ``None`` where there is none to record."""
+    """Missing column that would explain a residual; ``None`` where there is none to record."""
     kind, place = next(((p.kind, p.name) for p in left.locations), ("", ""))
     follows = next((d.covariate for d in left.depends_on), "")
     missing = [f for f in found if f.status == "not_testable" and not is_frame(found, f.name)]

@@ -1,4 +1,4 @@
-"""Forward selection of terms that nobody listed, backward elimination of those that rows held out do not bear out."""
+"""Forward selection of unlisted terms, then backward elimination by cross-validation."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from thermal_robot.inference.weights import Noise
 
 
 def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
-    """Forward selection: let terms that nobody listed compete with all known effects; ``None`` if none pays.
+    """Forward selection: add unlisted terms in competition with all known effects; ``None`` if none is selected.
 
-    Terms are generated from what the fit leaves: events, waves of the joints, laws of any quantity at any place. One
-    event or law more joins a fit at a time, as ``discovered.<number>``.
+    Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. One
+    change point or law is added at a time, as ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")
     held = [effect for effect, _ in fit.effects]
@@ -52,7 +52,7 @@ def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
 
 
 def _ripple(fit: Fit) -> JointRipple | None:
-    """Return the ripple that a fit shows, if it is considered and another than the one that it holds."""
+    """Ripple that a fit shows, if it is a candidate and differs from the one in the fit."""
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     found = waves(fit)
@@ -60,9 +60,9 @@ def _ripple(fit: Fit) -> JointRipple | None:
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
-    """Return the residual of the known effects with the places and quantities of the laws that explain it.
+    """Residual of the known effects, with the places and quantities of the laws that explain it.
 
-    Where none does, and the discrepancy errs anew at one place in every pose or visit, that is the place.
+    Without laws, the place is that of a per-pose or per-visit discrepancy, if any.
     """
     form = discrepancy.form
     if not found and left.flagged and form is not None and form.anew and form.place[0]:
@@ -90,9 +90,9 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
 def beside_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Choose among the effects of a fit again, with the joints' scatter (``chance``) in the covariance of the noise.
+    """Repeat the model selection with the joints' scatter (``chance``) in the covariance of the noise.
 
-    Effects and laws that the scatter had imitated are then no longer in the fit.
+    Effects and laws that only fitted the scatter then drop out.
     """
     e = fit.explanation
     scatter, sensitivity = chance.scatter, fit.corrected.joint_sensitivity
@@ -121,7 +121,7 @@ def beside_scatter(
 
 
 def concluded(fit: Fit, left: Examined, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
-    """Return what is concluded of a fit: its laws are told apart from what its known effects explain."""
+    """Conclusion of a fit: discovered laws are separated from what known effects explain."""
     laws = discovered(fit)
     unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)
@@ -129,7 +129,7 @@ def concluded(fit: Fit, left: Examined, chance: RandomGap, refused: Mapping[str,
 
 @dataclass(frozen=True)
 class Gained:
-    """Held-out log predictive density that one effect brings under one scheme of holding rows out.
+    """Held-out log predictive density of one effect under one cross-validation scheme.
 
     ``nats`` is its gain over all rows held out, with its 95 % ``interval``; ``share`` is 1 − (rms with it / rms without
     it)² of these rows, noise included.
@@ -146,7 +146,7 @@ _NOT_ASKED = Gained("time", 0.0, 0.0, (-np.inf, np.inf))
 
 @dataclass(frozen=True)
 class Earned:
-    """What one effect of a fit brings on rows held out, all others fitted anew without it.
+    """Cross-validation of one effect against the refitted model without it.
 
     ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme with the smallest upper bound.
     """
@@ -156,32 +156,31 @@ class Earned:
 
     @property
     def clearly(self) -> bool:
-        """Whether rows held out are clearly worse with it."""
+        """Whether the held-out predictive density is significantly lower with the effect."""
         return self.hardest.interval[1] < 0.0
 
     @property
     def harms(self) -> bool:
-        """Whether rows held out are worse with it."""
+        """Whether the held-out predictive density is lower with the effect."""
         return self.blocked.nats < 0.0 or self.clearly
 
     @property
     def helps(self) -> bool:
-        """Whether rows held out are clearly better with it."""
+        """Whether the held-out predictive density is significantly higher with the effect."""
         return self.blocked.interval[0] > 0.0 and not self.harms
 
 
 def earned(fit: Fit) -> dict[str, Earned]:
-    """Cross-validate every effect and law of a fit: paired differences of log predictive densities of rows held out.
+    """Cross-validate every effect and law of a fit: paired differences of held-out log predictive densities.
 
     The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
     components in units of the noise (Vehtari, Gelman and Gabry, *Statistics and Computing* 27, 2017, on elpd and its
-    standard error): no few rows decide. The standard error is that of the sums over blocks of consecutive rows, the
-    quantile Student's. Something that acts within one block alone cannot earn its word, as no other rows tell of it.
+    standard error): robust to a few rows. The standard error is that of the sums over blocks of consecutive rows, the
+    quantile Student's. An effect within a single block gains nothing, as other rows do not predict it.
 
     Beside blocks, rows are held out by condition, by region, and at the ends of each joint's range. There, effects that
-    compensate each other over the range measured fall apart: of four series of one robot, gains and periodic errors of
-    ten times the size of the others carried over to no other. An event says nothing of rows held out with all that it
-    did, as a session or the warmest rows, and is asked in blocks of consecutive rows alone.
+    compensate each other only within the measured range fail. Events are tested in blocks of consecutive rows alone,
+    since a whole session held out contains all that an event did.
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
@@ -222,12 +221,12 @@ def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) 
 
 
 def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
-    """Backward elimination by cross-validation: take terms out until all that stay obey one rule.
+    """Backward elimination by cross-validation until every remaining term obeys one rule.
 
-    An effect or a law stays where it is nine times as probable as nothing in its place, predicts rows held out no worse
-    (a law, but an event: clearly better), and something of it is determined. All that clearly harm go at once, as they
-    may compensate each other; of the rest that do not obey, one after another, the one goes first that brings rows held
-    out least. Refused, by name: its probability, and its share where rows held out speak against it.
+    The rule: posterior odds of at least nine against nothing in its place, a held-out density that is not lower (of a
+    law, but no event: significantly higher), and at least one determined direction. All significantly harmful terms are
+    removed at once, as they may compensate each other; the others one at a time, the smallest held-out gain first. Also
+    returns the removed effects by name.
     """
     refused: dict[str, Refused] = {}
     exact = True
@@ -243,7 +242,7 @@ def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Re
 
 
 def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
-    """Return the terms that go next, of those that do not obey the rule, and what speaks against each."""
+    """Terms to remove next, which do not obey the rule, with the reason for each."""
     table = earned(fit)
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
@@ -264,10 +263,10 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
 
 
 def in_place(fit: Fit) -> dict[str, float]:
-    """Return by name the odds of each effect and law against nothing in its place; of a law also against its rivals.
+    """Posterior odds of each effect and law against nothing in its place; of a law also against its alternatives.
 
-    What others could do in its place does not count: two of which one is at work are told as confounded. A law says
-    what it follows, and where: it is no surer than that.
+    Alternatives of an effect do not count here: they are reported as confounded. The odds of a law include those of its
+    place and quantity.
     """
     odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
     told = {d.law.name: d.probability for d in discovered(fit)}
@@ -275,9 +274,9 @@ def in_place(fit: Fit) -> dict[str, float]:
 
 
 def determined(fit: Fit) -> set[str]:
-    """Return the effects and laws of a fit of which the data determine something.
+    """Effects and laws of a fit of which the data determine at least one direction.
 
-    Along one principal axis of its posterior at least, less than half of the prior's standard deviation is left.
+    Determined means that the posterior standard deviation is below half the prior's along some principal axis.
     """
     e, found = fit.explanation, set()
     for b in e.best.blocks:
@@ -289,9 +288,9 @@ def determined(fit: Fit) -> set[str]:
 
 
 def _refused(judged: Earned) -> Refused:
-    """Return what rows held out say of an effect: its probability, from its prior and their density, and its share.
+    """Cross-validation result of a removed effect: probability from its prior and held-out densities, and share.
 
-    The probability is at most the prior's: blocks of rows that speak for an effect do not outweigh what refuses it.
+    The probability is at most the prior's, whatever other blocks of rows gain.
     """
     said = judged.hardest if judged.clearly else judged.blocked
     return Refused(float(expit(log_odds() + min(judged.blocked.nats, 0.0))), said.share)

@@ -28,7 +28,7 @@ from thermal_robot.percents import percent
 
 
 class Outcome(NamedTuple):
-    """Result of a test: p-value, what is said where it fails, and the ``share`` of the residual that is no noise."""
+    """Result of a test: p-value, sentence if it fails, and the ``share`` of the residual that is not noise."""
 
     p: float = 1.0
     reason: str = ""
@@ -37,29 +37,32 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """Residual of the rows that are no outliers, in units of the estimated noise, all fitted columns projected out."""
+    """Studentised residual without outliers: divided by the noise, all fitted columns projected out."""
 
     rows: NDArray[np.int64]
     target: Target
 
     @property
     def white(self) -> Array:
-        """(N, m) residual over the noise."""
+        """Residual (N, m) divided by the noise."""
         return self.target.white.reshape(len(self.rows), -1)
 
     def some(self, count: int) -> Residual:
-        """Return a random subset of rows with the fitted columns projected out again; all rows if there are fewer."""
+        """Random subset of the rows with the fitted columns projected out again; all rows if there are fewer."""
         if len(self.rows) <= count:
             return self
         drawn = np.sort(np.random.default_rng(settings.TEST_SEED).choice(len(self.rows), count, replace=False))
         m = self.white.shape[1]
         basis, _ = np.linalg.qr(self.target.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
         white = without(self.white[drawn].ravel(), basis)
-        return Residual(self.rows[drawn], Target(white, self.target.root[drawn], basis))
+        return Residual(
+            self.rows[drawn],
+            Target(white, self.target.root[drawn], basis, round(self.target.unseen * count / len(self.rows))),
+        )
 
 
 def residual(fit: Fit) -> Residual:
-    """Return the residual of a fit of frames and effects without priors, so that tests on it are exact."""
+    """Least-squares residual of frames and effects without priors, so that tests on it are exact."""
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)
     own = (e.linear.blocks[b] for b in e.best.blocks)
@@ -69,12 +72,13 @@ def residual(fit: Fit) -> Residual:
     basis = orthonormal(design.reshape(root.size, design.shape[2]))
     # of the exact model, not the linear one: where effects are large and noise is small they differ
     gap = (fit.corrected.gap[rows] * root).ravel()
-    return Residual(rows, Target(without(gap, basis), root, basis))
+    unseen = 0 if e.whitening.seen is None else int((3 - e.whitening.seen[rows]).sum())
+    return Residual(rows, Target(without(gap, basis), root, basis, unseen))
 
 
 @dataclass(frozen=True)
 class Repeats:
-    """Noise from near-repeats: number of pairs, mean square over the estimated noise², sigma of position, m."""
+    """Pure error from near-repeats: number of pairs, mean square over the estimated noise², sigma of position, m."""
 
     pairs: int
     scale2: float
@@ -82,7 +86,7 @@ class Repeats:
 
 
 def repeats(fit: Fit, left: Residual) -> Repeats | None:
-    """Estimate the noise from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs."""
+    """Pure error from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs."""
     distance, neighbour = nearest(fit.campaign.q[left.rows], 1)
     close = np.flatnonzero(distance[:, 0] < settings.NEAR)
     pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
@@ -95,7 +99,7 @@ def repeats(fit: Fit, left: Residual) -> Repeats | None:
 
 
 def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return distances and indices (N, count) of the nearest other points; a point is never its own neighbour."""
+    """Distances and indices (N, count) of the nearest neighbours, without the point itself."""
     from scipy.spatial import cKDTree
 
     distance, number = cKDTree(points).query(points, k=count + 1)
@@ -107,7 +111,7 @@ def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
 
 @dataclass(frozen=True)
 class Examined:
-    """Whether the residual is noise, and where it enters and what it follows.
+    """Residual analysis: whether the residual is noise, where it enters and what it follows.
 
     ``floor``: one sigma per axis of instrument and repeatability together, m, by its ``source``: ``stated``,
     ``repeats``, ``scatter`` or ``remainder``.
@@ -119,12 +123,12 @@ class Examined:
 
 
 def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Examined:
-    """Test whether the residual is noise.
+    """Residual analysis of a fit: several tests for noise with Bonferroni correction.
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
     of recorded quantities, and whether the rows set aside are too many, follow each other, or have something in common.
-    Only the first asks for more than the stated noise by a margin. Rows set aside count in the unexplained rms where
-    they are no gross errors.
+    Only the first has a margin over the stated noise. Outliers count in the unexplained rms unless they are gross
+    errors.
     """
     left, noise = residual(fit), float(fit.explanation.whitening.noise[0])
     again, white = repeats(fit, left), left.white
@@ -133,7 +137,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     known = {"stated": fit.campaign.noise_position, "repeats": of_repeats, "remainder": rms / float(np.sqrt(3.0))}
     source, floor = next((name, sigma) for name, sigma in known.items() if sigma is not None)
     progress("remainder: size and neighbours")
-    rest = [_too_large(fit, left), _lack_of_fit(left, again), _neighbours(fit, left)]
+    rest = [_too_large(fit, left), _lack_of_fit(left, again), _autocorrelation(fit, left)]
     progress("remainder: places and quantities")
     law, locations, depends = _laws(fit, left)
     rest, aside = [*rest, law], [_in_a_row(fit), too_many(fit, left), alike(fit)]
@@ -184,8 +188,8 @@ def _lack_of_fit(left: Residual, again: Repeats | None) -> Outcome:
     return Outcome(p, f"what remains is {times} what {again.pairs} pairs of repeated commands differ by")
 
 
-def _neighbours(fit: Fit, left: Residual) -> Outcome:
-    """Permutation test of the correlation of neighbours' residuals, in joint space and in time."""
+def _autocorrelation(fit: Fit, left: Residual) -> Outcome:
+    """Permutation test of the autocorrelation of the residual, in joint space and in time."""
     q = fit.campaign.q[left.rows]
     q = q[:, q.std(axis=0) > settings.ROUNDING]
     white = left.white / np.sqrt((left.white**2).mean(axis=0) + settings.TINY)
@@ -210,7 +214,7 @@ def _neighbours(fit: Fit, left: Residual) -> Outcome:
 
 
 class LawTest(NamedTuple):
-    """A smooth law of one quantity at one place, kind and name, and how much of the residual it explains."""
+    """F test of a smooth law of one quantity at one place, with the share of the residual that it explains."""
 
     place: tuple[str, str]
     quantity: str
@@ -262,7 +266,7 @@ def _smooth_laws(observations: Observations, left: Residual) -> Iterator[LawTest
 
 
 def _in_a_row(fit: Fit) -> Outcome:
-    """P-value that so many outliers are consecutive by chance, as rows after a change are and gross errors are not."""
+    """P-value of so many consecutive outliers by chance: a change gives runs of them, gross errors do not."""
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
     follow = int((aside[1:] & aside[:-1]).sum())
@@ -275,9 +279,9 @@ def _in_a_row(fit: Fit) -> Outcome:
 
 
 def too_many(fit: Fit, left: Residual) -> Outcome:
-    """Binomial test whether so many rows are gross errors, which are few and do not care for pose or load.
+    """Binomial test of the number of outliers against the rate of gross errors.
 
-    Instruments spoil :data:`~thermal_robot.inference.settings.SPOILT` of the rows at most. Where the tails of the other
+    The rate of gross errors is at most :data:`~thermal_robot.inference.settings.SPOILT`. Where the tails of the other
     rows are heavier than normal, the share that Student's law sets aside is added.
     """
     count, samples = int(fit.explanation.outliers.sum()), len(fit.explanation.outliers)
@@ -289,7 +293,7 @@ def too_many(fit: Fit, left: Residual) -> Outcome:
 
 
 def _share_of_tails(left: Residual, samples: int) -> float:
-    """Share of the rows that a multivariate Student law sets aside; 0 where the kurtosis is that of a normal law."""
+    """Share of rows beyond the outlier limit under a multivariate Student law; 0 where the kurtosis is normal."""
     squares = left.white**2
     excess = float((squares**2).mean() / max(float(squares.mean()) ** 2, settings.TINY)) - 3.0
     # variance of the kurtosis of a normal sample: 24/n
@@ -302,10 +306,10 @@ def _share_of_tails(left: Residual, samples: int) -> float:
 
 
 def alike(fit: Fit) -> Outcome:
-    """Scan test whether the rows set aside lie together in a quantity: beyond a value, or between two.
+    """Scan test whether the outliers cluster in a quantity: beyond a value, or between two.
 
-    Given that the ends of such a range are rows set aside, how many of the others lie within has a hypergeometric law
-    where rows are set aside whatever their quantity. Both the ranges and the quantities are counted (Bonferroni).
+    Given that a range ends at two outliers, the number of other outliers within is hypergeometric under the null
+    hypothesis. Both the ranges and the quantities are counted (Bonferroni).
     """
     aside = fit.explanation.outliers
     count = int(aside.sum())
@@ -318,7 +322,7 @@ def alike(fit: Fit) -> Outcome:
 
 
 def scan_test(values: Array, aside: NDArray[np.bool_]) -> float:
-    """Return the p-value, all ranges counted, that the rows set aside lie together in a quantity (N,) by chance."""
+    """P-value of the scan statistic, corrected for all ranges, of outliers that cluster in a quantity (N,)."""
     own = np.sort(values[aside])
     count, samples = len(own), len(values)
     ordered = np.sort(values)
@@ -336,7 +340,7 @@ def scan_test(values: Array, aside: NDArray[np.bool_]) -> float:
 
 
 def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: int) -> Array:
-    """Hypergeometric probability that of ``drawn`` of ``total`` rows at least ``held`` are among ``good`` ones."""
+    """Hypergeometric upper tail: at least ``held`` of ``drawn`` from ``total`` rows are among the ``good`` ones."""
 
     def log_choose(n: Any, k: Any) -> Any:
         return -np.log1p(n) - betaln(n - k + 1.0, k + 1.0)
@@ -348,9 +352,9 @@ def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: i
 
 
 def _asked(observations: Observations) -> dict[str, Array]:
-    """Return by name, in words, what rows may be set aside for: all quantities, torques, and approach times torque.
+    """Quantities over which outliers may cluster, with words for each: all recorded, torques, approach times torque.
 
-    The last tells where a joint is pressed against the side from which it came, and where against the other.
+    The product's sign tells whether gravity presses a joint towards the side from which it came.
     """
     found = quantities(observations)
     torques = () if observations.torque is None else observations.torque.T

@@ -1,4 +1,4 @@
-"""The result of a diagnosis: one frozen value, its tables and its JSON.
+"""The diagnosis as one frozen value, its tables and its JSON.
 
 This module knows nothing of reports: whoever is registered in :mod:`thermal_robot.teller` puts it into words.
 """
@@ -47,13 +47,13 @@ SCHEMA = "thermal-robot/diagnosis/2"
 
 
 def told(diagnosis: Diagnosis) -> Diagnosis:
-    """Return the diagnosis with its summary and advice."""
+    """Diagnosis with its summary and advice in words."""
     teller = registered()
     return replace(diagnosis, summary=teller.headline(diagnosis), advice=teller.advice(diagnosis))
 
 
 def estimate_table(estimates: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
-    """Return estimates, each with the name of its effect, as a table; NaN where the data do not identify one.
+    """Estimates as a data frame with the names of their effects; NaN where a parameter is not identified.
 
     Index (effect, parameter); columns ``value``, ``std`` (one sigma), ``unit`` and ``identified``.
     """
@@ -67,7 +67,7 @@ def estimate_table(estimates: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
 
 
 def frame_table(model: CorrectedModel) -> pd.DataFrame:
-    """Where the robot stands and where the target sits, as they were declared or fitted.
+    """Poses of base and target as a data frame, as declared or fitted.
 
     Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns ``x``
     ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF; NaN for a target of which positions alone
@@ -85,12 +85,13 @@ def frame_table(model: CorrectedModel) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
-    """Where the gap lies, which effects cause it, how far it shrinks.
+    """Result of a diagnosis: where the gap lies, which effects cause it, how far a correction shrinks it.
 
     Attributes
     ----------
     campaign, robot, tool_frame, samples, measures, joint_names, reach
-        What was diagnosed; movable joints, root to tool; diagonal of the measured volume, m.
+        Names of campaign, robot and tool frame, number of rows, kind of measurement; joints, root to tool; diagonal of
+        the measured volume, m.
     outliers, left_out
         Row numbers in the file of the measurements set aside; names of the effects left out by request.
     gap, effects, where, unexplained, rows
@@ -112,6 +113,8 @@ class Diagnosis:
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     performance
         Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
+    says
+        What its rows say, for a reader.
 
     Examples
     --------
@@ -154,6 +157,7 @@ class Diagnosis:
     fit: Fit | None = None
     misfit: Misfit | None = None
     performance: Performance | None = None
+    says: str = ""
 
     @property
     def usable(self) -> bool:
@@ -162,11 +166,11 @@ class Diagnosis:
 
     @property
     def reason(self) -> str:
-        """What is wrong with the table, and which remedy fits; empty where it is usable."""
+        """What is wrong with the table, and the remedy; empty where it is usable."""
         return "" if self.usable else f"{self.summary} {self.advice}"
 
     def explain(self, effect: str) -> Any:
-        """Draw the residual with and without one effect, against the quantity that drives it, place by place.
+        """Draw partial residuals of one effect, place by place: with and without it, over the quantity that drives it.
 
         Returns a :class:`matplotlib.figure.Figure`; raises :class:`EffectError` if the fit does not hold the effect.
 
@@ -180,7 +184,7 @@ class Diagnosis:
         return registered().explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
-        """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them.
+        """Optimal design: samples that best separate the leading explanations.
 
         Examples
         --------
@@ -193,7 +197,7 @@ class Diagnosis:
         return next_samples(self._fitted(), count)
 
     def update(self, rows: Campaign | pd.DataFrame) -> Updated:
-        """Add new rows of the same robot, in time that does not grow with the number of old ones (docs/update.md).
+        """Update with new rows of the same robot, in time independent of the number of old rows (docs/update.md).
 
         Effects, settings and places stay; all else is that of a fresh fit of them to all rows. Rows may be a campaign
         of the same robot and kind, or a table of its columns. :class:`CampaignError` says what does not fit.
@@ -215,7 +219,7 @@ class Diagnosis:
         return self.fit
 
     def arm(self, rows: ArrayLike) -> Arm | None:
-        """Return how the arm stood in some of :attr:`rows`, with the shares of its places, for a drawing.
+        """Link poses in some of the :attr:`rows`, with the shares of the arm's places, for a drawing.
 
         ``rows`` (R,) are positions in :attr:`rows`, from 0 on. ``None`` where nothing is known of places: this
         diagnosis is not usable, or was made without its fit.
@@ -234,7 +238,7 @@ class Diagnosis:
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Parameters of all effects that are told, SI, in the order of the findings.
+        """Parameters of all reported effects as a data frame, SI, in the order of the findings.
 
         ``status`` of the effect and the columns of :func:`~thermal_robot.diagnosis.result.estimate_table`.
         """
@@ -244,7 +248,7 @@ class Diagnosis:
 
     @property
     def residuals(self) -> pd.DataFrame:
-        """Gap and remainder by ``row``, the number in the file, in the root frame's axes.
+        """Gap and residual as a data frame by ``row``, the row number in the file, in root frame axes.
 
         Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx`` ``.ry`` ``.rz`` in rad, the turn of
         several targets in the axes of their common frame; ``held_out.before`` and ``held_out.after``, distance in m
@@ -279,7 +283,7 @@ class Diagnosis:
 
     @property
     def narrowed(self) -> bool:
-        """Whether effects were left out by request."""
+        """Whether the user restricted the candidate effects."""
         return bool(self.left_out)
 
     def finding(self, effect: str) -> Finding:
@@ -298,7 +302,7 @@ class Diagnosis:
         return of_effect({f.name: f for f in self.effects}, effect)
 
     def title(self, effect: str) -> str:
-        """Return an effect's name in plain words.
+        """Name of an effect in plain words.
 
         Examples
         --------
@@ -309,7 +313,7 @@ class Diagnosis:
         return own or effect.replace("_", " ")
 
     def is_frame(self, effect: str) -> bool:
-        """Tell whether an effect displaces a frame that is unknown.
+        """Whether an effect is the displacement of an unknown frame.
 
         Examples
         --------
@@ -319,7 +323,7 @@ class Diagnosis:
         return is_frame(self.effects, effect)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/diagnosis/2``.
+        """JSON object of the format ``thermal-robot/diagnosis/2``.
 
         Examples
         --------
@@ -368,7 +372,7 @@ class Diagnosis:
         return [] if self.fit is None or not self.usable else self.next_samples().to_list()
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all.
+        """Write :meth:`to_dict` to a file by an atomic replace.
 
         Examples
         --------

@@ -1,17 +1,17 @@
-"""Sequential estimation: a choice of effects fitted to old rows, most of them as sums, and to new ones.
+"""Sequential estimation of a fixed choice of effects: old rows as sufficient statistics, new rows one by one.
 
 A diagnosis alternates between weights, noise, prior scales and parameters while it chooses, and ends where the choice
 no longer changes. Here nothing is chosen, and the iteration goes on to its fixed point, so that old rows and new ones
 in whatever order, and one batch or many, end at the same place.
 
-Rows enter as sufficient statistics where a trust region allows.
-A row counts in full unless it stands in the tail (Huber 1964), and the noise, where none is stated, is told by the
-median of the residuals. So a row bears on the fit by its products alone as long as it crosses neither the bend of its
-weight nor the median. With J_i the row's columns in units of the noise, and any positive A, a step δ of the parameters
-moves it by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and Schwarz), and where A is that of all N rows, by √(δᵀAδ/N) in
-the root mean square. Rows that might reach the bend at most, or the median by a few root mean squares, are kept one by
-one; the others are summed. One that crosses the median all the same moves the noise by 1/N of itself, and with it
-nothing but the weights in the tail. Where noise is stated, and no more than it remains, the median bears on nothing.
+Rows enter as sufficient statistics where a trust region allows. A row counts in full unless it stands in the tail
+(Huber 1964), and the noise, where none is stated, is told by the median of the residuals. So a row enters the fit by
+its products alone while it crosses neither Huber's threshold nor the median. With J_i the row's columns in units of the
+noise, and any positive A, a step δ of the parameters moves it by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and
+Schwarz), and where A is that of all N rows, by √(δᵀAδ/N) in the root mean square. Rows that could cross the threshold,
+or come within a few root mean squares of the median, are kept one by one; the others are summed. A row that crosses the
+median all the same changes the noise by 1/N, which affects only the weights in the tail. With a stated noise that the
+residual does not exceed, the median has no effect.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from thermal_robot.observations import Frames
 
 
 class Point(NamedTuple):
-    """Frames, and the (P,) values of all parameters, SI, at which rows are linearised."""
+    """Linearisation point: frames, and the (P,) values of all parameters, SI."""
 
     frames: Frames
     values: Array
 
 
 class Judge(NamedTuple):
-    """The diagnosis's model, by which new rows are weighed: (m,) one sigma of its residual, m and rad, its rows."""
+    """Model of the diagnosis that weights new rows: point, (m,) one sigma of its residual, m and rad, row count."""
 
     point: Point
     sigma: Array
@@ -59,11 +59,11 @@ class Judge(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The model that a diagnosis selected: P parameters of effects with their prior sizes, and the stated noise.
+    """Model that a diagnosis selected: P parameters of effects with their prior sizes, and the stated noise.
 
-    ``blocks`` are without columns; ``rivals`` are further effects of combinations that were nearly as probable;
-    ``measures`` is m, 3 for positions, 6 for poses. With a ``judge`` rows keep the weight that they had, and new ones
-    get theirs by the model of the diagnosis; without, every row is weighed by its distance from the present model.
+    ``blocks`` are without columns; ``rivals`` are further effects of the alternative combinations; ``measures`` is m, 3
+    for positions, 6 for poses. With a ``judge`` old rows keep their weights, and new rows are weighted by the model of
+    the diagnosis; without, all rows are reweighted by the present model.
     """
 
     blocks: tuple[Block, ...]
@@ -73,56 +73,57 @@ class Choice:
     judge: Judge | None
 
     def listed(self, rivals: bool) -> tuple[Block, ...]:
-        """Return the chosen blocks, and the rivals if they are asked for."""
+        """Chosen blocks, followed by the alternatives if ``rivals``."""
         return (*self.blocks, *self.rivals) if rivals else self.blocks
 
     def split(self, values: Array) -> list[tuple[Effect, Array]]:
-        """Return each chosen effect with its part of (P,) values."""
+        """Chosen effects, each with its part of the (P,) values."""
         parts = np.split(values, np.cumsum([len(item.sizes) for item in self.blocks], dtype=int))
         return [(item.effect, own) for item, own in zip(self.blocks, parts, strict=False)]  # no value is left over
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Measured rows (n,) with their robust weights, 0 where set aside, and which are."""
+class WeightedRows:
+    """Measured rows with robust weights (n,), 0 where set aside, and the mask of those."""
 
     campaign: Campaign
     weights: Array
     aside: NDArray[np.bool_]
 
     @classmethod
-    def weighed(cls, choice: Choice, campaign: Campaign) -> Rows:
-        """Weigh new rows by the diagnosis's model; in full where each fit weighs them anew."""
+    def weighed(cls, choice: Choice, campaign: Campaign) -> WeightedRows:
+        """Robust weights of new rows from the diagnosis's residual scale; 1 where each fit reweights them."""
         distance2, limit = np.zeros(campaign.samples), np.inf
         if choice.judge is not None and campaign.samples:
             point, sigma, rows = choice.judge
-            distance2 = ((residual(campaign, point, choice) / sigma) ** 2).sum(axis=1)
+            distance2 = ((relative_residual(campaign, point, choice) / sigma) ** 2).sum(axis=1)
             limit = distance_limit(choice.measures, rows)
         aside = distance2 > limit
         return cls(campaign, np.where(aside, 0.0, tail_weight(distance2, choice.measures)), aside)
 
     @classmethod
-    def joined(cls, *batches: Rows) -> Rows:
-        """Return several batches as one."""
+    def joined(cls, *batches: WeightedRows) -> WeightedRows:
+        """Concatenate batches of rows."""
         weights, aside = ([getattr(one, name) for one in batches] for name in ("weights", "aside"))
         return cls(appended([one.campaign for one in batches]), np.concatenate(weights), np.concatenate(aside))
 
-    def take(self, which: NDArray[np.int64] | NDArray[np.bool_] | slice) -> Rows:
+    def take(self, which: NDArray[np.int64] | NDArray[np.bool_] | slice) -> WeightedRows:
         """Return some of the rows."""
         numbers = np.arange(len(self.aside))[which]
-        return Rows(self.campaign.take(numbers), self.weights[numbers], self.aside[numbers])
+        return WeightedRows(self.campaign.take(numbers), self.weights[numbers], self.aside[numbers])
 
     @property
     def kept(self) -> Array:
-        """(n, 1) or (n, m) square of each row's relative noise, 0 where set aside: turns products into m² and rad²."""
+        """Squared relative noise (n, 1) or (n, m) of each row, 0 where set aside: turns products into m² and rad²."""
         relative = self.campaign.relative_noise
         return np.asarray(~self.aside[:, None] * (1.0 if relative is None else relative**2))
 
 
 def linearised(rows: Campaign, point: Point, choice: Choice, *, rivals: bool = False) -> Array:
-    """(N, m, K + 1) design matrix of frames, chosen effects and rivals if asked for; the residual is the last column.
+    """Design matrix (N, m, K + 1) of frames, effects, alternatives if ``rivals``; the residual is the last column.
 
-    In m and rad, and in units of each row's own noise over that of all. Zero for parameters of which no row tells.
+    In m and rad, and in units of each row's own noise over that of all. Zero for parameters that these rows do not
+    determine.
     """
     blocks = choice.listed(rivals)
     if not rows.samples:
@@ -135,26 +136,26 @@ def linearised(rows: Campaign, point: Point, choice: Choice, *, rivals: bool = F
     return stack if rows.relative_noise is None else stack / rows.relative_noise[:, :, None]
 
 
-def residual(rows: Campaign, point: Point, choice: Choice) -> Array:
-    """(N, m) the last column of :func:`linearised` alone."""
+def relative_residual(rows: Campaign, point: Point, choice: Choice) -> Array:
+    """Residual (N, m), m and rad, over each row's relative noise: the last column of :func:`linearised`."""
     gap = corrected_observations(rows, point.frames, choice.split(point.values)).gap
     return gap if rows.relative_noise is None else gap / rows.relative_noise
 
 
 def joined(parts: Sequence[Array]) -> Array:
-    """(P,) arrays end to end, of length 0 where there are none."""
+    """Concatenate (P,) arrays; of none, an array of length 0."""
     return np.concatenate([*parts, np.zeros(0)])
 
 
 def products(stack: Array, weights: Array) -> Array:
-    """(G, K + 1, K + 1) products of columns (N, m, K + 1) at weights (N,) or (N, m), of positions and orientations."""
+    """Gram matrices (G, K + 1, K + 1) of columns (N, m, K + 1) with weights, of positions and of orientations."""
     n, m, k = stack.shape
     parts = (stack.T * np.sqrt(weights).T).T.reshape(n, m // 3, 3, k).swapaxes(0, 1).reshape(m // 3, 3 * n, k)
     return np.asarray(parts.swapaxes(1, 2) @ parts)
 
 
 def carried(sums: Array, step: Array) -> Array:
-    """Return products (…, K + 1, K + 1) with (k,) times the first columns taken from the last: the gap after a step."""
+    """Gram matrices (…, K + 1, K + 1) after a step (k,): the gap less the first k columns times the step."""
     change = np.eye(sums.shape[-1])
     change[: len(step), -1] = -step
     return np.asarray(change.T @ sums @ change)
@@ -162,7 +163,7 @@ def carried(sums: Array, step: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """Trust region: how far parameters and limits may move while each summed row stays on its side of each limit.
+    """Trust region of the sums: how far parameters and limits may move before the weight of a summed row changes.
 
     Steps up to √(δᵀAδ) = ``reach`` are safe, A (k, k) the ``metric``, positive. ``share`` and ``typical``: how far a
     step of 1 moves a row, at most and in the root mean square, in units of the noise, of the median row and over all;
@@ -181,12 +182,12 @@ class Guard:
     quiet: bool
 
     def distances(self, stack: Array) -> Array:
-        """(N, G) distance of positions and of orientations from the model, in units of the noise."""
+        """Distance (N, G) of positions and of orientations from the model, in units of the noise."""
         white = (stack[:, :, -1] / self.sigma).reshape(len(stack), len(self.medians), 3)
         return np.asarray(np.linalg.norm(white, axis=2))
 
     def scores(self, stack: Array, weights: Array) -> Array:
-        """(N,) the reach up to which each of the rows at the point of the sums, (N, m, K + 1), is safe; −1 for none."""
+        """Trust-region radius (N,) up to which each row, (N, m, K + 1), keeps its weight; −1 where it has none."""
         parts = self.distances(stack)
         score = (self.bend - np.linalg.norm(parts, axis=1)) / (moves(stack, self.metric, self.sigma) + self.share)
         if not self.quiet:
@@ -195,7 +196,7 @@ class Guard:
         return np.where((score > 0.0) & (weights >= 1.0), score, -1.0)
 
     def holds(self, step: Array, sigma: Array, medians: Array, bend: float, rms: Array) -> bool:
-        """Tell whether a fit is within reach: step (k,), noise, limits in its units, rms (G,) per axis, m and rad."""
+        """Whether a fit is in the trust region: step (k,), noise, limits in its units, rms (G,) per axis, m and rad."""
         far, ratio = float(np.sqrt(step @ self.metric @ step)), sigma[::3] / self.sigma[::3]
         within = far <= self.reach and bool(np.abs(bend * ratio - self.bend).max() <= self.share * self.reach)
         if self.quiet:
@@ -205,7 +206,7 @@ class Guard:
 
 
 def moves(stack: Array, metric: Array, sigma: Array) -> Array:
-    """(N,) how far a unit step in a metric (k, k) moves each row (N, m, K + 1) at most, in units of the noise."""
+    """Largest displacement (N,) of each row (N, m, K + 1) by a unit step in a metric (k, k), in units of the noise."""
     white = stack[:, :, : len(metric)] / sigma[:, None]
     within = white @ np.linalg.inv(np.linalg.cholesky(metric)).T
     return np.asarray(np.sqrt((within**2).sum(axis=(1, 2))))
@@ -213,7 +214,7 @@ def moves(stack: Array, metric: Array, sigma: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Sufficient statistics: the products of rows, and what must be counted beside.
+    """Sufficient statistics of rows: Gram matrices and counts.
 
     ``products`` (2, G, K + 1, K + 1): of rows with weight, in the units of :func:`linearised`, and of rows not set
     aside, m and rad. ``counts`` (3,): how many there are, have weight, are not set aside; ``below`` (G,): nearer than
@@ -226,8 +227,8 @@ class Sums:
     guard: Guard | None
 
     @classmethod
-    def of(cls, stack: Array, rows: Rows, guard: Guard | None = None) -> Sums:
-        """Return the sums of rows with their columns (N, m, K + 1) at the point of linearisation."""
+    def of(cls, stack: Array, rows: WeightedRows, guard: Guard | None = None) -> Sums:
+        """Sufficient statistics of rows with columns (N, m, K + 1) at the linearisation point."""
         below = np.zeros(stack.shape[1] // 3, dtype=np.int64)
         if guard is not None:
             below = (guard.distances(stack) < guard.medians).sum(axis=0)
@@ -235,19 +236,19 @@ class Sums:
         return cls(np.stack([products(stack, own) for own in (rows.weights, rows.kept)]), counts, below, guard)
 
     def plus(self, other: Sums, sign: int = 1) -> Sums:
-        """Return the sums with further rows at the same point, or without them where ``sign`` is −1."""
+        """Add the statistics of further rows at the same point, or subtract them with ``sign`` −1."""
         names = ("products", "counts", "below")
         return replace(self, **{name: getattr(self, name) + sign * getattr(other, name) for name in names})
 
     def after(self, step: Array, columns: int) -> Sums:
-        """Return the sums of some columns, the first ones and the residual, after a step of the parameters."""
+        """Statistics of the first columns and the residual after a step of the parameters."""
         own = np.r_[: columns - 1, -1]
         return replace(self, products=carried(self.products[..., own[:, None], own], step))
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """State of the iteration: point, (k,) step since the sums were linearised, the rows kept one by one, the noise.
+    """State of the iteration: point, step (k,) since the sums were linearised, rows kept one by one, noise.
 
     ``sigma`` (m,) and ``held``: whitening noise and its prior's degrees of freedom. ``leverage``: share of the
     equations that is fitted. ``best``: prior scales and noise, if known. ``medians`` (G,) and ``bend``, in units of
@@ -256,7 +257,7 @@ class State:
 
     point: Point
     step: Array
-    rows: Rows
+    rows: WeightedRows
     sigma: Array
     held: float
     leverage: float
@@ -268,7 +269,7 @@ class State:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted(State):
-    """Fit of a choice to all rows; ``values`` are mean and covariance per chosen effect, ``gram`` its problem.
+    """Converged fit of a choice to all rows: ``values`` are mean and covariance by effect, ``gram`` its problem.
 
     ``products`` (k + 1, k + 1) in units of ``sigma``, the gap at the point. ``squares`` (G,): sum of squares, m² and
     rad², over ``count`` rows not set aside. ``steady``: it is the fixed point, too.
@@ -283,31 +284,31 @@ class Fitted(State):
 
     @property
     def noise(self) -> Array:
-        """(m,) one sigma of each component, m and rad."""
+        """Residual standard deviation (m,) of each component, m and rad."""
         return self.sigma * self.best.noise
 
     @property
     def rms(self) -> Array:
-        """(G,) root mean square length of the residual, m and rad."""
+        """Root mean square residual (G,) of positions and of orientations, m and rad."""
         return np.asarray(np.sqrt(self.squares / max(self.count, 1)))
 
     @property
     def deviations(self) -> Array:
-        """(P,) posterior standard deviation of every parameter, SI."""
+        """Posterior standard deviations (P,) of the parameters, SI."""
         return joined([np.sqrt(np.maximum(np.diag(covariance), 0.0)) for _, covariance in self.values.values()])
 
     def expected(self, choice: Choice) -> Array:
-        """(P,) prior standard deviation of every parameter, SI."""
+        """Prior standard deviations (P,) of the parameters, SI."""
         return joined([item.sizes * self.best.scales[k] for k, item in enumerate(choice.blocks)])
 
     def precision(self, prior: Array, frames: float) -> Array:
-        """(k, k) inverse covariance of frames and parameters, SI, by all rows and prior deviations (P,), of frames."""
+        """Posterior precision (k, k) of frames and parameters, SI, for prior deviations (P,) and that of the frames."""
         found = self.products[:-1, :-1] / self.best.noise**2
         return np.asarray(found + np.diag(np.r_[np.full(len(found) - len(prior), frames), prior] ** -2.0))
 
 
 def settled(choice: Choice, sums: Sums, begin: State) -> Fitted:
-    """Fit a choice to rows in sums and rows one by one, to the fixed point; where it begins does not matter."""
+    """Fit a choice to summed and single rows by fixed-point iteration; the result does not depend on the start."""
     for _ in range(own_settings.REST_ROUNDS):
         found, size = _round(choice, sums, begin)
         before = np.e * found.best.noise if begin.best is None else begin.best.noise
@@ -319,7 +320,7 @@ def settled(choice: Choice, sums: Sums, begin: State) -> Fitted:
 
 
 def _round(choice: Choice, sums: Sums, begin: State) -> tuple[Fitted, float]:
-    """Iterate once: weigh the rows, find scales and noise, step; return also how far the step went, in noise."""
+    """One iteration: weights, prior scales, noise, Gauss-Newton step; also returns the step's length in noise."""
     campaign, point = begin.rows.campaign, begin.point
     stack, names = linearised(campaign, point, choice), unknown_frames(campaign)
     state, flat = weighed(choice, sums, begin, stack[:, :, -1]), len(names)
@@ -348,7 +349,7 @@ def _round(choice: Choice, sums: Sums, begin: State) -> tuple[Fitted, float]:
 
 
 def normal(choice: Choice, total: Sums, state: State, rivals: bool = False) -> tuple[Array, Linear, Gram]:
-    """Return whitened products of all rows at a point, and the problem without frames whose parameters are whole."""
+    """Whitened Gram matrix of all rows at a point, and the linear problem with the frames projected out."""
     white, flat = np.tensordot(state.sigma[::3] ** -2.0, total.products[0], 1), len(unknown_frames(state.rows.campaign))
     full = carried(white, np.r_[np.zeros(flat), -state.point.values])
     nothing = np.zeros((0, choice.measures, flat + 1))
@@ -358,7 +359,7 @@ def normal(choice: Choice, total: Sums, state: State, rivals: bool = False) -> t
 
 
 def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
-    """Robust weights (Huber 1964) of the rows kept one by one, by their residual (n, m), and the noise of all rows."""
+    """Huber weights (1964) of the single rows from their residual (n, m), and the noise of all rows."""
     if choice.judge is not None:
         return replace(state, steady=True)
     count, measures, rows, guard = len(gap), choice.measures, state.rows, sums.guard
@@ -374,24 +375,24 @@ def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
     stated = replace(choice.noise, relative=rows.campaign.relative_noise)
     sigma, held, distance2 = judged(gap, measured, stated, state.leverage, measures)
     aside = distance2 > distance_limit(measures, total)
-    rows = Rows(rows.campaign, np.where(aside, 0.0, tail_weight(distance2, measures)), aside)
+    rows = WeightedRows(rows.campaign, np.where(aside, 0.0, tail_weight(distance2, measures)), aside)
     edge = bend(measures, state.leverage, sigma, far_scale(measured, sigma))
     return replace(state, rows=rows, sigma=sigma, held=held, medians=medians / sigma[::3], bend=edge, steady=steady)
 
 
 def axis_noise(medians: Array, leverage: float) -> Array:
-    """(G,) one sigma per axis, from the median distance of three normal axes and the share of equations fitted."""
+    """One sigma per axis (G,), from the median distance of three normal axes, corrected for leverage."""
     return np.asarray(medians / np.sqrt(float(chdtri(3, 0.5)) * (1.0 - leverage)))
 
 
 def bend(measures: int, leverage: float, sigma: Array, scale: Array) -> float:
-    """Distance, in units of the noise, from which on a row counts less (Huber 1964); of two parts the nearer one's."""
+    """Huber's threshold, in units of the noise, at the distance beyond which a row is down-weighted."""
     return float(np.sqrt(chdtri(measures, settings.BEND_LEVEL) * (1.0 - leverage)) * (scale / sigma).min())
 
 
 @dataclass(frozen=True, eq=False)
 class Sequential:
-    """Sequential estimate: all rows so far, as a fit of the choice needs them.
+    """Sequential estimate: fit of a choice, sums of old rows, and rows kept one by one.
 
     ``sums`` are of rows that are not looked at again, linearised at ``anchor``; ``fitted`` is the fit to all, and has
     those kept one by one. ``batches`` are read only when the sums must be formed anew; ``aside`` are those of the last
@@ -402,14 +403,14 @@ class Sequential:
     anchor: Point
     sums: Sums
     fitted: Fitted
-    batches: tuple[Rows, ...]
+    batches: tuple[WeightedRows, ...]
     aside: NDArray[np.bool_]
     anew: bool = False
 
     @classmethod
-    def of(cls, choice: Choice, batches: tuple[Rows, ...], begin: State, anew: bool = False) -> Sequential:
-        """Fit a choice to rows, and form the sums of those that need not be looked at again."""
-        rows = Rows.joined(*batches)
+    def of(cls, choice: Choice, batches: tuple[WeightedRows, ...], begin: State, anew: bool = False) -> Sequential:
+        """Fit a choice to rows, then sum the rows that need not be revisited."""
+        rows = WeightedRows.joined(*batches)
         begin = replace(begin, step=np.zeros_like(begin.step), rows=rows)
         aside, kept, sums = rows.aside.copy(), np.arange(len(rows.aside)), summed(choice, rows.take(slice(0)), begin)
         if len(kept) > 2 * own_settings.KEPT:
@@ -420,13 +421,13 @@ class Sequential:
 
     @property
     def samples(self) -> int:
-        """Number of all rows."""
+        """Number of rows, summed ones included."""
         return int(self.sums.counts[0]) + len(self.fitted.rows.aside)
 
-    def plus(self, new: Rows) -> Sequential:
-        """Return all rows and some more; old rows in the sums are looked at again only where ``anew`` says so."""
+    def plus(self, new: WeightedRows) -> Sequential:
+        """Add rows; summed rows are revisited only where ``anew`` says so."""
         batches, old = (*self.batches, new), len(self.fitted.rows.aside)
-        fitted = settled(self.choice, self.sums, replace(self.fitted, rows=Rows.joined(self.fitted.rows, new)))
+        fitted = settled(self.choice, self.sums, replace(self.fitted, rows=WeightedRows.joined(self.fitted.rows, new)))
         grown = replace(self, fitted=fitted, batches=batches, aside=fitted.rows.aside[old:], anew=False)
         summing = bool(self.sums.counts[0])
         holds = not summing or (fitted.steady and self._holds(fitted))
@@ -437,7 +438,7 @@ class Sequential:
         return Sequential.of(self.choice, batches, fitted, anew=summing)
 
     def _take_in(self, old: int) -> Sequential:
-        """Return the same with those of the last rows in the sums that need not be looked at again."""
+        """Move those of the last rows that need not be revisited into the sums."""
         rows, guard = self.fitted.rows, self.sums.guard
         own = rows.take(slice(old, None))
         stack, safe = linearised(own.campaign, self.anchor, self.choice, rivals=True), np.ones(len(own.aside), bool)
@@ -448,13 +449,13 @@ class Sequential:
         return replace(self, sums=sums, fitted=replace(self.fitted, rows=kept))
 
     def _holds(self, fitted: Fitted) -> bool:
-        """Tell whether every row in the sums kept its side of the limits, and is straight as far as the point moved."""
+        """Whether summed rows keep their weights, and the curvature up to the new point is negligible."""
         guard, axis = self.sums.guard, fitted.rms / np.sqrt(3.0)
         near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.bend, axis)
         return near and self._bent(fitted) < own_settings.CURVED
 
     def _bent(self, fitted: Fitted) -> float:
-        """Return by how many deviations the curvature of the rows in the sums moves a parameter at most.
+        """Largest bias of a parameter, in standard deviations, by the curvature of the summed rows.
 
         Rows kept one by one tell what it leaves of the gap, which adds up over rows, and how it turns the columns. The
         latter meets residuals that know nothing of it, so that its sum grows as the square root of the rows.
@@ -473,13 +474,13 @@ class Sequential:
         return float(shift.max(initial=0.0))
 
 
-def summed(choice: Choice, rows: Rows, at: State, guard: Guard | None = None) -> Sums:
-    """Return the sums of rows linearised at the point of a state."""
+def summed(choice: Choice, rows: WeightedRows, at: State, guard: Guard | None = None) -> Sums:
+    """Sufficient statistics of rows linearised at the point of a state."""
     return Sums.of(linearised(rows.campaign, at.point, choice, rivals=True), rows, guard)
 
 
 def split(choice: Choice, begin: State) -> tuple[Sums, NDArray[np.int64]]:
-    """Form the sums of many rows, linearised near their fit (``begin``); with the numbers (n,) of the other rows."""
+    """Sum many rows, linearised near their fit (``begin``), and list the numbers (n,) of the rows kept singly."""
     rows, guard = _guarded(choice, begin)
     total, scores = summed(choice, rows.take(slice(0)), begin, guard), []
     for part in chunks(len(rows.aside)):
@@ -493,12 +494,12 @@ def split(choice: Choice, begin: State) -> tuple[Sums, NDArray[np.int64]]:
 
 
 def _sample(rows: int) -> NDArray[np.int64]:
-    """Return the numbers of rows, evenly spread, that stand for so many."""
+    """Evenly spaced row numbers, a representative sample of so many rows."""
     return np.linspace(0, rows - 1, min(own_settings.KEPT, rows)).astype(np.int64)
 
 
 def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]:
-    """Return which rows are kept one by one, and up to which reach the others are safe."""
+    """Rows kept one by one, and the trust-region radius up to which the others are safe."""
     if guard is None:
         return _sample(len(scores)), 0.0
     count = min(max(own_settings.KEPT, int((scores < 0.0).sum()) + own_settings.KEPT // 2), len(scores))
@@ -506,12 +507,12 @@ def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]
     return np.sort(order[:count]), float(scores[order[min(count, len(scores) - 1)]])
 
 
-def _guarded(choice: Choice, begin: State) -> tuple[Rows, Guard | None]:
-    """Weigh all rows at the point, and find the trust region of their sums, its reach still open."""
+def _guarded(choice: Choice, begin: State) -> tuple[WeightedRows, Guard | None]:
+    """Weights of all rows at the point, and the trust region of their sums with its radius still open."""
     rows = begin.rows
     if choice.judge is not None:
         return rows, None
-    gap = residual(rows.campaign, begin.point, choice)
+    gap = relative_residual(rows.campaign, begin.point, choice)
     found = weighed(choice, summed(choice, rows.take(slice(0)), begin), begin, gap)
     some = rows.take(_sample(len(rows.aside)))
     stack, share = linearised(some.campaign, begin.point, choice), len(rows.aside) / len(some.aside)

@@ -1,4 +1,4 @@
-"""Every number that was chosen to weigh a verdict again, to draw an effect, and to propose what to measure next."""
+"""Chosen numbers of the diagnosis: verdict, drawing of effects, next measurement; each with its unit and reason."""
 
 LEAST_LEADING, MOST_LEADING = 1e-3, 4
 """Probability below which no explanation is worth a measurement, and how many explanations are told apart."""

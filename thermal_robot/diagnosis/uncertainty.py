@@ -44,7 +44,7 @@ from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
 def as_remainder_says(fit: Fit) -> Fit:
-    """Widen the covariances of a fit to what its residual may do to its parameters; values stay."""
+    """Inflate the parameter covariances of a fit for structure in its residual; the values stay."""
     e = fit.explanation
     if not e.best.blocks:
         return fit
@@ -59,7 +59,7 @@ def as_remainder_says(fit: Fit) -> Fit:
 
 
 def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
-    """(K,) variance inflation factor of parameters over independent rows: divide their information by it.
+    """Variance inflation factor (K,) of parameters over independent rows, by which their information is divided.
 
     ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
     """
@@ -72,7 +72,7 @@ def _model(fit: Fit) -> Model:
 
 
 def _said(fit: Fit, model: Model) -> list[Array]:
-    """Return the covariances (P, P) of the parameters beside the posterior's: by jackknife, and the sandwich."""
+    """Parameter covariances (P, P) beside the posterior's: jackknife over blocks of rows, and sandwich."""
     found, e = [], fit.explanation
     for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
         rows = [~group for group in each(labels) if model.determines(~group)]
@@ -86,17 +86,17 @@ def _said(fit: Fit, model: Model) -> list[Array]:
 
 
 def _smooth(e: Explanation) -> Form | None:
-    """Form of a smooth discrepancy; one that is anew in every pose or visit is part of the covariance in the fit."""
+    """Smooth discrepancy of an explanation; ``None`` without one, or if it is drawn anew in every pose or visit."""
     return None if e.discrepancy.form is None or e.discrepancy.form.anew else e.discrepancy.form
 
 
 def _independent(model: Model) -> Array:
-    """(E, K) columns of frames and parameters, whitened as if rows were independent."""
+    """Columns (E, K) of frames and parameters, whitened as if rows were independent."""
     return whitened(model.linear, replace(model.whitening, smooth=None))[:, :-1]
 
 
 def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array:
-    """(K, K) covariance A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K) with prior precisions Λ⁻¹ (K,)."""
+    """Sandwich covariance (K, K) A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K), prior precisions Λ⁻¹ (K,)."""
     variance = e.best.noise**2
     spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
     alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
@@ -105,7 +105,7 @@ def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array
 
 
 def _posterior(information: Array, tight: Array) -> Array:
-    """(K, K) covariance A = (XᵀX/σ² + Λ⁻¹)⁻¹, each column scaled to unit length."""
+    """Posterior covariance (K, K) A = (XᵀX/σ² + Λ⁻¹)⁻¹, solved with columns scaled to unit length."""
     unit = (information.diagonal() + tight) ** -0.5
     size = np.outer(unit, unit)
     inverse: Array = np.asarray(np.linalg.inv(information * size + np.diag(tight * unit**2)))
@@ -113,12 +113,12 @@ def _posterior(information: Array, tight: Array) -> Array:
 
 
 def _symmetric(matrix: Array) -> Array:
-    """Return the matrix without what rounding makes it miss its transpose by."""
+    """Symmetric part of a matrix, without rounding errors."""
     return (matrix + matrix.T) / 2.0
 
 
 def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
-    """(P, P) covariance in units of the prior deviations, along none of its axes smaller than any of those said."""
+    """Covariance (P, P), in units of the prior deviations, raised along its axes to the largest of the others."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
     times = _times(variance, axes, said)
@@ -127,13 +127,13 @@ def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
 
 
 def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
-    """(P,) how many times a variance along its axes the largest of those said is, at least once."""
+    """Variance inflation factors (P,), at least 1, along principal axes: largest of some covariances over variance."""
     most = np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0)
     return np.asarray(most / variance)
 
 
 def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
-    """Return what makes predictions of a fit uncertain; ``needs`` are the columns that its model reads.
+    """Predictive uncertainty of a fit: covariances, residual size and range; ``needs`` are the columns that it reads.
 
     ``floor`` is one sigma per axis of the noise where the campaign states none, m.
     """
@@ -165,7 +165,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
 
 
 def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
-    """(K, K) covariance of frames and parameters together, without what turns the target and does not move it.
+    """Posterior covariance (K, K) of frames and parameters that move the target; rotations alone are left out.
 
     The second is the sandwich; ``None`` without a smooth discrepancy.
     """
@@ -179,7 +179,7 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
-    """(H, 3) residual of rows held out, of all where none can be, measurement frame, m, and the number of each."""
+    """Held-out residuals (H, 3), m, measurement frame, with their row numbers; residuals of all rows without folds."""
     walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
     if not walk.tests:
         return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
@@ -187,9 +187,9 @@ def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
-    """(3,) size per axis of what is left beside what is told, so that 95 % of all are within 1.96 of both together.
+    """Conformal residual size (3,) per axis: with the parameters' variance, 1.96 of it hold 95 % of the residuals.
 
-    The axes differ as their rms does; rows set aside count in the share, and not in that.
+    The ratio of the axes is that of their rms without outliers; outliers count in the 95 %.
     """
     size = np.log(np.mean(left[kept] ** 2, axis=0) + settings.TINY) / 2.0
     # a rms of K numbers is known to 1/√2K: axes differ by what exceeds that (James and Stein)
@@ -201,7 +201,7 @@ def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
 
 
 def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
-    """(3,) one sigma per axis between sessions (random effects), measurement frame, m; ``None`` for one session."""
+    """Between-session standard deviation (3,) per axis (random effects), m; ``None`` for one session."""
     kept = ~fit.explanation.outliers
     left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
     runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]
@@ -213,19 +213,20 @@ def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | Non
 
 
 def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Effect, Array], ...]:
-    """Return effects that, where they fade, leave what registration alone does; as they are where others do not fade.
+    """Fading effects with the part that the fitted frames absorb where they fade; unchanged if some do not fade.
 
-    The frames take over of a column what they do as they are fitted without it, by the products of all columns.
+    That part is the least-squares projection of each column on the frames.
     """
     fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
     if len(fading) < len(held):
         return tuple(held)
     model, names = _model(fit), frame_columns(fit.corrected)[1]
     gram, flat = model.whole[0], model.flat
-    places = [k if name == "base" else 6 + k - names.index("tool") for k, name in enumerate(names)]
+    numbers = [k for k, name in enumerate(names) if name in ("base", "tool")]
+    places = [k if names[k] == "base" else 6 + k - names.index("tool") for k in numbers]
     twists = np.zeros((12, gram.shape[1] - 1 - flat))
     known = whitener(gram[:flat, :flat], diagnosis_settings.LEAST_SEEN)
-    twists[places] = known @ (known.T @ gram[:flat, flat:-1])
+    twists[places] = (known @ (known.T @ gram[:flat, flat:-1]))[numbers]
     found: list[tuple[Effect, Array]] = []
     for (effect, values), own in zip(fading, model.spans, strict=True):
         kept = {p.name: twists[:, k] for p, k in zip(gate.checked(effect, fit.nominal), own - flat, strict=True)}

@@ -1,4 +1,4 @@
-"""Update of a diagnosis with new rows: its choice of effects is held while they agree with it, all else fitted anew.
+"""Update of a diagnosis with new rows: the model stays while tests accept it, its parameters are estimated anew.
 
 The residual r of new rows under the model of all rows before has the covariance V = 1 + J C Jᵀ, in units of the noise,
 with C that of the parameters. Each test has its share of one stated chance.
@@ -10,8 +10,7 @@ with C that of the parameters. Each test has its share of one stated chance.
 * Gross errors among them are as frequent as before: negative binomial, with Jeffreys' prior.
 * Order statistics: rows outside of what was measured are as many as chance puts there.
 
-Where the residual is more alike in neighbouring rows than noise is, its mean square scatters more between blocks of
-rows than χ² says; the first two allow as much.
+Autocorrelated residuals make sums of squares of blocks overdispersed; the first two tests are corrected for it.
 """
 
 from __future__ import annotations
@@ -37,10 +36,10 @@ from thermal_robot.diagnosis.sequential import (
     Fitted,
     Judge,
     Point,
-    Rows,
     Sequential,
     State,
     Sums,
+    WeightedRows,
     joined,
     linearised,
     normal,
@@ -66,14 +65,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How well new rows agree with the model that did not know them.
+    """Goodness of fit of new rows under the model that was fitted without them.
 
     Attributes
     ----------
     chi2, figures
         rᵀV⁻¹r of the new rows, and of how many figures.
     whole, whole_figures
-        The same of all rows since the diagnosis.
+        As ``chi2`` and ``figures``, for all rows since the diagnosis.
     aside, rows
         Gross errors since the diagnosis, and of how many rows.
     p_batch, p_whole, p_change, p_aside
@@ -98,7 +97,7 @@ class Agreement:
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What new rows are compared with: ``tested`` are the effects of which a change is looked for, without columns.
+    """Reference for tests of new rows; ``tested`` are effects, without columns, of which a change is looked for.
 
     ``scatter`` is times the variance of χ² by which the mean square of blocks of the diagnosed rows scatters, at least
     1; ``aside`` of the diagnosed ``rows`` were gross errors.
@@ -109,8 +108,8 @@ class Watch:
     aside: int
     rows: int
 
-    def look(self, before: Sequential, new: Rows, last: Agreement) -> Agreement:
-        """Compare new rows with the model of all before, and with what was seen since the diagnosis."""
+    def look(self, before: Sequential, new: WeightedRows, last: Agreement) -> Agreement:
+        """Test new rows against the model of all rows before, and with those since the diagnosis."""
         fitted, choice = before.fitted, replace(before.choice, rivals=self.tested)
         white = linearised(new.campaign, fitted.point, choice, rivals=True) / fitted.noise[:, None]
         near = (white[:, :, -1] ** 2).sum(axis=1) <= distance_limit(choice.measures, before.samples + len(white))
@@ -137,7 +136,7 @@ class Watch:
         return float(fdtrc(figures / self.scatter, freedom / self.scatter, chi2 / figures)) if figures else 1.0
 
     def _change(self, inside: Array, freedom: float) -> tuple[float, tuple[str, str]]:
-        """Score test: the chance of the largest change among all that were looked for, and what it is of."""
+        """Score test for the largest change among all tested effects: its p-value, effect and parameter."""
         best, where, end = 1.0, ("", ""), 0
         for item in self.tested:
             own = slice(end, end := end + len(item.sizes))
@@ -154,7 +153,7 @@ class Watch:
 
 
 def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
-    """Variance of sums of squares of blocks (N,) of rows over that of χ², at least 1; ``left`` is (N, m)."""
+    """Overdispersion, at least 1, of blocks (N,) of rows: variance of their sums of squares over that of χ²."""
     if len(blocks) < 2:
         return 1.0
     squares = (left**2).sum(axis=1)
@@ -165,7 +164,7 @@ def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
 
 
 def misfits(a: Agreement) -> Iterator[str]:
-    """Yield a sentence for each test that is unlikely where the robot and its noise are as they were."""
+    """Yield a sentence for each test that rejects an unchanged robot and noise."""
     rest = "times the mean square that noise and the parameters' deviations allow"
     if a.p_batch < own_settings.FALLS:
         yield f"The new rows leave {a.chi2 / a.figures:.3g} {rest} (p = {a.p_batch:.1g})."
@@ -179,7 +178,7 @@ def misfits(a: Agreement) -> Iterator[str]:
 
 
 def beyond(spread: Spread | None, rows: Campaign, before: int) -> Iterator[str]:
-    """Yield that many of the new rows leave what was measured by ``before`` rows, and not by chance.
+    """Test for extrapolation: yield a sentence for each quantity in which too many new rows leave the measured range.
 
     Of rows in no particular order, the k of n new ones that are the outermost of all N + n, at either end, have the
     chance (k + 1) · n!/(n − k)! · (N + n − k)!/(N + n)!.
@@ -198,15 +197,15 @@ def beyond(spread: Spread | None, rows: Campaign, before: int) -> Iterator[str]:
 
 
 class Runner(NamedTuple):
-    """A combination that may come first: blocks of a :class:`Choice`, log prior odds less the chosen one's, names."""
+    """Alternative combination: blocks of a :class:`Choice`, log prior odds against the chosen one, names."""
 
     blocks: tuple[int, ...]
     log_prior: float
     names: tuple[str, ...]
 
 
-def rivals(fit: Fit) -> list[tuple[int, ...]]:
-    """Return the combinations of blocks that came nearest to the chosen one, most probable first."""
+def runners_up(fit: Fit) -> list[tuple[int, ...]]:
+    """Alternative combinations by posterior probability, most probable first."""
     e = fit.explanation
     known = [(c.blocks, p) for c, p in zip(e.combinations, e.probabilities, strict=True)]
     own = max((p for blocks, p in known if blocks == e.best.blocks), default=1.0)
@@ -215,12 +214,15 @@ def rivals(fit: Fit) -> list[tuple[int, ...]]:
 
 
 def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
-    """Return what a diagnosis chose, the effects of its fit in their settings, and the combinations that came near.
+    """Choice of a diagnosis with its effects in their settings, and the alternative combinations.
 
-    Where a discrepancy was found beside them, rows keep the weight that they had: it took part in weighing them, and is
-    told from all rows together.
+    With a discrepancy in the model, rows keep their weights, which depend on it.
     """
-    e, near, prior = fit.explanation, rivals(fit), log_priors([item.effect for item in fit.explanation.linear.blocks])
+    e, near, prior = (
+        fit.explanation,
+        runners_up(fit),
+        log_priors([item.effect for item in fit.explanation.linear.blocks]),
+    )
     further = sorted({b for found in near for b in found} - {*e.best.blocks})
     place = {b: k for k, b in enumerate((*e.best.blocks, *further))}
     odds = [sum(prior[b] for b in found) - sum(prior[b] for b in e.best.blocks) for found in near]
@@ -241,7 +243,7 @@ def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
 
 
 def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
-    """(R,) log Bayes factor of each combination against the chosen one, prior odds included, by all rows so far."""
+    """Log posterior odds (R,) of each alternative combination against the chosen one, by all rows so far."""
     choice, fitted = estimate.choice, estimate.fitted
     stack = linearised(fitted.rows.campaign, fitted.point, choice, rivals=True)
     total = estimate.sums.after(fitted.step, stack.shape[2]).plus(Sums.of(stack, fitted.rows))
@@ -251,7 +253,7 @@ def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
 
 
 def _without_columns(fit: Fit, item: Block, effect: Effect) -> Block:
-    """Return a block with no rows, of the effect as a model holds it."""
+    """Block without rows, of the effect as a model holds it."""
     nothing = np.zeros((0, fit.explanation.linear.measures, len(item.sizes)))
     return replace(item, effect=gate.delivered(effect, fit.nominal), source=nothing)
 
@@ -261,17 +263,17 @@ def _point(fit: Fit) -> Point:
 
 
 def fixed_point(fit: Fit) -> Sequential:
-    """Return the fit of a diagnosis at its fixed point, ready to take in more rows."""
+    """Sequential estimate that starts at the fit of a diagnosis."""
     e, point, flat = fit.explanation, _point(fit), len(unknown_frames(fit.campaign))
     leverage = (e.best.effective + flat) / max(e.problem.equations + flat, 1)
-    rows = Rows(fit.campaign, e.whitening.weights, e.outliers)
+    rows = WeightedRows(fit.campaign, e.whitening.weights, e.outliers)
     step = np.zeros(flat + len(point.values))
     begin = State(point, step, rows, e.whitening.noise, e.whitening.held, leverage)
     return Sequential.of(chosen(fit)[0], (rows,), begin)
 
 
 def watch(fit: Fit) -> Watch:
-    """Return what new rows are compared with."""
+    """Return the reference for tests of new rows, from a diagnosis."""
     e, kept = fit.explanation, ~fit.explanation.outliers
     left = (fit.corrected.gap / (e.whitening.sigma() * e.best.noise))[kept]
     first = [own[0] for own in fit.variants.values() if own]
@@ -282,12 +284,12 @@ def watch(fit: Fit) -> Watch:
 
 
 def independent_rows(fit: Fit) -> bool:
-    """Tell whether rows count by themselves: whether nothing of what remains is drawn anew in every pose or visit."""
+    """Whether rows are independent: no discrepancy is drawn anew in every pose or visit."""
     return fit.explanation.whitening.smooth is None
 
 
 class Diagnosed(Protocol):
-    """What of a :class:`~thermal_robot.Diagnosis` rows are added to."""
+    """Protocol of a :class:`~thermal_robot.Diagnosis` to which rows can be added."""
 
     @property
     def campaign(self) -> str: ...  # noqa: D102
@@ -311,9 +313,9 @@ _BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = W
 
 
 def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
-    """Return what the updates of a diagnosis begin with; its rows are passed over once.
+    """Return the initial state of updates to a diagnosis; passes over its rows once.
 
-    Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
+    Only alternatives that are less probable than the choice are followed.
     """
     if not independent_rows(fit):
         raise EstimationError(
@@ -329,33 +331,33 @@ def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
 
 
 def prepare(found: Diagnosed) -> None:
-    """Form the sums of a diagnosis of many rows: the pass over them is a part of it, not of an update."""
+    """Sum the rows of a large diagnosis beforehand, so that updates need no pass over them."""
     if found.usable and found.fit is not None and found.samples > 2 * own_settings.KEPT and independent_rows(found.fit):
         start(found.fit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Updated:
-    """A diagnosis whose effects stand, with new rows: its parameters, noise and model by all rows.
+    """Diagnosis with new rows: parameters, noise and corrected model by all rows, effects unchanged.
 
     Attributes
     ----------
     diagnosis
-        Where it began; its effects are held.
+        Initial diagnosis, whose effects stay.
     outliers
         Row numbers of the last new rows that are set aside, as their table counts them.
     model
         The corrected model by all rows.
     agreement
-        How well the last new rows agreed with the model that did not know them.
+        Tests of the last new rows under the model fitted without them.
     estimate, watch
         The fit to all rows; what new rows are compared with.
     wider
-        (P,) by how much the diagnosis widened each deviation for what it could not explain.
+        Factors (P,) by which the diagnosis inflated each standard deviation for an unexplained residual.
     runners, rival, lead
-        Combinations that may come first; the best of them by all rows so far, and its log odds against the chosen one.
+        Alternative combinations; the best of them by all rows so far, and its log odds against the chosen one.
     fallen
-        What new rows said against the choice, one sentence a reason; it stays.
+        Reasons against the selected effects, one sentence for each failed test; they are permanent.
 
     Examples
     --------
@@ -387,14 +389,14 @@ class Updated:
         """Add more rows; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`."""
         rows = more_rows(self.fit.campaign, rows, self.model.needs)
         with threadpool_limits(1):  # as in a diagnosis: matrices are small
-            new = Rows.weighed(self.estimate.choice, rows)
+            new = WeightedRows.weighed(self.estimate.choice, rows)
             after = replace(self, estimate=self.estimate.plus(new))
             if rows.samples:
                 after = self._compared(after.estimate, new)
         return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.estimate.aside].tolist()))
 
-    def _compared(self, estimate: Sequential, new: Rows) -> Updated:
-        """Return the same with all rows, and what the new ones say of the choice."""
+    def _compared(self, estimate: Sequential, new: WeightedRows) -> Updated:
+        """Return the result for all rows, with the tests of the new ones."""
         agreement, rival, lead = self.watch.look(self.estimate, new, self.agreement), self.rival, self.lead
         if self.runners:
             gains = log_odds(estimate, self.runners)
@@ -406,18 +408,18 @@ class Updated:
         fallen = tuple(dict.fromkeys((*self.fallen, *found)))
         return replace(self, estimate=estimate, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
 
-    def _testable(self, new: Rows) -> Iterator[str]:
-        """Yield the effects that could not be tested, and can be with what the new rows recorded."""
+    def _testable(self, new: WeightedRows) -> Iterator[str]:
+        """Yield the untestable effects that the new rows make testable."""
         known = library()
         if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
             old = self.estimate.fitted
-            both = observe(Rows.joined(old.rows, new).campaign, old.point.frames)
+            both = observe(WeightedRows.joined(old.rows, new).campaign, old.point.frames)
             for name, needs in asked.items():
                 if not gate.missing(known[name], both):
                     yield f"{name} could not be tested without {', '.join(needs)}, and now can be."
 
     def _model(self, new: Campaign) -> CorrectedModel:
-        """Return the corrected model by all rows, measured where these are, too."""
+        """Corrected model by all rows, with the range of both old and new rows."""
         fitted, choice, known = self.estimate.fitted, self.estimate.choice, self.model.spread
         model = replace(self.model, frames=fitted.point.frames, effects=tuple(choice.split(fitted.point.values)))
         if known is None:
@@ -436,20 +438,20 @@ class Updated:
 
     @property
     def samples(self) -> int:
-        """Rows so far, those of the diagnosis included."""
+        """Number of rows, those of the diagnosis included."""
         return self.estimate.samples
 
     @property
     def choice_stands(self) -> bool:
-        """Whether nothing speaks against the effects, settings and places that the diagnosis chose.
+        """Whether all tests accept the effects, settings and places of the diagnosis.
 
-        What new rows said against it stays; that other effects explain all rows better may change with more rows.
+        A failed test is permanent; the comparison with other effects may change with more rows.
         """
         return not self.reason
 
     @property
     def reason(self) -> str:
-        """Why the choice is to be made anew, in plain words; empty while it stands."""
+        """Why the model must be selected again, in plain words; empty while it stands."""
         if self.lead <= 0.0:  # a fresh diagnosis takes the more probable combination, however little it is ahead
             return " ".join(self.fallen)
         own = dict.fromkeys(item.effect.name for item in self.estimate.choice.blocks)
@@ -460,32 +462,32 @@ class Updated:
 
     @property
     def noise(self) -> float:
-        """One sigma per axis of what remains beside the effects, m."""
+        """Residual standard deviation per axis, m."""
         return float(self.estimate.fitted.noise[0])
 
     @property
     def noise_orientation(self) -> float | None:
-        """The same of orientations, rad; ``None`` without them."""
+        """Residual standard deviation per axis of orientations, rad; ``None`` without them."""
         return float(self.estimate.fitted.noise[3]) if self.estimate.choice.measures == 6 else None
 
     @property
     def rms_after(self) -> float:
-        """Root mean square of the remainder, m, over the rows that are not set aside."""
+        """Root mean square residual over the rows that are not set aside, m."""
         return float(self.estimate.fitted.rms[0])
 
     @property
     def rms_after_orientation(self) -> float | None:
-        """The same of orientations, rad; ``None`` without them."""
+        """Root mean square residual of orientations, rad; ``None`` without them."""
         return float(self.estimate.fitted.rms[1]) if self.estimate.choice.measures == 6 else None
 
     @property
     def anew(self) -> bool:
-        """Whether all old rows were looked at again, since the parameters had moved too far for their sums."""
+        """Whether old rows were revisited because the parameters left the trust region of their sums."""
         return self.estimate.anew
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Parameters of the effects that are held, as the model has them, SI.
+        """Parameters of the effects as a data frame, as the model has them, SI.
 
         Index (effect, parameter); columns ``value``, ``std`` (one sigma), ``unit`` and ``identified``. Where the
         diagnosis widened deviations for what it could not explain, they are wider by the same factor.
@@ -506,7 +508,7 @@ class Updated:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, SI, ready for JSON: schema ``thermal-robot/updated/1``."""
+        """JSON object of the format ``thermal-robot/updated/1``, SI."""
         names = ("samples", "choice_stands", "reason", "noise", "noise_orientation", "rms_after")
         told = {name: getattr(self, name) for name in (*names, "rms_after_orientation")}
         table = self.parameters.reset_index().rename(columns={"parameter": "name"})
@@ -543,7 +545,7 @@ def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
 
 
 def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
-    """(P,) by how much the diagnosis widened each deviation for what it could not explain; ``own`` are at rest."""
+    """Factors (P,) by which the diagnosis inflated each deviation for unexplained residuals; ``own`` are at rest."""
     left, e = found.unexplained if found.remaining is None else found.remaining, fit.explanation
     if not left.flagged:
         return np.ones_like(own)
@@ -552,7 +554,7 @@ def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
 
 
 def _covariance(fitted: Fitted, choice: Choice, names: tuple[str, ...]) -> Array:
-    """(K, K) covariance of frames and parameters by all rows, without what turns the target and does not move it."""
+    """Posterior covariance (K, K) of frames and parameters that move the target; rotations alone are left out."""
     precision = fitted.precision(np.maximum(fitted.expected(choice), settings.TINY), frames=own_settings.LOOSE)
     unit = precision.diagonal() ** -0.5
     inner = np.linalg.inv(precision * np.outer(unit, unit))

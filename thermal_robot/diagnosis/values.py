@@ -1,4 +1,4 @@
-"""The values that a diagnosis is made of: frozen, without behaviour. SI throughout; distances are in m."""
+"""Values of a diagnosis: frozen dataclasses, SI; distances in m."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Status = Literal["found", "not_found", "not_testable", "confounded", "contained"
 
 @dataclass(frozen=True)
 class Location:
-    """A place with its share of the gap's mean square; for an unexplained residual, with its probability."""
+    """Place with its share of the gap's mean square; for an unexplained residual, with its probability."""
 
     kind: str
     name: str
@@ -31,7 +31,7 @@ class Location:
 
     @property
     def words(self) -> str:
-        """The place with its kind, unless its name says it already."""
+        """Name of the place with its kind, unless the name contains it."""
         return in_words(self.kind, self.name)
 
 
@@ -48,7 +48,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the data say of one effect.
+    """Result for one effect: status, probability, estimates, places and held-out share.
 
     Attributes
     ----------
@@ -71,10 +71,10 @@ class Finding:
     locations
         Places where it acts, largest share first.
     parameters, unseen
-        Its estimates, empty if it is neither part of the fit nor contained; names of parameters of which the data see
-        nothing, or nothing beside the others.
+        Its estimates, empty if it is neither part of the fit nor contained; names of parameters that the data do not
+        determine.
     size
-        How much a discovered law changes over the rows that were measured, or an effect that is a curve of each joint.
+        Range over the measured rows of a discovered law, or of an effect that is a curve of each joint.
     quantity, shape, describes, usually
         Only of a discovered law: the quantity that it follows, its shape, a sentence about it, and what one of that
         place and quantity usually is; ``None`` where nobody can say.
@@ -105,7 +105,7 @@ class Finding:
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:
-    """Tell whether an effect is the displacement of an unknown frame.
+    """Whether an effect is the displacement of an unknown frame.
 
     A name without a finding is one: of what was no candidate, only unknown frames are confounded with effects.
     """
@@ -115,9 +115,10 @@ def is_frame(found: Sequence[Finding], name: str) -> bool:
 
 @dataclass(frozen=True)
 class Refused:
-    """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
+    """Effect removed by cross-validation: its probability and its held-out share.
 
-    The share is ``None`` where scatter of joints had feigned it, it stayed in question, or nothing determined it.
+    The share is ``None`` where scatter of joints imitated the effect, it stayed uncertain, or the data did not
+    determine it.
     """
 
     probability: float
@@ -126,7 +127,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class DataFault:
-    """A fault of the table, not of the robot, that alone makes robot and table fit.
+    """Fault of the table that explains the gap without a fault of the robot.
 
     ``kinds`` are those that the data cannot tell apart; ``what`` and ``remedy`` are plain words without a full stop.
     ``rms_before``, ``rms_after``: rms distance over the rows struck with frames registered, as they stand and mended;
@@ -143,10 +144,10 @@ class DataFault:
 
 @dataclass(frozen=True)
 class AnotherModel:
-    """The robot that was measured, as far as a table tells it from that of the URDF.
+    """Robot that was measured, as far as the table distinguishes it from the URDF's.
 
     Its links are ``factor`` times as long, if all alike; ``joint`` is ``off`` m from its place in the URDF, the
-    farthest. A robot at hand that ``fits``, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
+    farthest. A shipped robot that ``fits``, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
     ``remains``, m.
     """
 
@@ -158,18 +159,18 @@ class AnotherModel:
 
     @property
     def in_another_unit(self) -> bool:
-        """Whether the URDF's lengths stand in another unit than m."""
+        """Whether the URDF's lengths are not in m."""
         return self.factor is not None and not 1.0 / UNIT < self.factor < UNIT
 
     @property
     def unit(self) -> str:
-        """In which unit the URDF's lengths stand, in words; empty where it is m."""
+        """Unit of the URDF's lengths, in words; empty where it is m."""
         return in_another_unit(self.factor) if self.factor is not None and self.in_another_unit else ""
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """Robot and table do not belong together, so that nothing is said of the robot.
+    """Mismatch of robot and table, so that nothing can be said of the robot.
 
     ``fault`` of the table that would mend it, or ``model``, another robot; where neither, ``away`` and ``turned``: rms
     distance, m, or turn, rad, that the best explanation leaves, ``None`` for what fits.
@@ -243,7 +244,7 @@ class Gap:
 
     @property
     def noise_known(self) -> bool:
-        """Whether the noise is known apart from the remainder itself: stated, or seen where commands are repeated."""
+        """Whether the noise is known independently of the residual: stated, or measured by repeated commands."""
         return self.noise_source != "remainder"
 
 
@@ -263,7 +264,7 @@ class Where:
 
     @property
     def places(self) -> dict[tuple[str, str], float]:
-        """Shares of all places, by kind and name, largest first: they sum to the part that the fit explains."""
+        """Shares of all places, by kind and name, largest first; their sum is the explained share."""
         shares = {(kind, name): s for kind in ("joint", "link") for name, s in getattr(self, f"{kind}s").items()}
         shares |= {(kind, kind): share for kind, share in self.beyond.items()}
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
@@ -271,7 +272,7 @@ class Where:
 
 @dataclass(frozen=True)
 class Dependence:
-    """A recorded quantity that the remainder follows, with the p-value of an F test, corrected for all those tried.
+    """Recorded quantity that the residual follows, with the Bonferroni-corrected p-value of its F test.
 
     Where a discovered law follows it: the posterior probability that it follows another one.
     """
@@ -300,7 +301,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Wanted:
-    """The next measurement: the one thing that would help most.
+    """Most useful next measurement: a column, a pose, repeats, a frame or a wider range.
 
     ``kind`` is ``column``: to be recorded; ``frame``: to be measured and declared known; ``pose``: to be measured;
     ``range``: poses over the whole range of every joint; ``repeats``: poses repeated on another day. ``name`` is that
@@ -323,7 +324,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The data of the figures, one row per measurement, N rows.
+    """Row-wise data for the figures, N rows.
 
     ``rows`` (N,) are numbers in the file, ``outliers`` (N,) is True for outliers. ``gap`` and ``remainder`` (N, m):
     residual with the frames alone and with the effects, in root frame axes, m, then rad. ``position`` (N, 3) of the
@@ -376,7 +377,7 @@ class Place(Location):
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What one effect explains: places with a share worth drawing, largest first, and how many more were left out."""
+    """Partial residuals of one effect at its largest places, and the number of places left out."""
 
     effect: str
     places: tuple[Place, ...]
@@ -384,7 +385,7 @@ class Explained:
 
 
 def jsonable(value: Any) -> Any:
-    """Return what JSON can hold: lists for tuples, numbers of Python for those of NumPy, ``None`` for infinite ones."""
+    """Convert to plain JSON values: tuples to lists, NumPy numbers to Python's, infinite ones to ``None``."""
     if isinstance(value, Mapping):
         return {str(k): jsonable(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

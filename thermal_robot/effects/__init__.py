@@ -1,4 +1,4 @@
-"""Every effect, the contract of one, and the library of all of them with the user's own through entry points."""
+"""Effects: physical causes of the gap, their contract, and the library, extensible by entry points."""
 
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.beam import ThermalBending

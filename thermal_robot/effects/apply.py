@@ -1,4 +1,4 @@
-"""Sensitivities of the channels, and the displacement of the robot by fitted effects."""
+"""Application of effects: sensitivities of the channels, and the displacement by fitted effects."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from thermal_robot.effects import gate
 from thermal_robot.effects.effect import Channel, Effect, Parameter, Response
 from thermal_robot.errors import EffectError, ThermalRobotError
 from thermal_robot.kinematics import Displacement
+from thermal_robot.observables import instrument_rows
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def sensitivity(observations: Observations, channel: Channel, index: int) -> Array:
-    """Return (N, 6, k): twist of the target a unit of each of a channel's k components, root frame axes, m and rad.
+    """Twist (N, 6, k) of the target per unit of each of a channel's k components, root frame axes, m and rad.
 
     One component in a joint (rad or m), six of a twist at a segment, the base and the tool (in the frame that
     :class:`Response` states), three of a displacement of the measured point (measurement frame, m), which turns
@@ -35,12 +36,12 @@ def sensitivity(observations: Observations, channel: Channel, index: int) -> Arr
     if channel == "tool":
         return observations.tool_sensitivity
     shifts = np.zeros((observations.campaign.samples, 6, 3))
-    shifts[:, :3] = observations.frames.base[:3, :3].T
+    shifts[instrument_rows(observations.campaign), :3] = observations.frames.base[:3, :3].T
     return shifts
 
 
 def column(observations: Observations, response: Response, measures: int) -> Array:
-    """Return (N, m) change of the target's pose a unit of one response, root frame axes; m = ``measures``, 3 or 6."""
+    """Displacement (N, m) of the target's pose per unit of one response, root frame axes; m = ``measures``, 3 or 6."""
     values = response.values
     moves = sensitivity(observations, response.channel, response.index)[:, :measures]
     if response.channel == "joint":
@@ -54,7 +55,7 @@ def column(observations: Observations, response: Response, measures: int) -> Arr
 
 
 def by_place(robot: Robot, parameter: Parameter) -> tuple[Parameter, ...]:
-    """Return a parameter place by place: itself where it has one, else a part for each place that it acts on.
+    """Split a parameter by place: itself where it has one, else a part for each place that it acts on.
 
     A parameter without a place, such as one coefficient of expansion for all links, acts on all of them at once; the
     part at a joint, link, base, tool or instrument has the responses there.
@@ -75,7 +76,8 @@ def displacement(
     """Displacement of the chain's four channels by fitted values (P,) of effects, and of the measured point (N, 3), m.
 
     The latter stands in the measurement frame, ``None`` where no effect acts on the instrument. Raises
-    :class:`EffectError` if parameters break the contract, or are not as many as values: rows lack what is read.
+    :class:`EffectError` if parameters break the contract, or their number differs from that of the values because
+    columns are missing.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint, segment = np.zeros((samples, robot.n)), np.zeros((samples, len(robot.segments), 6))
@@ -100,10 +102,10 @@ def displacement(
 
 
 def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Columns of :func:`gate.reads` without which, or with other values of which, a fitted effect does something else.
+    """Columns of :func:`gate.reads` on which the displacement by a fitted effect depends.
 
-    A column counts where the effect's own parameters change as it is left out, or takes other values: one that equals
-    another column here need not do so elsewhere. Raises :class:`EffectError` if the effect breaks the contract.
+    A column counts if the effect's parameters change when it is removed or takes other values. Raises
+    :class:`EffectError` if the effect breaks the contract.
     """
     campaign, own = observations.campaign, gate.checked(effect, observations)
     read = gate.reads(effect, observations)
@@ -126,7 +128,7 @@ def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
 
 
 def _alike(some: Sequence[Parameter], others: Sequence[Parameter]) -> bool:
-    """Tell whether parameters have the same names and responses."""
+    """Whether parameters have the same names and responses."""
     one, two = ([(p.name, r.channel, r.index, r.values) for p in own for r in p.responses] for own in (some, others))
     named = [p.name for p in some] == [p.name for p in others]
     pairs = zip(one, two, strict=False)

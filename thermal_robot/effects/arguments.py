@@ -1,4 +1,4 @@
-"""Schema of an effect's arguments in a file: what its class says of each by annotations.
+"""Validation of the constructor arguments of an effect in a file, from its annotations.
 
 An annotation is a type, or a type with a kind of :mod:`thermal_robot.schema` for its range, as in ``lag: NotNegative =
 0.0`` with one of the names below. Lists in a file are tuples in an effect.
@@ -39,7 +39,7 @@ _PLAIN: dict[Any, Kind] = {
 
 
 def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
-    """Return an effect with arguments from a file; :class:`MisfitError` for one that its class does not take."""
+    """Effect with arguments from a file; :class:`MisfitError` for one that its class does not take."""
     if "__dataclass_params__" in vars(effect):
         try:
             hints = get_type_hints(effect, include_extras=True)
@@ -57,7 +57,7 @@ def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
 
 
 def _kind(annotation: Any) -> Kind:
-    """Return the kind that an annotation says; anything that JSON holds where it says nothing of it."""
+    """Return a validator of an annotation; of any JSON value where there is none."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return next((part for part in parts[1:] if callable(part)), _kind(parts[0]))

@@ -1,4 +1,4 @@
-"""Lost motion of joints: backlash to the side of approach or of the load, hysteresis, play of a carriage."""
+"""Lost motion of joints: backlash towards the side of approach or of the load, hysteresis, play of a carriage."""
 
 from __future__ import annotations
 
@@ -68,18 +68,18 @@ class Backlash(Effect):
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the approach columns, unless at least one of them varies."""
+        """Approach columns, unless at least one of them varies."""
         columns = tuple(f"approach.{joint}" for joint in observations.robot.joint_names)
         return () if any(observations.varies(column) for column in columns) else columns
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the approach columns of the chain's joints that were recorded, and what torques are read from."""
+        """Return the recorded approach columns of the chain's joints, and the columns from which torques follow."""
         columns = (f"approach.{joint}" for joint in observations.robot.joint_names)
         recorded = tuple(column for column in columns if column in observations.covariates)
         return (*recorded, *torque_columns(observations)) if np.any(self.held) or self.grows else recorded
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Friction always wins, whether or not it grows with torque, or gravity does above a share of the largest."""
+        """Grid of settings: friction holds the joint, constant or growing with torque, or gravity turns it."""
         turning = tuple(replace(self, carriage=sits) for sits in _CARRIAGES if _slides(observations))
         torque = observations.torque
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
@@ -98,20 +98,20 @@ class Backlash(Effect):
 
     @property
     def _shares(self) -> Array:
-        """(n,) share of each joint."""
+        """Share (n,) of each joint's largest torque above which gravity turns it."""
         return np.broadcast_to(self.held, len(self.largest))
 
     @property
     def apart(self) -> int:
-        """Number of joints whose share is not that of most."""
+        """Number of joints whose share differs from the common one."""
         shares = [share for j, share in enumerate(self._shares.tolist()) if self._may_hang(j)]
         return len(shares) - max(map(shares.count, shares), default=0)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Shares whose odds are larger and smaller by a factor, of all joints together and of each.
+        """Neighbours of a setting: odds of the shares multiplied and divided by a factor, jointly and one by one.
 
-        Besides, teeth that change sides over more or less of friction, one joint that never hangs, or alone does, and
-        where shares differ, that of one for all.
+        Also softer and sharper changes of side, a share of zero or of its own for one joint, and, where shares differ,
+        one of them for all.
         """
         shares = self._shares
         able = [j for j, joint in enumerate(self.chain) if self._may_hang(j) and joint in (self.places or self.chain)]
@@ -129,12 +129,12 @@ class Backlash(Effect):
         return (*found, *(replace(self, soft=film) for film in films))
 
     def _with(self, j: int, share: float) -> Effect:
-        """Return the effect with another share of one joint's largest torque."""
+        """Copy with another share of one joint."""
         shares = self._shares
         return replace(self, held=tuple(np.where(np.arange(len(shares)) == j, share, shares).tolist()))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One lost motion a joint whose direction of approach is recorded, rad or m; where it grows, one per torque."""
+        """One lost motion for each joint with a recorded approach, rad or m; where it grows, one per torque."""
         robot, covariates, torque = observations.robot, observations.covariates, observations.torque
         found = []
         for j, joint in enumerate(robot.joint_names):
@@ -153,7 +153,7 @@ class Backlash(Effect):
         return tuple(found)
 
     def _turning(self, observations: Observations, j: int, short: Array) -> Iterator[Parameter]:
-        """Yield three turns of the carriage of a slide, rad; none of one beside the chain."""
+        """Yield three rotations of the carriage of a prismatic joint, rad; none for a joint outside the chain."""
         robot, joint = observations.robot, observations.robot.joint_names[j]
         for s in (s for s, segment in enumerate(robot.segments) if segment.name == joint):
             stroke = observations.q[:, [j]] * (self.carriage == "moving")
@@ -164,11 +164,11 @@ class Backlash(Effect):
                 yield Parameter(label, "rad", _TURNS, "joint", joint, (at_segment(s, twist),))
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the direction in which the joint came."""
+        """Direction of approach of the joint."""
         return driving(observations, f"approach.{parameters[0].place}")
 
     def _side(self, observations: Observations, j: int, approach: Array) -> Array:
-        """(N,) on which side of its play a joint stands."""
+        """Side (N,) of its play on which a joint rests."""
         torque = observations.torque
         held = self.held[j] if isinstance(self.held, tuple) else self.held
         if not held or torque is None or not self._may_hang(j):
@@ -181,12 +181,12 @@ class Backlash(Effect):
         return np.asarray(0.5 * ((1.0 + approach) * up + (1.0 - approach) * down))
 
     def _may_hang(self, j: int) -> bool:
-        """Whether a joint carries enough to hang at all."""
+        """Whether a joint carries enough load for gravity to take up its play."""
         return self.largest[j] >= _HANGS * max(self.largest)
 
 
 def _slides(observations: Observations) -> bool:
-    """Whether a joint slides of which the side is known from which it came."""
+    """Whether a joint is prismatic and its direction of approach is known."""
     robot = observations.robot
     sliding = (n for n, kind in zip(robot.joint_names, robot.joint_types, strict=True) if kind == "prismatic")
     return any(observations.varies(f"approach.{joint}") for joint in sliding)

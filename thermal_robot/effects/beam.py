@@ -1,4 +1,4 @@
-"""Segments as straight beams: which bend, about what; and beams that bow because one side is warmer."""
+"""Straight beams: segments that bend, and beams that bow by a temperature difference."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def beams(robot: Robot) -> tuple[int, ...]:
 
 
 def shafts(robot: Robot) -> tuple[int, ...]:
-    """Beams along the axis of neither joint at their ends: along one, a twist is a joint that yields."""
+    """Beams along neither adjacent joint axis: along one, twist is joint compliance."""
     chain, found = robot.chain, []
     for s in beams(robot):
         e, along = robot.segments[s].index, robot.segments[s].direction
@@ -40,8 +40,8 @@ def shafts(robot: Robot) -> tuple[int, ...]:
 def cross_axes(robot: Robot, s: int) -> Array:
     """Two unit vectors (2, 3) across a segment, in its own frame.
 
-    They are right angled to the segment in the frame of its parent link, the first also to that axis of the frame which
-    lies most across the segment: the sections of links are drawn along the frames of links.
+    In the frame of the parent link both are perpendicular to the segment, the first also to the frame axis most nearly
+    across it, as link sections are usually aligned with link frames.
     """
     segment = robot.segments[s]
     rotation = robot.chain.rotations[segment.index]
@@ -53,7 +53,7 @@ def cross_axes(robot: Robot, s: int) -> Array:
 
 @dataclass(frozen=True)
 class ThermalBending(Effect):
-    """Beam with a temperature gradient: every segment bows with how much warmer its link is than the robot, κ = g ΔT.
+    """Thermal bending: every segment bows with the excess of its link's temperature over the robot's, κ = g ΔT.
 
     ΔT = T_link − T. What heats a link from one side (a motor, the sun, a drive) leaves its flanks unlike, and in
     proportion to how far the link has left the rest. A constant curvature κ about an axis across the segment turns its
@@ -72,19 +72,19 @@ class ThermalBending(Effect):
     size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the links' temperatures, unless the difference of one to the robot's varies."""
+        """Link temperatures, unless the difference of one to the robot's varies."""
         differences = (_difference(observations, column) for column in _columns(observations))
         if any(d is not None and np.ptp(d) > _STEADY for d in differences):
             return ()
         return _columns(observations)
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the links' temperatures that were recorded, and the robot's."""
+        """Return the recorded link temperatures, and the robot's."""
         own = [column for column in _columns(observations) if column in observations.covariates]
         return (*own, "temperature") if own and "temperature" in observations.covariates else tuple(own)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return two curvatures per kelvin for each segment whose link's temperature is recorded; 1/(m·K)."""
+        """Two curvatures per kelvin for each segment whose link's temperature is recorded; 1/(m·K)."""
         robot, found = observations.robot, []
         for s in beams(robot):
             segment = robot.segments[s]
@@ -99,7 +99,7 @@ class ThermalBending(Effect):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return how much warmer the link is than the robot."""
+        """Excess of the link's temperature over the robot's."""
         link = parameters[0].place
         difference = _difference(observations, f"temperature.{link}")
         return None if difference is None else (f"{link} warmer than the robot by", "K", difference)
@@ -112,7 +112,7 @@ def _columns(observations: Observations) -> tuple[str, ...]:
 
 
 def _difference(observations: Observations, column: str) -> Array | None:
-    """(N,) how much warmer a link is than the robot, K; ``None`` where its temperature is not recorded."""
+    """Excess (N,) of a link's temperature over the robot's, K; ``None`` where it is not recorded."""
     recorded = observations.covariates
     if column not in recorded:
         return None

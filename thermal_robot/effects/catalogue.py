@@ -1,4 +1,4 @@
-"""Registry of effects by name: the program's own, those of installed packages, and the choice among them."""
+"""Registry of effects: the program's own, those of installed packages, and the user's choice among them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ RANDOM = tuple(_RANDOM)
 
 
 def random_effects() -> tuple[RandomEffect, ...]:
-    """Return the effects that scatter: told from what remains, not fitted.
+    """Random effects, which are estimated as variance components of the residual.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def random_effects() -> tuple[RandomEffect, ...]:
 
 
 def library() -> dict[str, Effect]:
-    """Return every effect that is fitted, by name: the program's own, then those of installed packages.
+    """All fixed effects by name: the program's own, then those of installed packages.
 
     Warns
     -----
@@ -98,7 +98,7 @@ def library() -> dict[str, Effect]:
 
 
 def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
-    """Raise unless something is an effect that can stand beside those that are known."""
+    """Raise unless an object is an effect that can be added to the known ones."""
     if not isinstance(effect, Effect) or not isinstance(effect.name, str) or not effect.name:
         raise EffectError(f"{effect!r} is not an effect with a name; expected an instance of a subclass of Effect")
     if effect.random:
@@ -120,7 +120,7 @@ def restored(name: str, arguments: str) -> Effect:
 
 
 def named(name: str) -> Effect:
-    """Return an effect by its name, one that scatters too.
+    """Effect of a name, random ones included.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def named(name: str) -> Effect:
 
 
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
-    """Return what an answer says of one effect; :class:`UnknownEffectError` says which name was probably meant."""
+    """Entry of an answer for one effect; :class:`UnknownEffectError` suggests the name that was meant."""
     if name not in answers:
         raise UnknownEffectError(f"no effect named {name!r} was considered{_meant(str(name), answers)}")
     return answers[name]
@@ -162,7 +162,7 @@ def _unknown(name: str, known: Iterable[str]) -> EffectError:
 def choose(
     only: str | Iterable[str] = (), without: str | Iterable[str] = (), own: Iterable[Effect] = ()
 ) -> tuple[Effect, ...]:
-    """Return the effects to be fitted that a user asked for; names of random ones may be asked for, too.
+    """Return the fixed effects that a user selects; names of random ones are accepted, too.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Bodies that yield to load, or by what inclinometers read of it: the base under the arm, links as cantilevers.
+"""Compliance of bodies under load, or as inclinometers measure it: the base, and links as cantilevers.
 
 An inclinometer's columns are ``tilt.x``, ``tilt.y`` of the base, and ``tilt.<link>.x``, ``tilt.<link>.y`` of a link.
 """
@@ -31,12 +31,12 @@ _MASSES = "masses in the URDF"
 
 
 def tilts(*links: str) -> tuple[str, ...]:
-    """Columns of the inclinometers of some links, or of the base."""
+    """Inclinometer columns of some links, or of the base."""
     return tuple(f"tilt.{link}.{axis}" if link else f"tilt.{axis}" for link in links for axis in "xy")
 
 
 def measured_turn(observations: Observations, link: str = BASE) -> Array:
-    """(N, 3) turn that an inclinometer read about x and y, rad; zero where nothing was."""
+    """Rotation (N, 3) about x and y by an inclinometer, rad; zero where it was not read."""
     read = np.zeros((observations.campaign.samples, 3))
     for k, column in enumerate(tilts(link)):
         read[:, k] = observations.covariates.get(column, 0.0)
@@ -44,49 +44,49 @@ def measured_turn(observations: Observations, link: str = BASE) -> Array:
 
 
 class _Yielding(Effect):
-    """Compliance under a load, or where inclinometers were read, the turn that was measured (``tilt``)."""
+    """Compliance under a load, or the rotation measured by inclinometers (``tilt``)."""
 
     tilt: bool  # a field of each class
 
     @abstractmethod
     def _inclined(self, observations: Observations) -> tuple[str, ...]:
-        """Return the links, or the base, whose inclinometers show it."""
+        """Links, or the base, with an inclinometer reading."""
 
     @abstractmethod
     def _loaded(self, observations: Observations) -> bool:
-        """Whether the masses are known and what they do varies."""
+        """Whether masses are known and their load varies."""
 
     @property
     def sided_by(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Gravity, unless the turns were measured."""
+        """Quantity that gives the parameters their sign: gravity, unless rotations were measured."""
         return () if self.tilt else ("gravity",)
 
     def _kinds(self, observations: Observations) -> list[bool]:
-        """Return whether turns are measured, for each way in which the campaign tells them."""
+        """Whether rotations are measured, one entry for each source of data."""
         measured = any(observations.varies(column) for column in tilts(*self._inclined(observations)))
         return [*([False] if self._loaded(observations) else []), *([True] if measured else [])]
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the tilts where they are used, else the payload where it was recorded."""
+        """Tilt columns where they are used, else the payload where it was recorded."""
         used = tilts(*dict.fromkeys((BASE, *self._inclined(observations)))) if self.tilt else ("payload",)
         return tuple(column for column in used if column in observations.covariates)
 
 
 def _tilt_read(observations: Observations, link: str) -> Driver | None:
-    """Return the reading of an inclinometer that varies most, as what drives an effect."""
+    """Inclinometer reading that varies most, as the driver of an effect."""
     read = [column for column in tilts(link) if column in observations.covariates]
     return driving(observations, max(read, key=lambda column: float(np.ptp(observations.covariates[column]))))
 
 
 def _moment(name: str, moment: Array, error: Array) -> Driver:
-    """Return a moment (N, 3) about the axis about which an error (N,) goes with it."""
+    """Moment (N, 3) about the axis with the best correlation to an error (N,)."""
     axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
     return name, "N·m", moment @ axis / (np.linalg.norm(axis) + 1e-300)
 
 
 @dataclass(frozen=True)
 class BaseCompliance(_Yielding):
-    """Base compliance: pedestal, floor or vehicle tip by c_e M_e about each horizontal axis e of the root frame; rad.
+    """Base compliance: pedestal or floor tips by c_e M_e about each horizontal axis e of the root frame; rad.
 
     M (N·m) is the moment of the weight of all links, and of the payload, about the root frame's origin (the URDF's
     masses); c_e in rad/(N·m), a spring about each axis. What yields ``below`` the origin moves the whole arm sideways,
@@ -110,16 +110,16 @@ class BaseCompliance(_Yielding):
         return observations.robot.has_masses and bool((np.ptp(overturning(observations), axis=0) > _STEADY).any())
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give the base's turn, unless the tilt or the moment of known masses varies."""
+        """Columns that would give the base's rotation, unless its tilt or the moment of known masses varies."""
         return () if self._kinds(observations) else (*tilts(BASE), _MASSES)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return springs and the measured tilt, as far as the campaign has them, at the origin and below."""
+        """Grid of settings: springs and measured tilt, as far as recorded, about the origin and about a lower point."""
         every = [(tilt, below) for tilt in self._kinds(observations) for below in (False, True)]
         return tuple(replace(self, below=below, tilt=tilt) for tilt, below in every) or (self,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return two compliances about each horizontal axis, rad/(N·m) and m/(N·m), or gain and depth of the tilt."""
+        """Two compliances about each horizontal axis, rad/(N·m) and m/(N·m), or gain and depth of the tilt."""
         gravity = observations.robot.gravity
         up = -gravity / max(float(np.linalg.norm(gravity)), _STEADY)
         if self.tilt:
@@ -136,21 +136,21 @@ class BaseCompliance(_Yielding):
         return found
 
     def _tipping(self, turn: Array, up: Array, *told: tuple[str, str, float]) -> tuple[Parameter, ...]:
-        """Return the parameters, by label, unit and size, of a turn (N, 3) at the origin, and of one below it."""
+        """Parameters, by label, unit and size, of a rotation (N, 3) about the origin, and about a point below."""
         still = np.zeros_like(turn)
         twists = [np.hstack([still, turn]), np.hstack([np.cross(turn, up), still])][: 1 + self.below]
         rows = zip(told, twists, strict=False)
         return tuple(Parameter(*one, "base", "base", (at_base(twist),), positive=True) for one, twist in rows)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the tilt that varies most, or the moment about the axis about which the error goes with it."""
+        """Tilt that varies most, or the moment about the axis that correlates best with the error."""
         if self.tilt:
             return _tilt_read(observations, BASE)
         return _moment("overturning moment", overturning(observations), error)
 
 
 def overturning(observations: Observations) -> Array:
-    """(N, 3) moment of the weight of all that moves about the root frame's origin, root frame axes, N·m."""
+    """Overturning moment (N, 3) of the moving weight about the root frame's origin, root frame axes, N·m."""
     first = observations.robot.segments[0].index
     turns, place = observations.commanded.rotations[:, first], observations.commanded.positions[:, first]
     load = np.einsum("nij,nkj->nki", turns, observations.segment_load[:, 0].reshape(-1, 2, 3))
@@ -199,18 +199,18 @@ class LinkCompliance(_Yielding):
         return observations.robot.has_masses and any(np.ptp(turn) > _STEADY for turn in bent)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give a load, unless one that bends a segment, or a measured tilt, varies.
+        """Columns that would give a load, unless a bending load or a measured tilt varies.
 
         Where the arm's own masses are not known, what a payload bends it by stands in for their share, too.
         """
         return () if self._kinds(observations) else (_MASSES,)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return bending under load and the measured tilts, as far as the campaign has them."""
+        """Return the settings: bending under load and measured tilts, as far as the campaign has them."""
         return tuple(replace(self, tilt=tilt) for tilt in self._kinds(observations)) or (self,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return two bending compliances a segment, then what twists, 1/(N·m²); or gains of measured turns."""
+        """Two bending compliances and torsion for each segment, 1/(N·m²); or gains of measured rotations."""
         if self.tilt:
             return _by_tilt(observations)
         robot = observations.robot
@@ -233,7 +233,7 @@ class LinkCompliance(_Yielding):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the bending moment, about the axis about which the error goes with it, or the tilt."""
+        """Bending moment about the axis that correlates best with the error, or the tilt."""
         link = parameters[0].place
         if self.tilt:
             return _tilt_read(observations, link)
@@ -242,7 +242,7 @@ class LinkCompliance(_Yielding):
 
 
 def _by_tilt(observations: Observations) -> tuple[Parameter, ...]:
-    """Return a gain for each link with an inclinometer, in the order of the chain."""
+    """One gain for each link with an inclinometer, in the order of the chain."""
     robot, chain, found = observations.robot, observations.robot.chain, []
     before = measured_turn(observations)  # root frame
     for s, segment in enumerate(robot.segments):
@@ -260,7 +260,7 @@ def _by_tilt(observations: Observations) -> tuple[Parameter, ...]:
 
 
 def _yields(observations: Observations, s: int) -> list[tuple[Array, Array]]:
-    """Turn (N,) and displacement (N,) of a segment's far end about each axis, for E I = 1 N·m²."""
+    """Rotation (N,) and deflection (N,) of a cantilever's free end about each axis, for E I = 1 N·m²."""
     segment, load, found = observations.robot.segments[s], observations.segment_load[:, s], []
     length = segment.length
     for axis in cross_axes(observations.robot, s):

@@ -22,6 +22,8 @@ from thermal_robot.effects.effect import (
     at_tool,
 )
 from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.effects.settings import IN_MODEL
+from thermal_robot.observables import components, instrument_rows
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -47,6 +49,7 @@ class Geometric(Effect):
 
     name: ClassVar[str] = "geometric"
     title: ClassVar[str] = "geometric errors of the links"
+    in_model: ClassVar[str] = "a calibration of this one arm, or another variant, in the controller"
     size_spread: ClassVar[float] = 1.0
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -64,7 +67,7 @@ class Geometric(Effect):
         )
 
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Errors of the parameters of Denavit and Hartenberg (1955) but for the zeros, which are the joints' own.
+        """Denavit-Hartenberg parameter errors (1955) without the joint zeros, which are ``joint_offset``.
 
         Of each joint's axis: its distance from the axis before it, its twist about their common normal, its shift along
         itself, or its turn if the joint slides (a, α, d, θ); where both are nearly parallel also a turn across (β).
@@ -85,7 +88,7 @@ class Geometric(Effect):
         return tuple(p for p in found if not self.places or p.place in self.places)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the position of the joint whose placement it is, or of the one that it mimics."""
+        """Position of the joint of the placement, or of the joint that it mimics."""
         joint = observations.robot.segments[parameters[0].responses[0].index].joint
         return position_of(observations, joint) if joint else None
 
@@ -127,6 +130,7 @@ class JointOffset(Effect):
 
     name: ClassVar[str] = "joint_offset"
     title: ClassVar[str] = "joint zero offsets"
+    in_model: ClassVar[str] = "other joint zeros in the controller"
     singular: ClassVar[str] = "a zero offset"
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
@@ -142,7 +146,7 @@ class JointOffset(Effect):
         )
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
+        """Position of the joint."""
         return position_of(observations, parameters[0].place)
 
 
@@ -159,6 +163,8 @@ class BaseFrame(Effect):
 
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
+    in_model: ClassVar[str] = "a base frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
@@ -168,15 +174,15 @@ class BaseFrame(Effect):
         return _ALONE if self.alone else 1.0
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return all components together, and each alone."""
+        """Return the settings: all components together, and each alone."""
         return (self, *(replace(self, alone=component) for component, _ in TWIST))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the declaration that would make the base an effect."""
+        """Return the declaration without which the base is fitted and no effect."""
         return () if observations.campaign.base_known else ('frames.base = "known"',)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the base's twist in the root frame: m and rad."""
+        """Twist of the base in the root frame: m and rad."""
         return tuple(
             Parameter(component, unit, 2e-3, "base", "base", (at_base(np.eye(6)[k]),))
             for k, (component, unit) in enumerate(TWIST)
@@ -199,6 +205,8 @@ class ToolFrame(Effect):
 
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
+    in_model: ClassVar[str] = "a tool or flange frame set in the controller"
+    in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
 
     @property
@@ -207,21 +215,21 @@ class ToolFrame(Effect):
         return _ALONE if self.alone else 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the declaration that would make the tool an effect."""
+        """Return the declaration without which the tool is fitted and no effect."""
         campaign = observations.campaign
         # a simulator predicts the declared target: an unknown tool is not refitted to it
         return () if campaign.tool_known or campaign.simulated_position is not None else ('frames.tool = "known"',)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the components that the campaign shows together, and each of all alone."""
+        """Return the settings: all observable components together, and each alone."""
         own = replace(self, turns=self._turns(observations))
         return (own, *(replace(own, alone=component) for component, _ in TWIST))
 
     def _turns(self, observations: Observations) -> bool:
-        return observations.campaign.measures == "pose" if self.turns is None else self.turns
+        return components(observations.campaign) == 6 if self.turns is None else self.turns
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
+        """Twist of the tool in the tool frame: m, and rad where orientation is measured."""
         return tuple(
             Parameter(component, unit, 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
             for k, (component, unit) in enumerate(TWIST)
@@ -243,11 +251,15 @@ class InstrumentScale(Effect):
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return what would make it testable: an instrument."""
+        return () if instrument_rows(observations.campaign).any() else ("rows of kind position or pose",)
+
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
         response = at_instrument(observations.predicted_position)
         return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,)),)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the distance from the instrument."""
+        """Distance from the instrument."""
         return "distance from the instrument", "m", np.linalg.norm(observations.predicted_position, axis=1)

@@ -53,22 +53,22 @@ class Drift(Fading):
         return tuple(replace(fitted, time_constant=share) for share in (0.0, 0.1, 0.25, 0.6))
 
     def elsewhere(self, observations: Observations) -> Drift:
-        """Return it as it begins with that campaign, at the same rate."""
+        """Copy for another campaign: the same rate from its own beginning."""
         clock = observations.clock
         return self if clock is None else replace(self, origin=float(clock.min()), found=())
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return it as it begins and ends with the campaign."""
+        """Copy with the start and the end of the campaign."""
         return self if observations.clock is None else replace(self, found=ends(observations.clock))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Time constants longer and shorter by a factor; beside the linear law, long ones."""
+        """Neighbours of a setting: time constants times and over a factor; for the linear law, long time constants."""
         shares = (0.0, 1.0, 2.0) if self.time_constant == 0.0 else (1.0, factor, 1.0 / factor)
         base = self.time_constant or 1.0
         return tuple(replace(self, time_constant=base * share) for share in shares)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the base's twist over the campaign, in the root frame: m and rad."""
+        """Twist of the base over the campaign, in the root frame: m and rad."""
         clock = observations.clock
         if clock is None:
             return ()
@@ -83,5 +83,5 @@ class Drift(Fading):
         )
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the clock."""
+        """Time, or order in its place."""
         return driving(observations, "time" if "time" in observations.covariates else "order")

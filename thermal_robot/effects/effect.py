@@ -1,4 +1,4 @@
-"""The contract of an effect: where error enters the chain, and the quantity it grows with.
+"""Contract of an effect: where error enters the chain, and the quantity that it grows with.
 
 An effect is a frozen dataclass. It names its parameters and gives the *unit response* of each: what one unit does in
 the channels, read from the observations. It calls no kinematics, fits nothing and holds no fitted value. Arguments of
@@ -53,7 +53,7 @@ TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Unit response: what one unit of a parameter does in one place of one channel.
+    """Unit response: displacement of one place of one channel per unit of a parameter.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Parameter:
     Attributes
     ----------
     label
-        What it is, without the place ("strain per kelvin").
+        Name without the place ("strain per kelvin").
     unit
         Its unit as text.
     size
@@ -150,9 +150,9 @@ class Parameter:
         The joint's or link's URDF name; ``base``, ``tool`` or ``instrument`` (or a link) for these kinds; empty for all
         that the responses act on.
     responses
-        What one unit does in the channels.
+        Displacement of the channels per unit.
     positive
-        Whether it cannot be negative, as no joint is stiffer than rigid: its prior is half a normal one.
+        Whether it cannot be negative, as a compliance: its prior is half-normal.
     """
 
     label: str
@@ -170,13 +170,13 @@ class Parameter:
 
     @cached_property
     def bare(self) -> Parameter:
-        """The parameter without its responses, which may be large."""
+        """Copy without the responses, which may be large."""
         return replace(self, responses=())
 
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """Base of all effects; the module's docstring shows how to write one.
+    """Base class of effects; the module's docstring shows how to write one.
 
     Attributes
     ----------
@@ -207,6 +207,11 @@ class Effect(ABC):
     """By which it is asked for and reported."""
     title: ClassVar[str] = ""
     """Plain words for a sentence; the name with spaces where a class states none."""
+    in_model: ClassVar[str] = ""
+    """What it is where another model of the same robot says its pose, such as the controller's; empty for what no model
+    holds, such as wear."""
+    in_model_times: ClassVar[float] = 1.0
+    """Times of its expected size that it has there."""
     singular: ClassVar[str] = ""
     """The same of a single joint; the title where a class states none."""
     sided_by: ClassVar[tuple[str, ...]] = ()
@@ -225,7 +230,7 @@ class Effect(ABC):
     """Whether its own part is told where a larger effect that contains it was found: what somebody could set anew."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Give a class with a name of its own, but no title, one; the same for its singular."""
+        """Derive title and singular from the class name where a class gives none."""
         super().__init_subclass__(**options)
         if "name" in vars(cls) and "title" not in vars(cls):
             cls.title = str(cls.name).replace("_", " ")
@@ -234,44 +239,44 @@ class Effect(ABC):
 
     @abstractmethod
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the parameters with their unit responses, for the observations' rows."""
+        """Parameters with their unit responses, for the observations' rows."""
 
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return fewer parameters that do the same, in the order in which they are told; empty where all are told.
+        """Equivalent smaller set of parameters, in the order of reporting; empty where all are reported.
 
-        Each is a combination of :meth:`parameters`. Beside those of the effects inside (:attr:`told_inside`), which
-        come first, they are no more than needed, but for what the data do not see.
+        Each is a combination of :meth:`parameters`. Together with those of the contained effects (:attr:`told_inside`),
+        which come first, they are a minimal set.
         """
         return ()
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what the campaign lacks for this effect to be testable; empty when it can be tested."""
+        """Columns that the campaign lacks for this effect to be testable; empty when it can be tested."""
         return tuple(need for need in self.needs if not observations.varies(need))
 
     @property
     def share(self) -> float | None:
-        """Share of the prior probability of its name; ``None`` where it goes by places and weight.
+        """Share of the prior probability of its name; ``None`` where places and ``weight`` decide it.
 
-        Settings of an effect that states its share are not looked for in single places.
+        Effects with a share are not searched in single places.
         """
         return None
 
     @property
     def weight(self) -> float:
-        """Prior weight beside other settings of the same places."""
+        """Prior weight against other settings of the same places."""
         return 1.0
 
     @property
     def apart(self) -> int:
-        """Number of constants that stand apart from a common one: each has its price."""
+        """Number of constants that differ from a common one; each costs prior probability."""
         return 0
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the covariates that its responses were read from: whoever predicts must know them, too."""
+        """Covariates on which its responses depend, and which a prediction needs."""
         return tuple(need for need in self.needs if need in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the settings of the nonlinear arguments that inference should compare: the coarse grid.
+        """Return the settings of the nonlinear arguments that inference compares: the coarse grid.
 
         What a setting takes from the campaign (an origin of time, a record) is fixed here, once, so that a saved model
         predicts other samples with it.
@@ -279,19 +284,19 @@ class Effect(ABC):
         return (self,)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return settings near this one, itself among them: the constants that may be refined, and no others.
+        """Return the settings near this one, itself among them, for the refinement of constants.
 
-        Estimation moves to the best of them, with factors (above 1) that become smaller.
+        A coordinate search moves to the best of them, with decreasing factors (above 1).
         """
         return (self,)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return what drives the effect at one place, to draw it against.
+        """Quantity that drives the effect at one place, for plots.
 
         Parameters
         ----------
         observations
-            Of the fitted model.
+            Observations of the fitted model.
         parameters
             Those at the place, at least one.
         error
@@ -305,18 +310,18 @@ class Effect(ABC):
         return None
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return the effect as a model holds it that predicts other rows; it does the same in these."""
+        """Equivalent effect for prediction at other rows."""
         return self
 
     def elsewhere(self, observations: Observations) -> Effect:
-        """Return the effect as it is in another campaign of the robot, with that one's record in place of its own."""
+        """Effect in another campaign of the robot, with that campaign's record."""
         return self
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor's arguments, for saving; ``places`` and ``excluded`` only where they are set."""
+        """Return the constructor arguments for saving; ``places`` and ``excluded`` only where they are set."""
         return {name: value for name, value in asdict(self).items() if name not in ("places", "excluded") or value}
 
 
 def in_words(kind: str, place: str) -> str:
-    """Name a place with its kind, as a link and a joint may share a name; ``elbow_joint`` says it already."""
+    """Name of a place with its kind, unless the name says it."""
     return (place or kind) if not place or kind in place else f"{kind} {place}"

@@ -1,4 +1,4 @@
-"""Extrapolation of effects that only a curve through measured rows tells: beyond these they fall back to their mean.
+"""Extrapolation of effects with empirical curves: beyond the measured range they fade to their mean.
 
 A function of x, of mean m over the rows where it was found, is there what it is. At a distance d beyond the range of
 width r it is m + (f(x̂) − m) exp(−½ (d / (s r))²), x̂ the nearer end and s = :data:`settings.FADES`: continuous, never
@@ -24,11 +24,11 @@ _OF_A_MODEL = ("found", "means", "rests", "fades")
 
 @dataclass(frozen=True)
 class Fading(Effect):
-    """Effect with the range of its driver in which it was ``found``; empty where it is to have no end.
+    """Effect with the range of its driver in which it was ``found``; empty where it does not fade.
 
     It ``fades`` beyond, or keeps the value of the edge. ``means``: of each of its functions over the rows where it was
-    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that frames take over of a unit of
-    each parameter.
+    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that the fitted frames absorb per
+    unit of each parameter.
     """
 
     found: tuple[float, ...] = field(default=(), kw_only=True)
@@ -37,16 +37,16 @@ class Fading(Effect):
     fades: bool = field(default=True, kw_only=True)
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor's arguments, for saving; the range only where it has one."""
+        """Return the constructor arguments for saving; the range only where it has one."""
         return {k: v for k, v in super().arguments().items() if self.found or k not in _OF_A_MODEL}
 
     def faded(self, functions: Array, left: Array) -> Array:
-        """(N, K) functions, of which so much (N,) is left of what they differ by from their means."""
+        """Functions (N, K) whose deviations from their means are multiplied by the factor (N,)."""
         means = np.array(self.means) if self.means else np.zeros(functions.shape[1])
         return np.asarray(means + (functions - means) * left[:, None]) if self.fades else functions
 
     def registered(self, parameters: Sequence[Parameter], left: Sequence[Array]) -> tuple[Parameter, ...]:
-        """Return parameters with what the frames take over of each where so much, (N,) each, is left of it."""
+        """Parameters with the part that the frames absorb at the fading factors (N,)."""
         if not self.rests or not self.fades:
             return tuple(parameters)
         twists = [np.outer(1.0 - own, self.rests[12 * k : 12 * k + 12]) for k, own in enumerate(left)]
@@ -55,11 +55,11 @@ class Fading(Effect):
 
 
 def ends(values: Array) -> tuple[float, float]:
-    """Least and largest of (N,) values."""
+    """Range, least and largest, of (N,) values."""
     return float(values.min()), float(values.max())
 
 
 def left_at(values: Array, low: float, high: float) -> Array:
-    """(N,) share that is left of an effect at values of what drives it, found from one end to the other."""
+    """Fading factor (N,), 1 to 0, of an effect at values of its driver, for the range in which it was found."""
     beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
     return np.asarray(np.exp(-0.5 * beyond**2))

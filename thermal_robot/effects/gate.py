@@ -1,4 +1,4 @@
-"""Validation of what effects answer: everybody asks through this gate, and a breach of the contract is refused.
+"""Validation of what effects return: all callers pass through here, and a breach of the contract is an error.
 
 An effect may be anybody's code. What it raises, and an answer of the wrong type or content, end in an ``EffectError``
 that names the effect and what was asked.
@@ -36,7 +36,7 @@ _FIELDS: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
 
 
 def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Parameters of an effect in its ``places``, none in ``excluded`` ones, once they are seen to keep the contract.
+    """Return the validated parameters of an effect in its ``places`` but the ``excluded`` ones.
 
     Each has a name of its own, a kind of place, a place of that kind that the robot has (or none), a positive size, and
     finite responses of the shape that :class:`Response` states. Raises :class:`EffectError` otherwise, or if the effect
@@ -53,7 +53,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
 
 
 def _is_what_it_holds(effect: Any) -> bool:
-    """Tell whether effects that compare as equal are equal: whether all that this one holds is compared, and hashed."""
+    """Whether equality of effects compares all of their fields, so that they can be hashed."""
     try:
         hash(effect)
     except TypeError:
@@ -62,7 +62,7 @@ def _is_what_it_holds(effect: Any) -> bool:
 
 
 def placed(effect: Effect, places: tuple[str, ...] = (), excluded: tuple[str, ...] = ()) -> Effect:
-    """Return an effect, with whatever constructor, in other places."""
+    """Copy of an effect in other places, whatever its constructor."""
     other = copy.copy(effect)
     object.__setattr__(other, "places", places)
     object.__setattr__(other, "excluded", excluded)
@@ -70,7 +70,7 @@ def placed(effect: Effect, places: tuple[str, ...] = (), excluded: tuple[str, ..
 
 
 def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Return the parameters of an effect without a look at their responses, which may then be of any rows."""
+    """Parameters of an effect without a check of their responses, which may be of any rows."""
     with np.errstate(all="ignore"):
         answer = _asked(effect, "parameters", observations)
     if not isinstance(answer, (tuple, list)) or not all(isinstance(parameter, Parameter) for parameter in answer):
@@ -79,12 +79,12 @@ def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...
 
 
 def independent(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Return the parameters in which an effect is told (:meth:`Effect.independent`), once they keep the contract."""
+    """Return the validated parameters for reporting (:meth:`Effect.independent`)."""
     return _seen(effect, _asked(effect, "independent", observations), observations)
 
 
 def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-    """Driver of an effect at a place (:meth:`Effect.driver`): a name, a unit and (N,) finite values, or ``None``."""
+    """Return a validated driver (:meth:`Effect.driver`): name, unit, (N,) finite values; ``None`` without one."""
     answer = _asked(effect, "driver", observations, parameters, error)
     if answer is None:
         return None
@@ -97,14 +97,14 @@ def driver(effect: Effect, observations: Observations, parameters: Sequence[Para
 
 
 def missing(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Columns that the campaign lacks for an effect (:meth:`Effect.missing`); it and ``needs`` are tuples of texts."""
+    """Return the validated columns that the campaign lacks for an effect (:meth:`Effect.missing`)."""
     if isinstance(effect, Effect):
         _texts(effect, "needs is", effect.needs)
     return _texts(effect, "missing answers", _asked(effect, "missing", observations))
 
 
 def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Covariates that an effect reads (:meth:`Effect.reads`), names of columns that the campaign has."""
+    """Return the validated covariates that an effect reads (:meth:`Effect.reads`)."""
     answer = _texts(effect, "reads answers", _asked(effect, "reads", observations))
     if any(column not in observations.covariates for column in answer):
         raise _broken(effect, f": reads answers {answer!r}, expected columns of the campaign")
@@ -112,28 +112,28 @@ def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
 
 
 def delivered(effect: Effect, observations: Observations) -> Effect:
-    """Effect as a model holds it (:meth:`Effect.delivered`), one of the same name."""
+    """Return the validated effect for prediction at other rows (:meth:`Effect.delivered`)."""
     return _settings(effect, "delivered", (_asked(effect, "delivered", observations),))[0]
 
 
 def elsewhere(effect: Effect, observations: Observations) -> Effect:
-    """Effect as it is in another campaign (:meth:`Effect.elsewhere`), one of the same name."""
+    """Return the validated effect in another campaign (:meth:`Effect.elsewhere`)."""
     return _settings(effect, "elsewhere", (_asked(effect, "elsewhere", observations),))[0]
 
 
 def unfaded(effect: Effect) -> Effect:
-    """Effect as it goes on beyond the rows where it was found, if it has such a range."""
+    """Copy of an effect that does not fade beyond the range where it was found."""
     ends = getattr(effect, "fades", False) and getattr(effect, "found", ())
     return replace(effect, fades=False) if ends else effect  # type: ignore[call-arg]
 
 
 def variants(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect that are compared (:meth:`Effect.variants`), at least one, each of its name."""
+    """Return the validated settings of an effect (:meth:`Effect.variants`), at least one."""
     return _settings(effect, "variants", _asked(effect, "variants", observations))
 
 
 def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
-    """Return settings near an effect's own (:meth:`Effect.nearby`), each of its name, itself among them."""
+    """Return the validated settings near an effect's own (:meth:`Effect.nearby`), itself among them."""
     answer = _settings(effect, "nearby", _asked(effect, "nearby", factor))
     if effect not in answer:
         raise _broken(effect, f": nearby answers {answer!r}, expected it to hold itself, {effect!r}")
@@ -141,25 +141,25 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
 
 
 def at(effect: Effect, place: str, observations: Observations) -> Effect | None:
-    """Effect in one joint or link alone; ``None`` where it has no parameters there, or states its share."""
+    """Copy of an effect in one joint or link; ``None`` where it has no parameters there, or states its share."""
     has = effect.share is None and place in places_of(checked(effect, observations))
     return placed(effect, (place,), effect.excluded) if has else None
 
 
 def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect in each single joint or link; empty where it has parameters in one or none."""
+    """Return the copies of an effect in each single joint or link; empty where it has parameters in one or none."""
     places = places_of(checked(effect, observations))
     single = places if len(places) > 1 and effect.share is None else ()
     return tuple(placed(effect, (place,), effect.excluded) for place in single)
 
 
 def places_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
-    """Joints and links that parameters sit in, in their order, each once."""
+    """Joints and links of some parameters, in their order, without duplicates."""
     return tuple(dict.fromkeys(p.place for p in parameters if p.kind in _LOCAL and p.place))
 
 
 def arguments(effect: Effect) -> dict[str, Any]:
-    """Arguments of an effect, for saving (:meth:`Effect.arguments`): values by name that JSON can hold."""
+    """Return the validated constructor arguments for saving (:meth:`Effect.arguments`), JSON values by name."""
     answer = _asked(effect, "arguments")
     try:
         json.dumps(answer)
@@ -171,7 +171,7 @@ def arguments(effect: Effect) -> dict[str, Any]:
 
 
 def _asked(effect: Effect, question: str, *about: Any) -> Any:
-    """Return what a method of an effect answers; whatever it raises names the effect and the method."""
+    """Call a method of an effect; errors name the effect and the method."""
     if not isinstance(effect, Effect):
         raise EffectError(f"{effect!r} is not an effect; expected an instance of a subclass of Effect")
     try:
@@ -181,7 +181,7 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
 
 
 def _broken(effect: Effect, what: str) -> EffectError:
-    """Return the error of an effect that breaks the contract: the program's own is no fault of who uses it."""
+    """Error of a breach of contract: :class:`OwnEffectError` for the program's own effects."""
     own = type(effect).__module__.split(".")[0] == __package__.split(".")[0]
     return (OwnEffectError if own else EffectError)(f"effect {effect.name!r}{what}")
 
@@ -201,7 +201,7 @@ def _settings(effect: Effect, question: str, answer: Any) -> tuple[Effect, ...]:
 
 
 def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
-    """Return the parameters in the joints and links that the effect names, all where it names none; none excluded."""
+    """Parameters in the effect's places, in all where it names none, but the excluded ones."""
     known = (*robot.joint_names, *places_of(parameters))
     # what an effect does not do in a place of the robot may be excluded from there
     for field, among in (("places", known), ("excluded", (*known, *robot.urdf_joints, *robot.urdf_links))):
@@ -236,7 +236,7 @@ def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Para
 
 
 def _wrong(parameter: Any, observations: Observations) -> str:
-    """Say what is wrong with a parameter; empty where nothing is."""
+    """Describe what is wrong with a parameter; empty where nothing is."""
     for field, fits, expected in _FIELDS:
         if not fits(found := getattr(parameter, field)):
             return f"{field} is {found!r}, expected {expected}"

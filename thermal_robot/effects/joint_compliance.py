@@ -1,4 +1,4 @@
-"""Joint compliance: gear or servo yields to the torque that gravity, payload or contact puts on it."""
+"""Joint compliance: gears and servos yield to the torque of gravity, payload or contact."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class JointCompliance(Effect):
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give torques, where neither these nor the shape of gravity's vary."""
+        """Columns that would give torques, where neither these nor the shapes of gravity's torque vary."""
         torque = observations.torque
         known = torque is not None and bool(np.any(np.ptp(torque, axis=0) > 1e-9))
         if known or any(np.ptp(shape) > 1e-9 for _, shape in self._set(observations)._shapes(observations)):
@@ -66,11 +66,11 @@ class JointCompliance(Effect):
         return ("torque.<joint>", "payload", "masses in the URDF")
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the torques of the chain's joints that were recorded, and the payload where one was not."""
+        """Return the recorded torques of the chain's joints, and the payload where one is not recorded."""
         return torque_columns(observations)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Torques as they are known, or free weights where they are not."""
+        """Return the settings: known torques, or free weights where masses are unknown."""
         return (self._set(observations),)
 
     def _set(self, observations: Observations) -> JointCompliance:
@@ -82,7 +82,7 @@ class JointCompliance(Effect):
         return replace(self, joints=tuple(j for j, _ in few), weights=flat)
 
     def _shapes(self, observations: Observations) -> list[tuple[int, Array]]:
-        """Joint and (N,) values of each shape of gravity's torques."""
+        """Joint and values (N,) of each shape of gravity's torque."""
         if not self.joints:
             return []
         regressor = _weighed(observations.robot, observations.q)
@@ -104,7 +104,7 @@ class JointCompliance(Effect):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's torque; where masses are not known, as it was fitted, 1 at its largest."""
+        """Torque of the joint; with unknown masses the fitted one, 1 at its largest."""
         joint, robot = parameters[0].place, observations.robot
         if observations.torque is None:
             return f"fitted torque of {joint}", "relative", -error / max(float(np.abs(error).max()), 1e-300)
@@ -113,13 +113,13 @@ class JointCompliance(Effect):
 
 
 def _weighed(robot: Robot, q: Array) -> Array:
-    """(N, n, 4 n): torque of each joint for a unit weight in each body, at and about the next joint."""
+    """Regressor of statics (N, n, 4 n): joint torques per unit weight in each body, at and about the next joint."""
     regressor = static_regressor(robot, q) * np.array([1.0, _LEVER, _LEVER, _LEVER])
     return np.asarray(regressor.reshape(len(q), robot.n, -1))
 
 
 def _few_weights(robot: Robot) -> list[tuple[int, Array]]:
-    """Joint and (4n,) weights of each shape, over the range of the robot's joints."""
+    """Joint and weights (4n,) of each shape, over the range of the robot's joints."""
     rng = np.random.default_rng(0)
     lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
     drawn = _weighed(robot, rng.uniform(lower, upper, (_DRAWN, robot.n)))

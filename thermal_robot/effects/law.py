@@ -1,4 +1,4 @@
-"""Semiparametric law that nobody wrote down: an error of one place that follows one quantity, found in a remainder."""
+"""Semiparametric law: an error at one place that follows one quantity, discovered in a residual."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _SHIFTED = 0.04  # of the range: how far a mark is moved to refine it, by a fact
 
 @dataclass(frozen=True)
 class Discovered(Fading):
-    """Linear combination of basis functions, f(x) = Σ_k c_k φ_k(x), of one quantity x, by which one place errs.
+    """Discovered law f(x) = Σ_k c_k φ_k(x) of one quantity x, by which one place errs.
 
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`), with the ``marks`` that it asks for. In
     a joint f is an angle (or a displacement); at the base, the tool or a segment (``link`` and the name of the joint at
@@ -92,29 +92,29 @@ class Discovered(Fading):
 
     @property
     def share(self) -> float:
-        """Prior probability of one law of all that were tried."""
+        """Prior probability of one law among all that were tried."""
         return 1.0 / self.tried
 
     @property
     def follows(self) -> str:
-        """Quantity, or product of two, that a diagnosis reports."""
+        """Quantity, or product of two, as a diagnosis reports it."""
         return f"{self.quantity} * {self.by}" if self.by else self.quantity
 
     @property
     def modulated(self) -> Effect | None:
-        """Known effect that changes with the quantity, in the law's joint; ``None`` where it has joints of its own."""
+        """Known effect that the quantity modulates, in the law's joint; ``None`` where it has joints of its own."""
         known = restored(self.of, self.of_arguments) if self.of else None
         return None if known is None or known.share is not None else gate.placed(known, (self.place,))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the quantities that the campaign lacks, and what the effect in the law lacks."""
+        """Columns that the campaign lacks for the law, or for the effect that it modulates."""
         lacking: tuple[str, ...] = () if self.values(observations) is not None else (self.quantity,)
         if self.by and quantity(observations, self.by) is None:
             lacking += (self.by,)
         return lacking + (gate.missing(self.modulated, observations) if self.modulated else ())
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the columns that it follows, what tells the order of moves, and what the effect in the law reads."""
+        """Columns of the quantity, of the order of moves, and of the modulated effect."""
         names = [self.quantity, self.by]
         if self.quantity.startswith(TURN):
             names += [name for name in CLOCK if name in observations.covariates][:1]
@@ -123,7 +123,7 @@ class Discovered(Fading):
         return tuple(name for name in dict.fromkeys(names) if name in observations.covariates)
 
     def values(self, observations: Observations) -> Array | None:
-        """Return the (N,) quantity, as this law counts it; of the shape ``product``, that of the two."""
+        """Quantity (N,) as this law counts it; for the shape ``product`` the product of the two."""
         first = self._first(observations)
         if self.shape != "product" or first is None:
             return first
@@ -134,16 +134,16 @@ class Discovered(Fading):
         campaign = observations.campaign
         if self.shape == "constant":
             return np.zeros(campaign.samples)
-        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
+        if self.labels and (self.quantity in campaign.labels or not campaign.measured):
             number = {label: float(k) for k, label in enumerate(self.labels)}
             rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
             return np.array([number.get(label, np.nan) for label in rows])
-        if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
+        if self.quantity == "order" and self.quantity not in observations.covariates and not campaign.measured:
             return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
         return quantity(observations, self.quantity)
 
     def _followed(self, observations: Observations) -> Array | None:
-        """Return what the shape is of, at the rows; ``None`` where the campaign cannot tell."""
+        """Argument of the shape at the rows; ``None`` where the campaign lacks it."""
         of, clock = SHAPES[self.shape].of, self.values(observations)
         if of == "quantity" or clock is None:
             return clock
@@ -159,10 +159,10 @@ class Discovered(Fading):
         return np.where((run[:, None] == np.arange(len(self.runs))) | new, since, np.inf)
 
     def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
-        """(N,) time since the row's session began, and the number of that session.
+        """Time (N,) since the row's session began, and the number of that session.
 
-        A session that was not there began with the first of its rows, and has the number −1; a row of none belongs to
-        the last that had begun.
+        A session unknown to the law begins with its first row and has the number −1; a row without a session belongs to
+        the last one begun.
         """
         starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
         run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
@@ -176,7 +176,7 @@ class Discovered(Fading):
         return np.maximum(clock - began, 0.0), run
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
+        """Basis functions φ, (N, K), at arguments of the shape, and a name for each."""
         shape, clock = SHAPES[self.shape], self.quantity in CLOCK
         start = "the start" if clock else f"{self.quantity} {self._marked(self.origin)}"
         over = "the campaign" if clock else f"{self._marked(self.span)} of {self.quantity}"
@@ -190,9 +190,9 @@ class Discovered(Fading):
         return shape.functions(values, self.marks, self.origin, self.span), tuple(labels)
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
-        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell.
+        """Basis functions (N, K) at the rows, and a name for each; ``None`` where the campaign lacks them.
 
-        At a label that was not there they are the mean of those at the others.
+        At an unknown label they are the mean over the known ones.
         """
         values, two = self._followed(observations), bool(self.by) and self.shape != "product"
         second = quantity(observations, self.by) if two else None
@@ -214,14 +214,14 @@ class Discovered(Fading):
         return list(zip(self.found[::2], self.found[1::2], strict=True))
 
     def _left(self, observations: Observations) -> Array:
-        """(N,) how much is left of it; what has changed by the end of the campaign stays."""
+        """Fading factor (N,); what has changed by the end of the campaign stays."""
         left = np.ones(observations.campaign.samples)
         for (name, driver), (low, high) in zip(self._driven(observations), self._ranges, strict=False):
             left = left if name in CLOCK else left * left_at(driver, low, high)
         return left
 
     def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
-        """Return what it ends with, by name: what it follows, a second quantity, and how these two go together."""
+        """Drivers by name that bound the fading: the quantity, a second one, and their sum and difference."""
         first, values = self._first(observations), self.values(observations)
         if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
             return []
@@ -235,7 +235,7 @@ class Discovered(Fading):
         return [(self.quantity, first), (self.by, second), (both, u + v), (both, u - v)]
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return the law with the range in which it was found, and the effect in it with its own."""
+        """Copy with the range in which it was found, and its modulated effect with its own."""
         law, rows = self, self.at_rows(observations)
         if self.modulated is not None:
             kept = gate.arguments(gate.delivered(self.modulated, observations))
@@ -246,7 +246,7 @@ class Discovered(Fading):
         return replace(law, found=tuple(end for _, values in driven for end in ends(values)), means=means)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""
+        """One parameter for each function and component; rad or m, or the unit of the modulated effect."""
         rows = self.at_rows(observations)
         if rows is None:
             return ()
@@ -262,7 +262,7 @@ class Discovered(Fading):
         return self.registered(found, [self._left(observations)] * len(found))
 
     def _own(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return the parameters that a function multiplies: those of the effect in the law, or one a component."""
+        """Parameters that a function multiplies: those of the modulated effect, or one for each component."""
         robot = observations.robot
         if self.modulated is not None:
             return gate.checked(self.modulated, observations)
@@ -281,7 +281,7 @@ class Discovered(Fading):
         )
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return the same law with its mark a little lower and higher: by a share of the range."""
+        """Return the copies with the mark shifted down and up by a share of the range."""
         shape = SHAPES[self.shape]
         if not shape.mark:
             return (self,)
@@ -291,13 +291,13 @@ class Discovered(Fading):
         return self, self.shifted(shift), self.shifted(-shift), *wider
 
     def shifted(self, by: float) -> Discovered:
-        """Return the same law with its mark moved; a step does not stay between sessions, a time stays above 0."""
+        """Copy with its mark shifted; a step stays out of the time between sessions, a time above 0."""
         if self.starts:
             return replace(self, marks=(abs(self.marks[0] + by), *self.marks[1:]))
         return replace(self, marks=(self.marks[0] + by, *self.marks[1:]), runs=())
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the quantity that it follows."""
+        """Quantity that it follows."""
         return driving(observations, self.quantity)
 
     def to_source(self, values: Array, name: str = "my_effect") -> str:
@@ -313,7 +313,7 @@ class Discovered(Fading):
         )
 
     def describe(self) -> str:
-        """Say in a few words where the error enters and what it follows."""
+        """Describe in a few words where the error enters and what it follows."""
         at = {"joint": in_words("joint", self.place), "link": f"the placement of {self.place}"}.get(
             self.kind, f"the {self.kind}"
         )
@@ -341,7 +341,7 @@ class Discovered(Fading):
         return f"an error at {at} that follows {follows} ({how})"
 
     def _when(self) -> str:
-        """Say at which labels of its quantity it is another than elsewhere."""
+        """Labels at which it differs from elsewhere, in words."""
         if self.shape == "apart":
             return f"in {self.quantity} {self.labels[int(self.marks[0])]}"
         if len(self.labels) == 2:

@@ -1,4 +1,4 @@
-"""Laws in words and in size: a short name, what a law of that place and quantity usually is, how much it changes.
+"""Laws in words and in size: short name, usual cause, and range.
 
 What is usual is the experience of calibration: Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*,
 1991, chapter 2 (geometry, gears, joints that yield), and ISO 230-1 and 230-3 (play, warming). It is never more than a
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Size:
-    """Range of a law, or of an effect in one joint, over the rows that were measured, with one sigma, in SI.
+    """Range of a law, or of an effect in one joint, over the measured rows, with its standard deviation; SI.
 
     ``what`` it is the size of is ``step`` or ``range``; ``place`` is the joint, where the effect acts in several.
     """
@@ -40,7 +40,7 @@ class Size:
 
 
 def sizes(law: Discovered, observations: Observations, values: Array, covariance: Array) -> tuple[Size, ...]:
-    """Change of a law between the two rows between which it changes most, with its standard deviation.
+    """Largest difference of a law between two measured rows, with its standard deviation.
 
     Values (K·C,) and covariance are as fitted, functions first, SI. One size for a joint, and for an effect that
     changes; at a link, the base or the tool one of the translation, m, and one of the rotation, rad, each the length of
@@ -72,10 +72,10 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
 
 
 def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
-    """Change peak to peak of waves in each joint, between the two rows between which they change most.
+    """Peak-to-peak value of the waves in each joint, over the measured rows.
 
-    Single waves of a joint that moves over part of a turn do the same in part; what they do together is better known.
-    Values (K,) and covariance are SI; largest first, none of a place that does not err in its joint alone.
+    Waves of a joint with a limited range are correlated; their sum is better determined. Values (K,) and covariance are
+    SI; largest first, none of a place that does not err in its joint alone.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):
@@ -156,7 +156,7 @@ _KINDS = {
 
 
 def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
-    """Kind of a quantity as seen from a place, one of :data:`TELLS`; empty for one that only this campaign knows."""
+    """Class of a quantity as seen from a place, one of :data:`TELLS`; empty for a user's own quantity."""
     column, _, of = quantity.partition(".")
     if quantity.startswith(TURN):
         return "memory"
@@ -166,7 +166,7 @@ def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
 
 
 def usually(law: Discovered, joints: Sequence[str]) -> str:
-    """Usual cause of a law of that place and that quantity; empty where nobody can say."""
+    """Usual cause of a law of that place and that quantity; empty where none is known."""
     names = ["session"] if is_event(law) else [law.quantity, law.by]  # what was set up anew, once or for a session
     kinds = [kind_of(name, law.place, joints) for name in names if name]
     found = (USUALLY.get((law.kind, kind)) or USUALLY.get(("", kind), "") for kind in kinds)
@@ -174,7 +174,7 @@ def usually(law: Discovered, joints: Sequence[str]) -> str:
 
 
 def called(law: Discovered) -> str:
-    """Short name of a law: what errs, and over what."""
+    """Short name of a law: place and quantity."""
     at = {"joint": law.place, "link": f"{law.place}'s placement"}.get(law.kind, f"the {law.kind}")
     own = law.kind == "joint" and law.quantity == law.place
     over = f"over {f'{law.quantity} times {law.by}' if law.by else 'its position' if own else law.quantity}"
@@ -192,7 +192,7 @@ def called(law: Discovered) -> str:
 
 
 def is_event(law: object) -> bool:
-    """Tell whether a law is an event: base, tool or a joint's zero elsewhere from row to row, or in a session."""
+    """Whether a law is an event: base, tool or a joint's zero displaced from a row on, or in a session."""
     if not isinstance(law, Discovered) or law.by or law.of or law.kind == "link":
         return False
     in_time = law.quantity in CLOCK and law.shape in ("step", "run")
@@ -200,10 +200,9 @@ def is_event(law: object) -> bool:
 
 
 def event(law: Discovered, observations: Observations, sizes: Sequence[Size]) -> tuple[str, str]:
-    """Tell an event by the rows in which it shows: in a few words, and in a sentence without a full stop.
+    """Describe an event by its rows: in a few words, and in a sentence without a full stop.
 
-    Both empty for what is no event, for levels of more than one session, and where its rows do not follow each other in
-    the file: no row then tells when it was.
+    Both are empty for other laws, for levels of several sessions, and where the rows are not consecutive in the file.
     """
     rows = law.at_rows(observations) if is_event(law) and law.shape != "levels" else None
     there = np.zeros(0, dtype=bool) if rows is None else rows[0][:, 1] > 0.0
@@ -232,6 +231,6 @@ def event(law: Discovered, observations: Observations, sizes: Sequence[Size]) ->
 
 
 def _amount(value: float, unit: str) -> str:
-    """Return a length or an angle in thousandths of its unit, or millionths where it is small."""
+    """Write a length or an angle in thousandths of its unit, or millionths where it is small."""
     factor, prefix = (1e3, "m") if value >= 1e-4 else (1e6, "µ")
     return f"{factor * value:.2g} {prefix}{unit}" if value < 0.1 else f"{value:.2g} {unit}"

@@ -1,4 +1,4 @@
-"""Errors of a joint that follow its own position: gain of an encoder or a gear, eccentric wheels, ripple of teeth."""
+"""Periodic and linear errors of a joint in its own position: gain, eccentricity, gear ripple."""
 
 from __future__ import annotations
 
@@ -29,14 +29,13 @@ _NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part
 
 @dataclass(frozen=True)
 class OfPosition(Fading):
-    """Functions of the joints' own positions: all that a joint has end together, as they may cancel in part.
+    """Errors as functions of the joint's own position, which fade together beyond its measured range.
 
-    What has seen a whole turn is known everywhere, if it comes back after a turn or is a gain; so is the gain of a
-    joint that slides.
+    After a whole turn, gains and waves of integer order are known everywhere; so is the gain of a prismatic joint.
     """
 
     def _ended(self, observations: Observations, joint: int, order: float) -> tuple[Array, Array]:
-        """Return (N,) positions at which functions of a joint are read, and what is left of them; order 0 is a gain."""
+        """Positions (N,) clipped for functions of a joint, and the fading factor; order 0 is a gain."""
         x, slides = observations.q[:, joint], observations.robot.joint_types[joint] == "prismatic"
         if not self.found:
             return x, np.ones(len(x))
@@ -47,7 +46,7 @@ class OfPosition(Fading):
         return np.clip(x, low, high), left_at(x, low, high)
 
     def curves(self, observations: Observations, of: Sequence[tuple[str, float, str, float]]) -> tuple[Parameter, ...]:
-        """Return parameters by joint, order, words and expected size: two amplitudes a wave, one gain for order 0."""
+        """Parameters by joint, order, words and expected size: two amplitudes a wave, one gain for order 0."""
         robot, parts = observations.robot, []
         found: list[Parameter] = []
         for joint, order, words, size in of:
@@ -65,15 +64,15 @@ class OfPosition(Fading):
         return self.registered(found, parts)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
+        """Position of the joint."""
         return position_of(observations, parameters[0].place)
 
     def elsewhere(self, observations: Observations) -> Effect:
-        """Return the functions without a range: another campaign has its own."""
+        """Copy without a range, for another campaign."""
         return replace(self, found=(), means=(), rests=())
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return the functions with the range of each joint, and the mean of each there."""
+        """Copy with the measured range of each joint, and the mean of each function there."""
         own = self.elsewhere(observations).parameters(observations)
         means = tuple(float(np.mean(p.responses[0].values)) for p in own)
         return replace(self, found=tuple(end for q in observations.q.T for end in ends(q)), means=means)
@@ -100,7 +99,7 @@ class JointGain(OfPosition):
 
 @dataclass(frozen=True)
 class Waves(OfPosition):
-    """Waves of a joint's own position: of all in one joint together it is told how far they go, peak to peak."""
+    """Waves in a joint's own position, reported together by their peak-to-peak value."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ class TransmissionError(Waves):
     singular: ClassVar[str] = "a periodic transmission error"
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """All orders, or one alone; where the ratio of a motor is stated, wheels of both sides, or of one."""
+        """Return the settings: all orders, or one alone; with a stated gear ratio, wheels of both sides, or of one."""
         stated = set(observations.campaign.gears) & set(observations.robot.joint_names)
         sides = [replace(self, side=side) for side in ("joint", "motor")] if stated else [self]
         alone = [replace(own, harmonics=(k,)) for own in sides for k in self.harmonics if len(self.harmonics) > 1]
@@ -167,7 +166,7 @@ class JointRipple(Waves):
         return 1.0 / self.tried if self.orders else _NEVER
 
     def having(self, joint: str, order: float, tried: float) -> JointRipple:
-        """Return the ripple with one wave more, that was picked among so many."""
+        """Copy with one wave more, selected among so many."""
         product = self.tried * max(tried, 1.0)
         return replace(self, joints=(*self.joints, joint), orders=(*self.orders, order), tried=product)
 
@@ -179,7 +178,7 @@ class JointRipple(Waves):
 
 
 def _of_motor(order: float, ratio: float | None) -> str:
-    """Return in words how often a wave comes round in a turn of the motor, where that is a whole or a half number."""
+    """Periods of a wave in a turn of the motor, in words, where that is a whole or a half number."""
     if ratio is None:
         return ""
     times = Fraction(order / ratio).limit_denominator(2)

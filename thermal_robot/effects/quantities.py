@@ -1,4 +1,4 @@
-"""Covariates that an error may follow: recorded or computed, where they vary by more than they are read to."""
+"""Covariates that an error may follow: recorded or computed ones that vary by more than their resolution."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ _ROUNDING = 1e-9  # relative: how far sums of floats are off
 
 
 def resolution(values: Array, unit: str) -> float:
-    """Return the smallest step of a quantity that means something, in its unit.
+    """Resolution of a quantity, in its unit.
 
-    It is the smallest step between two of its values (N,), as far as that is what an instrument of this kind reads to:
-    digits beyond that say nothing, and two values that are further apart were meant. 0 for what is no reading, such as
-    a payload, a label or a direction of approach.
+    The smallest step between two of its values (N,), within the resolutions of instruments for this unit. 0 for
+    quantities that are no readings, such as payload, label or direction of approach.
     """
     if unit not in settings.READS_TO:
         return 0.0
@@ -35,14 +34,14 @@ def resolution(values: Array, unit: str) -> float:
 
 
 def varies(values: Array, least: float = 0.0) -> bool:
-    """Tell whether values (N,) differ by more than a resolution."""
+    """Whether values (N,) differ by more than a resolution."""
     return bool(np.ptp(values) > least * (1.0 + _ROUNDING)) if len(values) else False
 
 
 def without_twins(readings: Mapping[str, Array], joints: tuple[str, ...]) -> dict[str, Array]:
-    """Leave out readings of what another quantity says already: the coarser one stays.
+    """Remove redundant quantities: of two that agree the finer one is left out.
 
-    An encoder's reading goes where it says what was commanded, the temperature of a link where it is that of the robot.
+    An encoder reading that agrees with the command is removed, and a link temperature that agrees with the robot's.
     """
     found = {}
     for name, values in readings.items():
@@ -63,12 +62,12 @@ TURN = "since_turn."
 
 
 def unit(robot: Robot, name: str) -> str:
-    """Return the unit of a quantity's values, SI; empty where it has none, or none that is known."""
+    """SI unit of a quantity; empty where it has none, or an unknown one."""
     return unit_of(name.removeprefix(TURN), robot) or (SI.length if name in REACH else "")
 
 
 def quantities(observations: Observations) -> dict[str, Array]:
-    """Return what a remainder might follow, by name, (N,) each; only what varies by more than it is read to.
+    """Quantities by name, (N,) each, that vary by more than their resolution.
 
     Of two readings of the same the coarser one stands for both (:mod:`thermal_robot.effects.quantities`). Recorded
     covariates come first, the row's number where neither time nor order is recorded, the session as its number in the
@@ -89,7 +88,7 @@ def quantities(observations: Observations) -> dict[str, Array]:
 
 
 def quantity(observations: Observations, name: str) -> Array | None:
-    """Return the (N,) values of one quantity; ``None`` where the campaign does not have it."""
+    """Values (N,) of one quantity; ``None`` where the campaign lacks it."""
     if name in observations.covariates:
         return np.asarray(observations.covariates[name], dtype=float)
     robot = observations.robot
@@ -112,7 +111,7 @@ def quantity(observations: Observations, name: str) -> Array | None:
 
 
 def began(observations: Observations, clock: Array) -> dict[str, float]:
-    """Return by session when it began on a clock (N,), with its first row; by an empty name where there are none."""
+    """Start time by session on a clock (N,), with its first row; under an empty name without sessions."""
     rows = observations.campaign.labels.get("session")
     if rows is None:
         return {"": float(clock.min())}
@@ -120,7 +119,7 @@ def began(observations: Observations, clock: Array) -> dict[str, float]:
 
 
 def driving(observations: Observations, name: str) -> Driver | None:
-    """Return name, unit and (N,) values of a quantity that drives an effect; ``None`` where it does not vary."""
+    """Name, unit and values (N,) of a quantity that drives an effect; ``None`` where it does not vary."""
     values = quantity(observations, name)
     if values is None or not np.ptp(values) > 0:
         return None
@@ -128,13 +127,13 @@ def driving(observations: Observations, name: str) -> Driver | None:
 
 
 def position_of(observations: Observations, joint: str) -> Driver:
-    """Return a joint's commanded position as what drives an effect: name, unit and (N,) values, rad or m."""
+    """Commanded position of a joint as a driver: name, unit and (N,) values, rad or m."""
     robot = observations.robot
     return f"position of {joint}", unit(robot, joint), observations.q[:, robot.joint_names.index(joint)]
 
 
 def torque_columns(observations: Observations) -> tuple[str, ...]:
-    """Return the torques of the chain's joints that were recorded, and the payload where one was not."""
+    """Return the recorded torques of the chain's joints, and the payload where one is not recorded."""
     columns = tuple(f"torque.{joint}" for joint in observations.robot.joint_names)
     recorded = tuple(column for column in columns if column in observations.covariates)
     computed = ("payload",) if "payload" in observations.covariates and recorded != columns else ()

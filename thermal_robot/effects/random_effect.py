@@ -1,4 +1,4 @@
-"""Effects that scatter: variances in the joints, anew at each visit or once a commanded pose."""
+"""Random effects: variance components in the joints, drawn at each visit or once a commanded pose."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _SAME = 1e-6  # rad or m: commands nearer than this repeat each other
 
 @dataclass(frozen=True)
 class RandomEffect(Effect):
-    """Variance component: the parameter is the size of a scatter, which no column and no correction takes away.
+    """Variance component: its parameter is a standard deviation, which no correction removes.
 
-    It is told from the covariance of what remains, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j moves
-    the target and one σ_j (rad or m) a joint and component.
+    It is estimated from the covariance of the residual, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j
+    moves the target and one σ_j (rad or m) a joint and component.
     """
 
     random: ClassVar[bool] = True
@@ -35,15 +35,15 @@ class RandomEffect(Effect):
     """The parameter over σ_j."""
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return none: a mean does not depend on it."""
+        """No parameters: the mean does not depend on a variance."""
         return ()
 
     def joints(self, chain: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the joints of a chain that it may be in, in their order."""
+        """Joints of a chain in which it may be, in their order."""
         return tuple(j for j in chain if j in (self.places or chain) and j not in self.excluded)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
-        """Draw (N,) deviations of a joint from its commands, rad or m: normal, of the standard deviation ``size``.
+        """Random deviations (N,) of a joint from its commands, rad or m: normal, standard deviation ``size``.
 
         ``pose`` (N,) is the number of the commanded pose that each row is a visit to.
         """
@@ -53,7 +53,7 @@ class RandomEffect(Effect):
 
 @dataclass(frozen=True)
 class EncoderResolution(RandomEffect):
-    """Quantisation: every joint stands on a step of its encoder, with the same error at each repeat of a command.
+    """Quantisation by the encoder: every joint stands at a step, the same at each repeat of a command.
 
     A step s leaves an even distribution over ± s/2, with standard deviation s/√12 (Widrow, *Statistical analysis of
     amplitude-quantized sampled-data systems*, 1961): a sawtooth of the command. Where no pose is repeated, only a step
@@ -67,14 +67,14 @@ class EncoderResolution(RandomEffect):
     factor: ClassVar[float] = sqrt(12.0)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
-        """Return how far the nearest step is from each command; chance has only where the encoder's zero lies."""
+        """Distance (N,) of the nearest step from each command; only the encoder's zero is random."""
         first = size * rng.uniform()
         return first + size * np.round((command - first) / size) - command if size else np.zeros_like(command)
 
 
 @dataclass(frozen=True)
 class ExcessRepeatability(RandomEffect):
-    """Excess repeatability error: every joint scatters anew at each visit to a pose, with σ_j, rad or m.
+    """Excess repeatability error: every joint scatters anew at each visit to a pose with σ_j, rad or m.
 
     Only repeats of a pose show it: rows with the same label ``pose``, or, without that column, the same command again.
     """
@@ -87,7 +87,7 @@ class ExcessRepeatability(RandomEffect):
     factor: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return ``pose`` unless a pose is repeated; rows without a label stand alone."""
+        """Column ``pose`` unless a pose is repeated; rows without a label stand alone."""
         labels = observations.campaign.pose_labels
         visits = np.round(observations.q / _SAME) if labels is None else labels[labels != ""]
         return () if len(np.unique(visits, axis=0)) < len(visits) else self.needs

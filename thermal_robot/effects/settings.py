@@ -1,4 +1,4 @@
-"""Every number that was chosen in the effects: its value, its unit, and why that one."""
+"""Chosen numbers of the effects, each with its unit and reason."""
 
 from thermal_robot.campaign.settings import STILL
 
@@ -34,3 +34,6 @@ five knots turns within a quarter of its range: so far away nothing of it is kno
 BESIDE = 0.02
 """Of the range that was measured: a row that leaves it by less is not called outside. A hundred rows of a range leave a
 hundredth of it open at either end, and the next one of them falls there now and then."""
+IN_MODEL = 20.0
+"""Times of its expected size that a frame is off where it was set on purpose: a tool is some centimetres long, where
+errors are of a millimetre."""

@@ -1,4 +1,4 @@
-"""Basis functions of laws that nobody wrote down, one entry a shape: functions of a quantity, their names, their words.
+"""Basis functions of discovered laws: for each shape its functions, their names, and words.
 
 ========== ======================================================= ==========================
 shape      φ_k(x), with u = (x − origin) / span                    marks
@@ -70,7 +70,7 @@ class Shape:
     of: Literal["quantity", "strains", "run", "runs"] = "quantity"
 
     def functions(self, x: Array, marks: Marks, origin: float, span: float) -> Array:
-        """(N, K) functions of what the shape is of, (N,) or (N, K)."""
+        """Basis functions (N, K) of the argument of the shape, (N,) or (N, K)."""
         curves = np.column_stack([np.empty((len(x), 0)), *_CURVES[self.curves](x, marks, origin, span)])
         first = {"constant": np.ones((len(x), 1)), "rest": 1.0 - curves, "": curves[:, :0]}[self.beside]
         return np.hstack([first, curves])

@@ -1,4 +1,4 @@
-"""Thermal expansion of links, at once or with a first-order lag: the virtual prismatic joints of Kluz et al."""
+"""Thermal expansion of links, instantaneous or with a first-order lag: virtual prismatic joints (Kluz et al.)."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _FOLLOWED = 64  # histories and lags of which it is kept how far a body is behin
 
 @dataclass(frozen=True)
 class History:
-    """Recorded temperature, straight between its points: increasing (K,) times, s, and temperatures, °C."""
+    """Recorded temperature, linear between its points: increasing times (K,), s, and temperatures, °C."""
 
     times: tuple[float, ...]
     temperatures: tuple[float, ...]
 
     @classmethod
     def of(cls, times: Array, temperatures: Array) -> History:
-        """Keep a record of rows in any order; rows of one instant count as their mean, a long one is thinned."""
+        """Build the record from rows in any order; equal times are averaged, a long record is thinned."""
         instants, which = np.unique(times, return_inverse=True)
         values = np.bincount(which, temperatures) / np.bincount(which)
         kept = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), _POINTS)).round().astype(int))
@@ -60,7 +60,7 @@ class History:
 
 @lru_cache(maxsize=_FOLLOWED)
 def _behind(history: History, lag: float) -> tuple[float, ...]:
-    """(K,) by how much a body differs from the record at its points, K."""
+    """Temperature lag (K,) of a body behind the record at its points, K."""
     t, u = np.array(history.times), np.array(history.temperatures)
     behind = [0.0]
     for gain, decay in zip(np.diff(u) / np.diff(t) * lag, np.exp(-np.diff(t) / lag), strict=True):
@@ -108,15 +108,15 @@ class ThermalElongation(Effect):
     sided_by: ClassVar[tuple[str, ...]] = ("temperature",)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return ``temperature`` unless a temperature that applies to a segment varies."""
+        """Column ``temperature``, unless a temperature that applies to a segment varies."""
         return () if any(observations.varies(column) for column in _columns(observations)) else ("temperature",)
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the temperatures that apply to the segments; with a lag, the time, too."""
+        """Temperatures that apply to the segments; with a lag, the time, too."""
         return (*_columns(observations), "time") if self.lag else _columns(observations)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return a coefficient a link, one for all, one for all with a deviation a link; the same with lags.
+        """Return the settings: a coefficient a link, one for all, one for all with deviations; each with lags, too.
 
         A lag of 10 to 60 min is tried with each of the three: with the wrong one it may be worse than none.
         """
@@ -128,7 +128,7 @@ class ThermalElongation(Effect):
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def elsewhere(self, observations: Observations) -> ThermalElongation:
-        """Return it with the temperatures of that campaign; without the lag where nobody recorded when they were."""
+        """Copy with that campaign's temperatures; without the lag where it has no times."""
         if not self.lag:
             return self
         if not _follows(observations):
@@ -141,7 +141,7 @@ class ThermalElongation(Effect):
         return replace(self, times=record.times, temperatures=record.temperatures, starts=starts)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return lags longer and shorter by a factor, of 5 min to 3 h; other ways to share; links out of balance."""
+        """Neighbours of a setting: lags times and over a factor, 5 min to 3 h; other groupings of links."""
         if not self.lag:
             return (self,)
         near = (float(np.clip(self.lag * share, _SHORTEST, _LONGEST)) for share in (1.0, factor, 1.0 / factor))
@@ -173,12 +173,12 @@ class ThermalElongation(Effect):
         return (*found, *self._began(observations, [grown.index for grown in responses.values()]))
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the temperature that was recorded of the link, or of the robot."""
+        """Return the recorded temperature of the link, or of the robot."""
         own = f"temperature.{parameters[0].place}"
         return driving(observations, own if own in observations.covariates else "temperature")
 
     def _began(self, observations: Observations, grown: Sequence[int]) -> Iterator[Parameter]:
-        """Yield one strain a start: how much longer the links were than the record says, forgotten with the lag."""
+        """Yield one strain for each start: initial excess over the record, which decays with the lag."""
         for k, start in enumerate(() if self.balanced or not self.lag else self.starts):
             since = observations.covariates["time"] - start
             left = np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / self.lag), 0.0)
@@ -193,13 +193,13 @@ class ThermalElongation(Effect):
 
 
 def _grown(observations: Observations, s: int, strain: Array) -> Response:
-    """Return the twist of a segment that is longer by a strain (N,), along its virtual prismatic joint."""
+    """Twist of a segment by a strain (N,), along its virtual prismatic joint."""
     segment = observations.robot.segments[s]
     return at_segment(s, strain[:, None] * np.concatenate([segment.direction, np.zeros(3)]) * segment.length)
 
 
 def _follows(observations: Observations) -> bool:
-    """Whether links may follow the record: a sensor on each knows its temperature, of some alone nothing follows."""
+    """Whether the temperatures may lag behind the record: a single sensor, not one for each link."""
     return observations.varies("time") and _columns(observations) == ("temperature",)
 
 

@@ -1,4 +1,4 @@
-"""Servo lag of joints that are measured in passing."""
+"""Tracking error of joints that are measured in motion."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ class TrackingLag(Effect):
     size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the velocity columns, unless at least one of them varies."""
+        """Velocity columns, unless at least one of them varies."""
         columns = tuple(f"velocity.{joint}" for joint in observations.robot.joint_names)
         return () if any(observations.varies(column) for column in columns) else columns
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the velocities and accelerations of the joints that moved."""
+        """Velocities and accelerations of the joints that moved."""
         moving, accelerating = self._joints(observations)
         return (*(f"velocity.{joint}" for joint in moving), *(f"acceleration.{joint}" for joint in accelerating))
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return this effect for the joints that move: a model must not forget them where they stand still."""
+        """Return the setting for the joints that move in the campaign, which a model keeps at standstill, too."""
         moving, accelerating = self._joints(observations)
         return (replace(self, moving=moving, accelerating=accelerating),)
 
@@ -79,5 +79,5 @@ class TrackingLag(Effect):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's velocity."""
+        """Velocity of the joint."""
         return driving(observations, f"velocity.{parameters[0].place}")

@@ -1,1 +1,1 @@
-"""More than one campaign: many robots at once."""
+"""Several campaigns: comparison, change over time, fleets of robots."""

@@ -1,21 +1,20 @@
-"""Tests of equality between campaigns of one robot: what they share and what changed.
+"""Tests of equality between campaigns of one robot.
 
-Names. A wrong name fits one campaign, and takes another size in the next. So an effect keeps its name if two campaigns
-agree on most of it: the same size within half of the larger, which wear and re-adjustment leave alike.
+An effect that was wrongly named has another size in the next campaign. So an effect is confirmed if two campaigns agree
+on most of it: sizes within half of the larger, which allows for wear and re-adjustment.
 
-Parameters. A campaign alone says θ = G⁺b with covariance G⁺ of all effects that are at work in any campaign together.
-Of one effect with the others free, it says I θ = s, where I and s are what is left of G and b once the others are
-projected out; then
+Parameters. A campaign alone estimates the effects at work in any campaign by θ = G⁺b, with covariance G⁺. For one
+effect with the others free, I θ = s, where I and s are G and b with the others projected out; then
 
     χ² = Σ_c s_cᵀ I_c⁺ s_c − (Σ s_c)ᵀ (Σ I_c)⁺ (Σ s_c)
 
-has Σ rank I_c − rank Σ I_c degrees of freedom if the effect is the same in all campaigns. What only one of them
-determines adds to neither.
+has Σ rank I_c − rank Σ I_c degrees of freedom if the effect is the same in all campaigns. Directions that only one
+campaign determines add to neither.
 
 Predictions, where both campaigns measured: the cross-validation of mrcal (D. Kogan, *mrcal*: cross-validation of
-calibrations): two solutions of the same thing differ by noise, whose size each states. Where they differ by more than
-twice that, a model is wrong. Base and tool of each campaign are its own, so that a base twist and a shift of the target
-that make the two alike mean nothing and are fitted away, in the difference and in the deviations.
+calibrations): two calibrations of one robot differ by noise, whose size each states. A difference above twice that
+means that a model is wrong. Base and tool differ between campaigns, so that a base twist and a shift of the target are
+fitted and subtracted, in the difference and in the standard deviations.
 """
 
 from __future__ import annotations
@@ -75,19 +74,19 @@ def compare(
     effects: Sequence[Effect] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
-    """Say what campaigns of one robot share, and what changed between them.
+    """Test which effects and parameters campaigns of one robot share, and which changed between them.
 
-    What an unknown frame takes up, such as the first joint's zero, means nothing between campaigns: it is projected out
-    before anything is compared. One joint fit of all campaigns then weighs by evidence whether each effect is the same
-    in all of them or differs, place by place. An effect on whose size no two campaigns agree loses its name.
+    Parameters that an unknown frame absorbs, such as the first joint's zero, are projected out. One joint fit of all
+    campaigns then decides by marginal likelihood whether each effect is shared or differs, place by place. An effect on
+    whose size no two campaigns agree is contradicted.
 
     Parameters
     ----------
     *campaigns
         Two or more, in the order in which they were measured: campaigns, their diagnoses, corrected models, or paths of
-        campaigns and of model files (``.json``). A model says nothing of effects that it does not hold.
+        campaigns and of model files (``.json``). A model carries no information on effects outside it.
     names
-        What they are called; by default their own names.
+        Names of the campaigns in the result; by default their own.
     only, without, effects
         As for :func:`~thermal_robot.diagnose`, of campaigns that are not diagnosed yet.
     progress
@@ -139,7 +138,7 @@ def compare(
 
 
 def _opened(given: Any, effects: Sequence[Effect]) -> Any:
-    """Return a model as something to compare, and anything else as it is."""
+    """Load the path of a model file; anything else is returned unchanged."""
     if is_model(given):
         return Known.of(CorrectedModel.load(given, effects), Path(given).name)
     return Known.of(given, given.robot.name) if isinstance(given, CorrectedModel) else given
@@ -150,7 +149,7 @@ def _after(stage: str, progress: Callable[[str], None]) -> Callable[[str], None]
 
 
 def _called(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[str, ...]:
-    """Return a name for each campaign, none twice."""
+    """Return the unique name of each campaign."""
     require(f"{CALL}, names", names, (list, tuple), "a name for each campaign")
     if names and len(names) != len(found):
         raise CampaignError(
@@ -200,7 +199,7 @@ def _compared(
 
 
 def _kept(listed: Sequence[Candidate], said: Sequence[Sums]) -> tuple[Sequence[Candidate], list[Sums], tuple[str, ...]]:
-    """Keep the parameters that the campaigns tell, numbered; return the names of the others, too."""
+    """Parameters that the campaigns determine, renumbered, and the names of the others."""
     kept = told(said)
     start, left, result = 0, [], []
     for item in listed:
@@ -215,7 +214,7 @@ def _kept(listed: Sequence[Candidate], said: Sequence[Sums]) -> tuple[Sequence[C
 def _effects(
     listed: Sequence[Candidate], together: Joint, said: Sequence[Sums], names: Sequence[str]
 ) -> list[Compared]:
-    """Return what is compared of each effect, beside those at work or named."""
+    """Comparison of each effect, given those at work or named."""
     status = [_judged(n, item, together, said, names) for n, item in enumerate(listed)]
     result = []
     for number, item in enumerate(listed):
@@ -242,7 +241,7 @@ def _effects(
 
 
 def _changes(listed: Sequence[Candidate], together: Joint, names: Sequence[str]) -> tuple[Change, ...]:
-    """Return what differs: parts of one effect at one place are one change."""
+    """Differences between campaigns; those of one effect at one place are one change."""
     by_place = sorted(together.changes, key=lambda c: (c.part.effect, c.part.place))
     found = (list(some) for _, some in groupby(by_place, key=lambda c: (c.part.effect, c.part.place)))
     changes = (_change(listed[some[0].part.effect], some, together, names) for some in found)
@@ -279,7 +278,7 @@ def _change(item: Candidate, some: Sequence[Differs], together: Joint, names: Se
 def _judged(
     number: int, item: Candidate, found: Joint, said: Sequence[Sums], names: Sequence[str]
 ) -> tuple[Status, str]:
-    """Return the status of an effect, and the reason where it loses its name or is not compared."""
+    """Status of an effect, and the reason where it is contradicted or not compared."""
     tell = [c for c, one in enumerate(said) if one.tells(item.at)]
     at_work = any(part.effect == number for part in found.parts)
     if not any(item.named) and (len(tell) < 2 or not at_work):
@@ -331,7 +330,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _parameters(item: Candidate, said: Sequence[Sums], own: list[int], names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return an effect's parameters as each campaign alone has them; ``own`` says where they stand in ``said``."""
+    """Estimates of an effect's parameters by each campaign alone; ``own`` are their indices in ``said``."""
     values, stds = np.full((2, len(said), len(own)), np.nan)
     for c, one in enumerate(said):
         covariance, seen = one.inverse
@@ -348,7 +347,7 @@ def _parameters(item: Candidate, said: Sequence[Sums], own: list[int], names: Se
 
 
 def _differ(values: Array, stds: Array, names: Sequence[str]) -> dict[str, Any]:
-    """Compare one parameter between campaigns: the two that differ most, and the chi-square of one value in all."""
+    """Compare one parameter: the pair of campaigns that differ most, and the chi-square of equality in all."""
     known = np.flatnonzero(np.isfinite(values)).tolist()
     if len(known) < 2:
         return {}
@@ -368,7 +367,7 @@ def _differ(values: Array, stds: Array, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _equal(said: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]:
-    """Return χ², degrees of freedom and p value of some parameters being the same in all campaigns."""
+    """Chi-square test of equality of some parameters in all campaigns: χ², degrees of freedom, p-value."""
     others = [k for k in range(len(said[0].vector)) if k not in set(own)]
     chi2, degrees, longest = 0.0, 0, 0.0
     together, score = np.zeros((len(own),) * 2), np.zeros(len(own))
@@ -387,7 +386,7 @@ def _equal(said: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]
 
 
 def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int]:
-    """Return vᵀ M⁺ v and the rank of M; what is left of columns of this square by rounding is none."""
+    """Quadratic form vᵀ M⁺ v and the rank of M, rounding errors of projected columns left out."""
     value, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
     seen = value > max(inference.INFORMATION_FLOOR, inference.PROJECTED_FLOOR * longest)
     along = axes[:, seen].T @ vector
@@ -395,7 +394,7 @@ def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int
 
 
 def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) -> Predicted:
-    """Cross-validate the models of two campaigns."""
+    """Cross-prediction by the models of two campaigns."""
     nothing = Predicted(names, 0, 0.0, 0.0, 0.0, True)
     if a.model.simulated or b.model.simulated:
         return replace(nothing, note="predictions of a simulator stand in the place of the model's own")
@@ -423,13 +422,13 @@ def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str
 
 
 def _some(q: Array) -> Array:
-    """Return rows spread evenly over all."""
+    """Evenly spaced rows."""
     count = min(len(q), settings.POSES)
     return np.asarray(q[np.linspace(0, len(q) - 1, count).astype(int)])
 
 
 def _common(joints: Sequence[str], first: Ranges, second: Ranges) -> Ranges:
-    """Return the range that both measured of each joint and column; where one alone has the column, its own."""
+    """Return the common measured range of each joint and column; where one campaign alone has the column, its own."""
     found = {}
     for name in dict.fromkeys((*joints, *first, *second)):
         low, high = np.array([ranges[name] for ranges in (first, second) if name in ranges]).T
@@ -440,14 +439,14 @@ def _common(joints: Sequence[str], first: Ranges, second: Ranges) -> Ranges:
 
 
 def _points(model: CorrectedModel, at: Observations) -> Array:
-    """(N, 3) the predicted target in the root frame, m."""
+    """Predicted target (N, 3) in the root frame, m."""
     _, instrument = displacement(at, model.effects)
     point = at.predicted_position + (0.0 if instrument is None else instrument)
     return np.asarray((point - model.frames.base[:3, 3]) @ model.frames.base[:3, :3])
 
 
 def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
-    """(3 N, g) orthonormal columns of what aligning the unknown frames of either does."""
+    """Orthonormal columns (3 N, g) of the unknown frames of either campaign."""
     columns = np.zeros((len(at.q), 3, 0))
     if not (a.settings.base_known and b.settings.base_known):
         columns = np.concatenate([columns, at.base_sensitivity[:, :3, :]], axis=2)
@@ -457,13 +456,13 @@ def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
 
 
 def _left(values: Array, gauge: Array) -> Array:
-    """Return columns (N, 3) or (N, 3, K) without what the gauge does."""
+    """Project the gauge out of columns (N, 3) or (N, 3, K)."""
     flat = values.reshape(gauge.shape[0], -1)
     return np.asarray(flat - gauge @ (gauge.T @ flat)).reshape(values.shape)
 
 
 def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Array) -> Array:
-    """(N, 3) stated variance per axis of the prediction, root frame, m²."""
+    """Predictive variance (N, 3) per axis, root frame, m²."""
     turned = model.frames.base[:3, :3]
     moved = sensitivity(at, [effect for effect, _ in model.effects])
     moved = _left(np.einsum("ji,njk->nik", turned, moved), gauge)

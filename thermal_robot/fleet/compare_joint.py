@@ -1,13 +1,13 @@
 """Bayesian model selection over all campaigns together: what they share and what differs between them.
 
-Every campaign says y_c = X_c θ_c + noise, its own frames projected out. An effect that is shared is one block of
+The model of campaign c is y_c = X_c θ_c + noise, its own frames projected out. An effect that is shared is one block of
 columns over all campaigns; one of its places (a joint, a link), or one parameter there, that differs in some campaigns
 is a block over these alone. All blocks compete by the marginal likelihood of a diagnosis
 (:mod:`thermal_robot.inference.evidence`), from the campaigns' sums of products; noise and frames are each campaign's
-own. What the search holds for a change must also stand by its chi-square, corrected for all that was looked at.
+own. A change must also be significant by its chi-square, corrected for the number of comparisons.
 
-Blocks that differ are many: of four campaigns fourteen sets may each differ in every place and parameter. Products are
-formed of those that are asked for alone.
+There are many differing blocks: with four campaigns fourteen subsets for every place and parameter. Products are formed
+on demand.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Choice = tuple[Place, tuple[int, ...], tuple[int, ...], bool, float]
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One block of the joint fit: parameters of an effect that are shared by all campaigns, or differ in some.
+    """One block of the joint fit: parameters of an effect, shared by all campaigns or different in some.
 
     ``effect`` is its number in the list of those compared, ``place`` kind and name, empty for all its places;
     ``parameters`` are numbers among all that are compared, ``where`` those of the campaigns, all for what is shared.
@@ -56,9 +56,9 @@ class Part:
     positive: NDArray[np.bool_]
 
     def excludes(self, other: Part) -> bool:
-        """Whether two parts exclude each other: shared settings of one effect, and the same differing in two ways.
+        """Whether two parts exclude each other: settings of one effect that share parameters and campaigns.
 
-        One parameter may differ in a set of campaigns and in another, but not both alone and with its place in one.
+        One parameter may differ in two sets of campaigns, but not both alone and with its place in the same campaign.
         """
         if (self.effect, self.shared) != (other.effect, other.shared):
             return False
@@ -68,9 +68,9 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """All parts that the campaigns tell, and what each campaign says.
+    """Joint normal equations of all parts, from those of each campaign.
 
-    ``total`` and ``equations`` are y'y along what the campaigns see, and how many directions that are, of all together.
+    ``total`` is y'y in the range of the columns, ``equations`` its dimension, summed over the campaigns.
     """
 
     parts: tuple[Part, ...]
@@ -80,7 +80,7 @@ class Problem:
 
     @classmethod
     def of(cls, listed: Sequence[Candidate], said: Sequence[Sums]) -> Problem:
-        """Return the problem of the effects that are compared."""
+        """Joint problem of the effects that are compared."""
         parts = []
         for number, item in enumerate(listed):
             for place, own, where, shared, prior in _choices(item, said) if item.at else ():
@@ -96,7 +96,7 @@ class Problem:
         return cls(tuple(parts), said, total, equations)
 
     def gram(self, parts: Sequence[Part]) -> Gram:
-        """Return the normal equations of some parts together."""
+        """Return the normal equations of a selection of parts."""
         ends = np.cumsum([0, *(part.basis.shape[1] for part in parts)]).tolist()
         slices = tuple(slice(a, b) for a, b in pairwise(ends))
         matrix, vector = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
@@ -114,13 +114,13 @@ class Problem:
         return Gram(matrix, vector, self.total, slices, bases, positive, ranks, spreads, self.equations, settings.HELD)
 
     def better(self, held: Sequence[Part], bases: Sequence[Combination], best: float) -> list[Part]:
-        """Return parts that better a combination, beside it or in place of one of its blocks.
+        """Parts that improve a combination, added or in place of one of its blocks.
 
-        All are weighed to first order; of each place the first is returned that is better exactly, those that promise
-        most before the others. Where the effect is shared, to differ in some campaigns or in all others is the same:
-        then the fewer are returned, which others may join that differ elsewhere. ``held`` are the parts that take part
-        already, as the ``bases`` number them: the best combination, those as near, and those without one of its blocks.
-        ``best`` is the log evidence of the best.
+        All are scored to first order; for each place the first that improves the exact evidence is returned, in the
+        order of the first-order gain. For a shared effect, a difference in some campaigns or in the complement is
+        equivalent: the smaller subset is returned. ``held`` are the parts in the model already, as the ``bases`` number
+        them: the best combination, those as near, and those without one of its blocks. ``best`` is the log evidence of
+        the best.
         """
         found: dict[tuple[int, Place], Part] = {}
         alike = {(p.effect, p.parameters, p.where): p for p in self.parts if not p.shared}
@@ -142,7 +142,7 @@ class Problem:
     def _promising(
         self, held: Sequence[Part], bases: Sequence[Combination], best: float
     ) -> list[tuple[Part, Combination]]:
-        """Return what may be better to first order, those that promise most first, each with the base that it joins."""
+        """Parts with a first-order gain, the largest first, each with the combination that it joins."""
         found: dict[Part, tuple[float, Combination]] = {}
         used = sorted({b for base in bases for b in base.blocks})
         others = [part for part in self.parts if part not in held]
@@ -160,7 +160,7 @@ class Problem:
         return [(part, base) for part, (_, base) in sorted(found.items(), key=lambda item: -item[1][0])]
 
     def _beside(self, inside: Sequence[Part], base: Combination, part: Part, wanted: float) -> float:
-        """Return the log evidence of a part beside a base, exactly unless it clearly stays below what is wanted."""
+        """Log evidence of a combination with one more part; stopped early where clearly below ``wanted``."""
         parts = [*inside, part]
         prior, start = sum(p.log_prior for p in parts), _numbered(base, base.blocks)
         try:
@@ -171,13 +171,13 @@ class Problem:
 
 
 def _numbered(base: Combination, used: Sequence[int]) -> Combination:
-    """Return a combination with its blocks numbered by their places among those in use."""
+    """Return the combination with its blocks renumbered by their places among those in use."""
     at = {b: n for n, b in enumerate(used)}
     return replace(base, blocks=tuple(at[b] for b in base.blocks), scales={at[b]: base.scales[b] for b in base.blocks})
 
 
 def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
-    """Yield an effect as shared, in all places and in each, then each place and parameter as one that differs."""
+    """Yield the alternatives of an effect: shared, in all places and in each, then different by place and parameter."""
     everywhere, some, places = tuple(range(len(said))), some_of(len(said)), item.places
     among = len(places) if len(places) > 1 else 0
     shared: list[tuple[Place, tuple[int, ...]]] = [(("", ""), item.at)]
@@ -195,7 +195,7 @@ def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
 
 
 def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]]:
-    """Yield what of an effect may differ, with its share of the prior: all places, one, or one parameter there."""
+    """Yield subsets of an effect's parameters that may differ, with their prior shares."""
     if len(item.places) > 1:
         yield ("", ""), item.at, settings.EVERYWHERE
     each = (1.0 - settings.EVERYWHERE) / len(item.places)
@@ -207,7 +207,7 @@ def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]
 
 
 def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
-    """Return the sets of campaigns that may differ from the others: all, or of many those named in ``FEW``."""
+    """Subsets of campaigns that may differ from the others: all, or with many campaigns singles and splits in order."""
     every = range(campaigns)
     if campaigns <= settings.FEW:
         return tuple(s for size in range(1, campaigns) for s in combinations(every, size))
@@ -217,7 +217,7 @@ def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """A part that differs: its chi-square, degrees of freedom, probability by chance, and posterior probability."""
+    """Part that differs: chi-square, degrees of freedom, p-value, and posterior probability."""
 
     part: Part
     chi2: float
@@ -228,7 +228,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """The most probable joint explanation of K campaigns.
+    """Most probable joint explanation of K campaigns.
 
     ``parts`` are at work, of which ``changes`` differ between campaigns; ``values`` (K, P) are the parameters of each
     campaign in expected sizes; ``probability`` is, per effect, that it is at work in any campaign; ``looked_at`` counts
@@ -243,7 +243,7 @@ class Joint:
 
 
 def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
-    """Find what campaigns share and what differs between them, from what each says of the listed parameters."""
+    """Bayesian model selection over campaigns: which parameters they share and which differ."""
     problem = Problem.of(listed, said)
     looked_at = len({(p.effect, p.parameters) for p in problem.parts if not p.shared})
     parts, search, best = _searched(problem, [any(item.named) for item in listed])
@@ -268,10 +268,10 @@ def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
 
 
 def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Search, Combination]:
-    """Return the parts that were weighed together, the search over them, and the best combination.
+    """Parts that were evaluated together, the search over them, and the best combination.
 
-    All parts, where they are few. Of many, those that are shared first; others join while one of them, to first order,
-    would better the best combination, beside it or in place of one of its blocks.
+    All parts, where they are few. Otherwise the shared ones first; others join while their first-order gain is
+    positive, added or in place of a block.
     """
     few = len(problem.parts) <= settings.AT_ONCE
     held = [part for part in problem.parts if few or part.shared]
@@ -301,7 +301,7 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Sear
 def _standing(
     search: Search, parts: Sequence[Part], best: Combination, looked_at: int
 ) -> tuple[Combination, tuple[Change, ...]]:
-    """Take out, the weakest first, what differs by no more than chance makes one of so many places differ."""
+    """Backward elimination of differences that are insignificant after correction for the number of places."""
     while True:
         changes = [_change(search, parts, best, b) for b in best.blocks if not parts[b].shared]
         weakest = max(changes, key=lambda c: c.p_value, default=None)
@@ -314,7 +314,7 @@ def _standing(
 
 
 def _change(search: Search, parts: Sequence[Part], best: Combination, number: int) -> Change:
-    """Return the score test of a part that differs, beside all others of the best explanation, without its prior."""
+    """Score test of a differing part, given all others of the best explanation, without its prior."""
     start = sum(parts[b].basis.shape[1] for b in best.blocks[: best.blocks.index(number)])
     own = slice(start, start + parts[number].basis.shape[1])
     tight = np.linalg.inv(best.covariance[own, own])

@@ -1,21 +1,21 @@
-"""Normal equations of each campaign: what it says of the parameters that are compared, its frames projected out.
+"""Normal equations of each campaign in the compared parameters, its frames projected out.
 
 With y the gap, X the columns of all parameters and F those of the unknown frames, whitened by the campaign's own noise,
 
     G = Xᵀ(1 − F F⁺)X,   b = Xᵀ(1 − F F⁺)y.
 
-What an unknown frame takes up, such as the first joint's zero, is not in G. Where what remains is no noise, the
+Parameters that an unknown frame absorbs, such as the first joint's zero, are not in G. With a structured residual, the
 information along each axis of G is divided by the variance inflation of :mod:`thermal_robot.diagnosis.uncertainty`.
 
-A model file may stand in the place of a campaign. It holds the values θ of the effects that were found, the covariance
-C of frames and parameters, the deviation π that was expected of each parameter, and the ranges that were measured. The
-rows alone say of θ, by Bayes' theorem for a linear model with normal errors,
+A model file may replace a campaign. It holds the values θ of the effects found, the covariance C of frames and
+parameters, their prior standard deviations π, and the measured ranges. The information of the rows alone is, by Bayes'
+theorem for a linear model with normal errors,
 
     G = C⁻¹ − π⁻²,   b = C⁻¹ θ.
 
-Its parameters θ_M become those that are compared by what they do to the target: X_M = X A + F B over poses within the
-measured ranges, so that θ = A θ_M. An effect that does what the compared parameters cannot do is marginalised with the
-frames. Of all that a model does not hold it says nothing.
+Its parameters θ_M are expressed in the compared ones by their displacement of the target: X_M = X A + F B over poses
+within the measured ranges, so that θ = A θ_M. An effect outside the span of the compared parameters is marginalised
+with the frames. A model carries no information on effects outside it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ Ranges = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """A model file in the place of a diagnosis and of its fit, under the name ``campaign``.
+    """Model file in place of a diagnosis and its fit, named ``campaign``.
 
     ``corrected`` are observations of the corrected model at poses within the ranges that were measured, for the rows
     are gone. There are neither samples nor variants: which other effects were compared the file does not say.
@@ -69,12 +69,12 @@ class Known:
 
     @classmethod
     def of(cls, model: CorrectedModel, name: str) -> Known:
-        """Return a model under a name.
+        """Wrap a model under a name.
 
         Raises
         ------
         CampaignError
-            If it rests on a simulator, or does not say how sure it is.
+            If it depends on a simulator, or lacks its uncertainty.
         """
         if model.simulated:
             problem = "this model corrects a simulator's predictions, which it does not hold"
@@ -87,36 +87,36 @@ class Known:
 
     @property
     def effects(self) -> tuple[tuple[Effect, Array], ...]:
-        """Its effects with their values, SI."""
+        """Effects with their values, SI."""
         return self.model.effects
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Names of its effects."""
+        """Names of the effects."""
         return tuple(dict.fromkeys(effect.name for effect, _ in self.effects))
 
     @property
     def summary(self) -> str:
-        """What it is, in one sentence."""
+        """Description of the model in one sentence."""
         held = ", ".join(dict.fromkeys(effect.title for effect, _ in self.effects))
         return f"A model file; it holds {held or 'no effect'}."
 
     def odds(self, name: str) -> float:
-        """Even odds of an effect: the file says no more than that it was found."""
+        """Even odds of any effect, since a file has no odds."""
         return 1.0
 
     def probability(self, name: str) -> float:
-        """Whether it holds an effect, 0 or 1."""
+        """Probability 0 or 1 of an effect, by its presence."""
         return float(name in self.verdict)
 
 
 def is_model(path: object) -> bool:
-    """Whether this is the path of a file that may be a model."""
+    """Whether the path may be that of a model file."""
     return isinstance(path, (str, Path)) and Path(path).suffix.lower() == ".json" and is_file(Path(path))
 
 
 def poses(model: CorrectedModel, ranges: Ranges) -> Array:
-    """(N, n) joint positions, uniform over the ranges that were measured, rad or m."""
+    """Joint positions (N, n), uniform over the measured ranges, rad or m."""
     low, high = np.array([ranges[name] for name in model.robot.joint_names]).T
     return np.asarray(np.random.default_rng(0).uniform(low, high, (settings.POSES, model.robot.n)))
 
@@ -143,8 +143,8 @@ class Candidate:
 
     ``told`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
     among all that are compared. Of each campaign ``parameters`` are the same with their responses there, empty where it
-    lacks what they need; ``named`` tells whether its diagnosis names the effect. The name and title of a law that was
-    found in one campaign have that campaign's name with it.
+    lacks what they need; ``named``: whether its diagnosis names the effect. A discovered law has its campaign's name
+    appended to its name and title.
     """
 
     name: str
@@ -158,7 +158,7 @@ class Candidate:
 
     @property
     def places(self) -> dict[tuple[str, str], list[int]]:
-        """Numbers of the compared parameters by kind and name of their place."""
+        """Indices of the compared parameters by kind and name of their place."""
         found: dict[tuple[str, str], list[int]] = {}
         for number, parameter in zip(self.at, self.told, strict=True):
             found.setdefault((parameter.kind, parameter.place), []).append(number)
@@ -168,10 +168,10 @@ class Candidate:
 def candidates(
     found: Sequence[Diagnosis | Known], fits: Sequence[Fit | Known], names: Sequence[str]
 ) -> tuple[Candidate, ...]:
-    """List the effects that are compared, those that can be set anew first.
+    """Effects to compare, those that may be re-zeroed between campaigns first.
 
-    Every effect of a diagnosis, every one that is probable enough in any of them, and those that somebody could set
-    anew between campaigns, such as a joint's zero. A model file is both a diagnosis (``found``) and its fit.
+    All effects of the diagnoses, all that are probable enough in one, and those that may be re-set between campaigns,
+    such as joint zeros. A model file is both a diagnosis (``found``) and its fit.
     """
     listed: list[Candidate] = []
     for key, effect in _settings(fits, names):
@@ -192,9 +192,9 @@ def candidates(
 
 
 def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
-    """Yield each effect once, by its name, in all its places and in the setting that the surest fit has.
+    """Yield each effect once, in all its places and in the setting of the most certain fit.
 
-    A setting that reads more, such as a clock, goes before one that a campaign without it had to do with.
+    A setting that reads more columns, such as a clock, takes precedence.
     """
     known: dict[str, tuple[tuple[int, float], Effect]] = {}
     for fit in fits:
@@ -214,7 +214,7 @@ def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tup
 
 
 def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
-    """Return an effect's parameters in a campaign, as they are told; empty where the campaign lacks what it needs."""
+    """Parameters of an effect in a campaign, as reported; empty where the campaign lacks its columns."""
     observations = fit.corrected
     try:
         effect = _there(effect, fit)
@@ -228,7 +228,7 @@ def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
 
 
 def _there(effect: Effect, fit: Fit | Known) -> Effect:
-    """Return an effect as it is in a campaign; a model has no record to take anything from."""
+    """Effect as it is in a campaign; a model has no record to take over."""
     recorded = isinstance(fit, Fit) or isinstance(effect, OfPosition)  # these have nothing of it but their range
     return gate.elsewhere(effect, fit.corrected) if recorded else effect
 
@@ -248,17 +248,17 @@ class Sums:
 
     @property
     def inverse(self) -> tuple[Array, Array]:
-        """(P, P) pseudo-inverse of G, and (P,) part of each parameter's direction that G sees."""
+        """Pseudo-inverse (P, P) of G, and the share (P,) of each parameter in its range."""
         value, axes = np.linalg.eigh(self.matrix)
         seen = value > inference.INFORMATION_FLOOR
         return (axes[:, seen] / value[seen]) @ axes[:, seen].T, np.asarray((axes[:, seen] ** 2).sum(axis=1))
 
     def some(self, kept: Sequence[int]) -> Sums:
-        """Return what it says with the other parameters at zero."""
+        """Return the normal equations with the other parameters fixed at zero."""
         return Sums(self.matrix[np.ix_(kept, kept)], self.vector[list(kept)])
 
     def tells(self, own: Sequence[int]) -> bool:
-        """Whether it says anything of some parameters."""
+        """Whether it contains information on some parameters."""
         return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > inference.INFORMATION_FLOOR)
 
 
@@ -282,17 +282,17 @@ def sums(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate]
 
 
 def _columns(at: Observations, item: Candidate, number: int) -> Array:
-    """(N, m, P) columns of an effect, in expected sizes; zeros where the campaign lacks what it needs."""
+    """Columns (N, m, P) of an effect in expected sizes; zeros where the campaign lacks its columns."""
     if not item.parameters[number]:
         return np.zeros((*moved_by(at, ()).shape[:2], len(item.told)))
     return moved_by(at, item.parameters[number]) * item.sizes
 
 
 def _projected(full: Array, flat: int) -> tuple[Array, Array]:
-    """(P, P) and (P,) products without the first columns, what is left of their aliases set to zero.
+    """Products (P, P) and (P,) with the first columns projected out, rounding errors of their aliases set to zero.
 
-    Rounding leaves something, and so does a base that rocks: a shift of the first link is then no more exactly one of
-    the base, and a campaign would tell it to decimetres.
+    Without that, rounding or a moving base would leave a tiny component of an alias of the frames, such as a shift of
+    the first link, and estimate it to decimetres.
     """
     along = whitener(full[:flat, :flat]).T @ full[:flat, flat:]
     rest, before = full[flat:, flat:] - along.T @ along, np.diag(full)[flat:-1]
@@ -304,7 +304,7 @@ def _projected(full: Array, flat: int) -> tuple[Array, Array]:
 
 
 def told(said: Sequence[Sums]) -> list[int]:
-    """Return the parameters that are told: none that campaigns together do not see, or see as others before it."""
+    """Return the indices of the parameters that the campaigns together determine, without aliases of earlier ones."""
     together = np.sum([one.matrix for one in said], axis=0)
     value, axes = np.linalg.eigh(together)
     root = (axes * np.sqrt(np.maximum(value, 0.0))).T
@@ -314,7 +314,7 @@ def told(said: Sequence[Sums]) -> list[int]:
 
 
 def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: Sequence[Array]) -> Sums:
-    """Return what a model file says, with the (3N, P) columns of each listed effect at its poses."""
+    """Return the normal equations from a model file's covariance, with the (3N, P) columns of each listed effect."""
     width = sum(own.shape[1] for own in columns)
     prior, start = np.asarray(known.spread.prior), 0
     kept: list[int] = []
@@ -337,9 +337,9 @@ def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: S
 def _expressed(
     known: Known, effect: Effect, own: Array, listed: Sequence[Candidate], columns: Sequence[Array], number: int
 ) -> Array | None:
-    """(P, K) listed parameters for one prior deviation of each of an effect's K; ``None`` if they cannot do the same.
+    """Return listed parameters (P, K) equivalent to one prior deviation of each of an effect's K; ``None`` without any.
 
-    Its own parameters first; then, of what contains joints' zeros, with those beside them.
+    Tried are its own parameters, then, for an effect that contains joint zeros, these as well.
     """
     name = f"{effect.name} of {known.campaign}" if isinstance(effect, Discovered) else effect.name
     owner = np.repeat(np.arange(len(listed)), [c.shape[1] for c in columns])
@@ -362,7 +362,7 @@ def _expressed(
 
 
 def _without_prior(known: Known, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
-    """Return G and b of some of the model's parameters, in prior deviations: what rows say without the prior."""
+    """Information G and b of some of the model's parameters, in prior deviations, with the prior removed."""
     covariance = known.spread.covariance if known.spread.wider is None else known.spread.wider
     flat = len(covariance) - len(prior)
     values = np.concatenate([values for _, values in known.effects])[kept] / prior[kept]

@@ -1,4 +1,4 @@
-"""Equality tests between campaigns as one frozen value, its JSON, and the port through which it is put into words."""
+"""Result of a comparison of campaigns as one frozen value, and its JSON."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter in every campaign, each told by its own data beside all effects that are at work, SI.
+    """Estimates of one parameter by each campaign alone, given all effects that are at work; SI.
 
     Attributes
     ----------
     name, kind, place, unit
-        What it is, and where.
+        Name, kind and name of its place, and unit.
     values, stds
         Per campaign; ``None`` where its data do not determine it.
     between
         The two campaigns that differ most in deviations; empty where fewer than two tell it.
     difference, std
-        Of the later of these less the earlier, and its standard deviation.
+        Later minus earlier of these two campaigns, and its standard deviation.
     chi2, degrees, p_value
-        Of equal values in all campaigns; the probability is that of chance, not corrected for other parameters.
+        Chi-square test of equal values in all campaigns, not corrected for other parameters.
     """
 
     name: str
@@ -55,26 +55,26 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect in every campaign.
+    """Comparison of one effect between campaigns.
 
     Attributes
     ----------
     name, title
-        Of the effect; a law that was found in one campaign has that campaign's name with it.
+        Name and title of the effect; a discovered law has its campaign's name appended.
     status
-        ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: it loses
-        its name; ``not_needed``: some diagnosis names it, and the campaigns together do not need it;
-        ``not_compared``: one campaign alone can tell it; ``absent``: no diagnosis names it, and nothing speaks for it.
+        ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: no two
+        campaigns agree on its size; ``not_needed``: a diagnosis names it, but the joint fit does not need it;
+        ``not_compared``: only one campaign determines it; ``absent``: neither a diagnosis nor the joint fit has it.
     reason
-        Why it loses its name, or is not compared; empty otherwise.
+        Why it is contradicted, or not compared; empty otherwise.
     probability
-        That it is at work in any campaign, by the joint fit.
+        Posterior probability, by the joint fit, that it is at work in any campaign.
     named
         The campaigns whose own diagnosis names it.
     chi2, degrees, p_value
-        Of equal parameters in all campaigns, all others free in each.
+        Chi-square test of equal parameters in all campaigns, all others free in each.
     parameters
-        One by one.
+        Comparison of each parameter.
     """
 
     name: str
@@ -91,16 +91,16 @@ class Effect:
 
 @dataclass(frozen=True)
 class Change:
-    """What differs between campaigns by the joint fit.
+    """Difference between campaigns in the joint fit.
 
     Attributes
     ----------
     effect, title
-        Of the effect.
+        Name and title of the effect.
     kind, place
-        Where; empty for all its places.
+        Kind and name of the place; empty for all places.
     parameters
-        Names of those that differ.
+        Names of the parameters that differ.
     groups
         Campaigns that agree with each other.
     since
@@ -108,9 +108,9 @@ class Change:
     values, unit
         Per campaign, of a single parameter, SI; empty for several.
     chi2, degrees, p_value
-        Of no difference, beside all else that is shared; the probability is corrected for all that was compared.
+        Chi-square test of no difference, given all shared parameters; the p-value is corrected for all comparisons.
     probability
-        That this place differs.
+        Posterior probability that this place differs.
     """
 
     effect: str
@@ -130,14 +130,14 @@ class Change:
 
 @dataclass(frozen=True)
 class Predicted:
-    """What the models of two campaigns predict at the poses and conditions that both measured, frames aligned.
+    """Predictions of two campaigns' models at common poses and conditions, frames aligned.
 
     Attributes
     ----------
     campaigns
         The two.
     poses
-        How many.
+        Number of poses.
     rms, stated
         Root mean square of the difference, and of its stated deviation, m.
     beyond
@@ -159,26 +159,26 @@ class Predicted:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """What campaigns of one robot share, and what changed between them.
+    """Result of a comparison: what campaigns of one robot share, and what changed between them.
 
     Attributes
     ----------
     campaigns, samples
         Names of the campaigns in their order, and how many measurements each has; none of a model file.
     robot, tool_frame
-        Which robot.
+        Names of robot and tool frame.
     effects
         Every effect that was compared, those at work first.
     changes
-        What differs, the surest first.
+        Differences, the most certain first.
     predicted
-        For every two campaigns.
+        Cross-predictions of every two campaigns.
     not_told
-        Parameters that no campaign can tell beside the unknown frames and the others: they are not compared.
+        Parameters that no campaign determines given the unknown frames and the others: they are not compared.
     looked_at
-        How many places were compared: all probabilities of changes are corrected for that.
+        Number of places compared, for which the p-values of changes are corrected.
     diagnoses
-        Of the campaigns; in the place of a model file what the comparison knows of it.
+        Diagnoses of the campaigns; for a model file a stand-in.
 
     Examples
     --------
@@ -203,22 +203,22 @@ class Comparison:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Names of the effects that keep their name."""
+        """Names of the effects that the comparison confirms."""
         return tuple(e.name for e in self.effects if e.status in ("shared", "changed", "not_compared"))
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the effects that some diagnosis names, and that lose their name."""
+        """Names of the effects that a diagnosis names and the comparison contradicts."""
         return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed") and e.named)
 
     @property
     def summary(self) -> str:
-        """What stayed and what changed in one plain sentence."""
+        """Result in one plain sentence."""
         return str(registered().comparison_headline(self._plain()))
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Parameters by effect and name with a column for each campaign and for its deviation, SI."""
+        """Data frame of parameters by effect and name, with value and deviation for each campaign, SI."""
         import pandas as pd
 
         rows = {}
@@ -231,7 +231,7 @@ class Comparison:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["effect", "parameter"])
 
     def effect(self, name: str) -> Effect:
-        """Return what was compared of one effect.
+        """Comparison of one effect.
 
         Raises
         ------
@@ -244,7 +244,7 @@ class Comparison:
         raise KeyError(f"{name!r} was not compared; {', '.join(e.name for e in self.effects) or 'nothing'} was")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/comparison/1``; SI throughout."""
+        """JSON object of the format ``thermal-robot/comparison/1``, SI."""
         plain = self._plain()
         return {**plain, "summary": registered().comparison_headline(plain)}
 
@@ -265,7 +265,7 @@ class Comparison:
         return dict(jsonable(plain))
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        """Write :meth:`to_dict` to a file by an atomic replace."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __repr__(self) -> str:

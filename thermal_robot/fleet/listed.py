@@ -1,4 +1,4 @@
-"""Campaigns of a fleet with their labels: those below a folder, or those of a list in CSV or TOML."""
+"""Campaigns of a fleet with their labels, from a folder tree or a list in CSV or TOML."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ _LISTS = (".csv", ".toml")
 
 @dataclass(frozen=True)
 class Listed:
-    """The campaigns of a fleet: by name, which is the path from ``root``, with a label for each of ``names``."""
+    """Campaigns of a fleet, named by their path from ``root``, with a label for each of ``names``."""
 
     root: Path
     names: tuple[str, ...]
     campaigns: tuple[tuple[str, tuple[str, ...]], ...]
 
     def folder(self, name: str) -> str:
-        """Return the path of a campaign, absolute, so that every process finds it."""
+        """Absolute path of a campaign."""
         return os.path.abspath(self.root / name)
 
 
 def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
-    """Find the campaigns of a fleet, in the order of the list, of a folder in that of the names.
+    """Find the campaigns of a fleet, in the order of the list, or of the names in a folder.
 
     The source is a folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels,
     whose levels ``names`` names from the top, ``level_1`` and so on where left out. Or it is a list: CSV, or TOML with
@@ -69,7 +69,7 @@ def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
 
 
 def _below(root: Path, names: Sequence[str]) -> Listed:
-    """List every folder below with a campaign, labelled by the folders on the way; ``.`` is the root itself."""
+    """Every folder below with a campaign, labelled by the folders on the way; ``.`` is the root itself."""
     # a file that cannot be opened, such as a broken link, is a campaign: its row says why
     having = (folder for folder, _, files in os.walk(root) if FILE_NAME in files)
     found = sorted(Path(os.path.relpath(folder, root)).as_posix() for folder in having)
@@ -86,7 +86,7 @@ def _below(root: Path, names: Sequence[str]) -> Listed:
 
 
 def _of_list(path: Path) -> Listed:
-    """Read a list: columns of text, and where each campaign stands."""
+    """Columns of text of a list, and the path of each campaign."""
     if path.suffix.lower() == ".toml":
         columns, rows = _read_toml(path)
     else:
@@ -110,7 +110,7 @@ def _of_list(path: Path) -> Listed:
 
 
 def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
-    """Refuse a label that the table has a column for, or that stands twice."""
+    """Refuse a label that is a column of the table, or a duplicate."""
     names = tuple(labels)
     for name in names:
         if name in OWN or not name.strip():
@@ -122,7 +122,7 @@ def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
 
 
 def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
-    """Return columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
+    """Columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
     try:
         data: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

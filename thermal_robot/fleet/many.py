@@ -1,16 +1,16 @@
-"""Parallel diagnosis of many campaigns by processes of Dask, on this machine or behind the scheduler of a cluster.
+"""Parallel diagnosis of many campaigns by Dask workers, local or of a cluster.
 
-What is done already, the rows of each campaign by its fingerprint, is a database of SQLite: a process that is killed
-leaves what it has written, and nothing half. Only the process that runs the fleet opens it; a second one is refused.
+Finished rows of each campaign, by its fingerprint, are in an SQLite database, which survives a killed process. Only the
+process that runs the fleet opens it; a second one is refused.
 
 On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
 share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
 does, so that no other user of the machine can hand it work, and serves no page. A cluster's scheduler is named by its
 address; its TLS is that of Dask's own configuration.
 
-As much is handed out at a time as there are threads, so that a process that is killed had one campaign. Dask would
-hand that to others again and again, and count whatever else lay on them as suspicious, too: here it waits until the end
-and is done then by itself, once. If that process is killed as well, it was this campaign.
+At most one task a thread is submitted at a time, so that a killed process had one campaign. Dask would retry that on
+other workers and suspect their tasks, too: here it is retried once at the end, alone. If that process is killed as
+well, the campaign has failed.
 """
 
 from __future__ import annotations
@@ -57,14 +57,14 @@ Task = tuple[str, tuple[Any, ...]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fleet:
-    """The diagnoses of many campaigns, and what they have in common.
+    """Diagnoses of many campaigns, and their summary.
 
     Attributes
     ----------
     table
         Path of the table: Parquet, a row for each campaign and effect.
     summary
-        What is wrong with which robot, and what several share; it prints as text.
+        Summary of effects by robot and of common parameters; prints as text.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class Fleet:
     summary: Summary
 
     def to_frame(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return the table, or some of its columns; SI throughout."""
+        """Return the data frame of the table, or of some columns; SI."""
         import pandas as pd
 
         return pd.read_parquet(self.table, columns=None if columns is None else list(columns))
@@ -107,11 +107,11 @@ def diagnose_many(
     time_limit: float = settings.TIME_LIMIT,
     progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> Fleet:
-    """Diagnose many campaigns, each as :func:`diagnose` does, and say what their robots have in common.
+    """Diagnose many campaigns with :func:`diagnose` in parallel, and summarise them.
 
-    A run that was stopped continues: what is done, by the content of its files, the version of the program and the
-    options, is not done again. The table is the same, byte for byte, for any number of workers. A campaign that fails
-    is a row with its reason; one that failed for another reason than its own files is tried again by the next run.
+    An interrupted run is resumed: finished campaigns with the same files, program version and options are not repeated.
+    The table is the same, byte for byte, for any number of workers. A failed campaign is a row with its reason; it is
+    retried by the next run unless its own files are the reason.
 
     A script that calls this does so under ``if __name__ == "__main__":``, for its processes import it.
 
@@ -182,7 +182,7 @@ def diagnose_many(
 
 
 def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple[list[Plain], bool]:
-    """Diagnose the campaign in a folder; its rows, and whether another run may give others: the program failed."""
+    """Rows of one diagnosis, and whether a rerun may differ because the program failed."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what is worth a word stands in the rows
@@ -202,7 +202,7 @@ def _diagnosed(
     time_limit: float,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Diagnose what is not done yet, in the order of the list; what is alike is done once."""
+    """Diagnose what is not done yet, in the order of the list; duplicates once."""
     under_way: set[str] = set()
     finished, total = count(1), len(found.campaigns)
 
@@ -233,10 +233,10 @@ def _diagnosed(
 
 
 def _in_time(time_limit: float, *campaign: Any) -> tuple[list[Plain], bool]:
-    """Diagnose a campaign, or end the process.
+    """Diagnose a campaign within a time limit; end the process otherwise.
 
-    What a diagnosis leaves refers to itself, and would stay for hundreds of campaigns; what was there after the first,
-    modules above all, is not looked through again.
+    Reference cycles of each diagnosis are collected at once; objects that survive the first one, mostly modules, are
+    frozen.
     """
     with limited(time_limit):
         found = diagnosed(*campaign)
@@ -248,7 +248,7 @@ def _in_time(time_limit: float, *campaign: Any) -> tuple[list[Plain], bool]:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """End this whole process where what is done within takes longer, even where it hangs outside Python."""
+    """End this process after a time limit, even where it hangs outside Python."""
     with open(os.devnull, "w", encoding="utf-8") as nowhere:
         faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
         try:
@@ -258,7 +258,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def _whole(found: Listed, done: Done) -> Iterator[Plain]:
-    """Yield every row of the table, with names and labels."""
+    """Yield all rows of the table, with names and labels."""
     for number, rows in done.in_order():
         name, labels = found.campaigns[number]
         named = {CAMPAIGN: name, **dict(zip(found.names, labels, strict=True))}
@@ -266,13 +266,13 @@ def _whole(found: Listed, done: Done) -> Iterator[Plain]:
 
 
 def _without_place(message: str, folder: str) -> str:
-    """Return a message without the folder that its table names anyway, and that differs from machine to machine."""
+    """Message without the absolute path of its folder."""
     place = folder if not is_file(Path(folder)) else os.path.dirname(folder)
     return " ".join(message.replace(place + os.sep, "").split())
 
 
 def fingerprint(folder: str, options: Sequence[object]) -> str:
-    """Return what the rows of a campaign follow from: name, content of its files, version of the program, options."""
+    """Hash of all that determines the rows of a campaign: name, files, program version, options."""
     from importlib.metadata import version
 
     declaration = read_declaration(Path(folder))
@@ -284,7 +284,7 @@ def fingerprint(folder: str, options: Sequence[object]) -> str:
 
 
 class Done:
-    """The rows that are known, by fingerprint, and which campaign has which. Use :func:`opened`."""
+    """Store of finished rows by fingerprint, and the fingerprint of each campaign. Use :func:`opened`."""
 
     def __init__(self, database: sqlite3.Connection) -> None:
         self._database, self._written = database, time.monotonic()
@@ -293,11 +293,11 @@ class Done:
         return self._database.execute("SELECT 1 FROM done WHERE key = ?", (key,)).fetchone() is not None
 
     def name(self, number: int, key: str) -> None:
-        """Say which fingerprint a campaign has, by its number in the list."""
+        """Set the fingerprint of a campaign, by its number in the list."""
         self._database.execute("INSERT INTO listed VALUES (?, ?)", (number, key))
 
     def put(self, key: str, rows: list[Plain], again: bool = False) -> None:
-        """Keep the rows of a campaign, on disk within a second; ``again`` until the next run, which does it again."""
+        """Store the rows of a campaign, on disk within a second; ``again`` marks them for a rerun."""
         packed = zlib.compress(json.dumps(rows).encode())
         self._database.execute("INSERT OR REPLACE INTO done VALUES (?, ?, ?)", (key, packed, again))
         if time.monotonic() - self._written > settings.WRITTEN_EVERY:
@@ -305,7 +305,7 @@ class Done:
             self._written = time.monotonic()
 
     def in_order(self) -> Iterator[tuple[int, list[Plain]]]:
-        """Yield number and rows of every campaign, in the order of the list, one at a time."""
+        """Yield number and rows of every campaign, in the order of the list."""
         found = self._database.execute("SELECT number, rows FROM listed JOIN done USING (key) ORDER BY number")
         yield from ((number, json.loads(zlib.decompress(packed))) for number, packed in found)
 
@@ -323,7 +323,7 @@ _BEGIN = """
 
 @contextmanager
 def opened(file: Path) -> Iterator[Done]:
-    """Open what is done, or begin it; whatever happens, what was put there is on disk afterwards.
+    """Open or create the store; it is flushed to disk in any case.
 
     Raises
     ------
@@ -361,7 +361,7 @@ campaign whose process was killed comes back at once."""
 
 @contextmanager
 def connected(workers: int, scheduler: str | None = None) -> Iterator[Any]:
-    """Give a Dask client: of so many processes that are started on this machine, or of the scheduler at an address."""
+    """Yield a Dask client: of local worker processes, or of a scheduler's address."""
     dask, distributed = needed("dask"), needed("distributed")
     if scheduler is None:
         with dask.config.set(_UNSERVED), _local(distributed, workers) as cluster, distributed.Client(cluster) as found:
@@ -395,7 +395,7 @@ def _local(distributed: Any, workers: int) -> Any:
 
 
 def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Iterator[tuple[str, Any, str]]:
-    """Have tasks worked on, a few at a time: yield each key once, with its answer, or with why there is none.
+    """Run tasks, a few at a time: yield each key with its answer, or with its error.
 
     Raises
     ------
@@ -420,7 +420,7 @@ def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Ite
 def _flow(
     client: Any, work: Callable[..., Any], tasks: Iterator[Task], alone: bool
 ) -> Iterator[tuple[Task, Any, BaseException | None]]:
-    """Yield each task with its answer or its error; as many are under way at a time as there are threads, or one."""
+    """Yield each task with its answer or error; as many run at a time as there are threads, or one."""
     distributed = needed("distributed")
     under_way: dict[Any, Task] = {}
     finished = distributed.as_completed(with_results=True, raise_errors=False)

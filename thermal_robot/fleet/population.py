@@ -1,14 +1,14 @@
-"""Random-effects model by empirical Bayes: mean of a quantity over many robots, spread, and which robots stand out.
+"""Random-effects model by empirical Bayes: population mean of a quantity, spread between robots, and outliers.
 
-Of robot i the value y_i is known with deviation s_i. The robots' own values scatter about the mean of their group,
+The value y_i of robot i is known with standard deviation s_i. The robots scatter about the mean of their group,
 
     y_i ~ (1 − ε) N(μ_g, s_i² + τ²) + ε C(μ_g, W √(s_i² + τ²)),
 
-with Cauchy's law C, some times as wide and without an end, for robots that are unlike the others; these say nothing of
-μ_g. By empirical Bayes all of μ, τ and ε come from the fleet itself
-(Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1, 2006, on flat priors of τ): for
-each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird and Rubin, *J. R. Stat. Soc.* B
-39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over the posterior of τ.
+with a wider Cauchy law C for outlying robots, which carry little information on μ_g. By empirical Bayes μ, τ and ε are
+estimated from the fleet itself (Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1,
+2006, on flat priors of τ): for each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird
+and Rubin, *J. R. Stat. Soc.* B 39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over
+the posterior of τ.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ class Population:
 
     @property
     def nothing(self) -> float:
-        """Two-sided p value of the mean of a single group being zero."""
+        """Two-sided p-value of a zero mean of a single group."""
         return float(2.0 * ndtr(-abs(self.means[0]) / self.deviations[0]))
 
     @property
     def alike(self) -> float:
-        """P value of all groups having one mean: F test of their scatter against their deviations."""
+        """P-value of equal group means: F test."""
         groups, robots = len(self.means), int(self.counts.sum())
         weight = self.deviations**-2.0
         about = self.means - (weight * self.means).sum() / weight.sum()
@@ -55,7 +55,7 @@ class Population:
 
 
 def population(values: Array, deviations: Array, groups: Codes | None = None) -> Population:
-    """Fit a population to (n,) values with their deviations; ``groups`` (n,) numbers 0 to G − 1, none empty, or one."""
+    """Empirical Bayes fit of (n,) values with their deviations; ``groups`` (n,) are codes 0 to G − 1, none empty."""
     codes = np.zeros(len(values), dtype=np.int64) if groups is None else groups
     order = np.argsort(codes, kind="stable")
     unit = _unit(values, deviations, codes)
@@ -80,13 +80,13 @@ def population(values: Array, deviations: Array, groups: Codes | None = None) ->
 
 
 def _unit(values: Array, deviations: Array, codes: Codes) -> float:
-    """Return the size in which the grid is laid: the scatter about each group's median, with the robots' deviations."""
+    """Scale of the grid of spreads: robust scatter about the group medians, with the median deviation."""
     centres = np.array([np.median(values[codes == k]) for k in range(codes.max() + 1)])
     return float(np.hypot(1.4826 * np.median(np.abs(values - centres[codes])), np.median(deviations)))
 
 
 def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Array, Array, Array]:
-    """Return for T spreads (T, G) means and their tightness, (T, n) probability of being apart, (T,) log posterior."""
+    """EM at T spreads: means and precisions (T, G), outlier probabilities (T, n), log posterior (T,)."""
     counts = np.diff(np.append(starts, len(y)))
     variance = s**2 + tau[:, None] ** 2
     means = np.tile([np.median(part) for part in np.split(y, starts[1:])], (len(tau), 1))
@@ -110,15 +110,15 @@ def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Ar
 
 
 def _cauchy(square: Array) -> Array:
-    """Return the log density of what is unlike the others at so many squared deviations, over 1/√2π of a deviation."""
+    """Log density of outliers (Cauchy) at squared deviations, relative to 1/√2π of a deviation."""
     wide = settings.UNLIKE_WIDTH
     return np.asarray(np.log(np.sqrt(2.0 / np.pi) / wide) - np.log1p(square / wide**2))
 
 
 def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Array, Array]:
-    """Combine several values of the same robot, weighted by their precision.
+    """Weighted mean of several values of the same robot.
 
-    Where they differ by more than their deviations, that of the mean grows in proportion (Birge, *Phys. Rev.* 40,
+    Where they differ by more than their deviations, the deviation of the mean is inflated (Birge, *Phys. Rev.* 40,
     1932). Returns numbers of the n robots, and (n,) values and deviations.
     """
     robots, which = np.unique(owners, return_inverse=True)

@@ -1,15 +1,15 @@
-"""Least-squares estimates of all parameters of a diagnosis as rows of a Parquet table, one for each effect; SI.
+"""Parquet table of a fleet: least-squares estimates of all parameters, one row for each effect; SI.
 
-A fleet cannot be judged by the parameters of the robots in which an effect was found: those are the large ones, and an
-effect too small to be found in any robot may be at work in all. So every campaign tells every parameter of every effect
-that it can test, beside the effects that were found and those that may be at work, as the data alone say it: with G the
-products of the columns, the frames projected out, s the noise, and Λ the priors of the others,
+The parameters of robots in which an effect was found are biased: only large ones are found, and a small effect may be
+at work in all robots. So every campaign estimates every parameter of every testable effect, given the effects that were
+found and those that may be at work: with G the Gram matrix, the frames projected out, s the noise, and Λ the priors of
+the others,
 
     θ = (G/s² + Λ⁻¹)⁻¹ b/s²,
 
-Λ⁻¹ next to nothing for the effect in question, and no parameter held positive. Such estimates scatter about the truth,
-and their mean over a fleet does, too. What is not found but may be at work has its prior of expected size: left out,
-it would be told as something else's, in all robots alike.
+with nearly flat prior for the effect in question, and no parameter held positive. Such estimates are unbiased, and so
+is their mean over a fleet. Effects that may be at work keep their prior of expected size: left out, they would bias
+others in all robots alike.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ OWN = (CAMPAIGN, *_COLUMNS)
 
 
 def needed(module: str) -> Any:
-    """Return a module of the extra ``fleet``.
+    """Import a module of the extra ``fleet``, or say how to install it.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def needed(module: str) -> Any:
 
 
 def rows_of(found: Diagnosis) -> list[Plain]:
-    """Return the rows of a diagnosis, without the campaign's name and its labels.
+    """Rows of a diagnosis, without the campaign's name and labels.
 
     One for each effect, in the diagnosis's order; one without an effect where it is not usable. ``parameters`` are
     those that the diagnosis tells and the data identify, ``free`` those of :func:`free`.
@@ -135,12 +135,12 @@ def _of_effect(finding: Finding, alone: Sequence[Plain]) -> Plain:
 
 
 def failed(reason: str) -> list[Plain]:
-    """Return the one row of a campaign that could not be diagnosed."""
+    """Row of a campaign that could not be diagnosed."""
     return [{"outcome": FAILED, "reason": reason}]
 
 
 def schema(labels: Sequence[str]) -> pa.Schema:
-    """Return the columns of the table: the campaign, its labels as text, what was diagnosed, and of each effect."""
+    """Columns of the table: campaign, labels, diagnosis, effect."""
     pa = needed("pyarrow")
     text, real = pa.string(), pa.float64()
     nested = {
@@ -153,7 +153,7 @@ def schema(labels: Sequence[str]) -> pa.Schema:
 
 
 def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None:
-    """Write the table, whole or not at all, holding few rows at a time; equal rows give equal bytes.
+    """Write the table by an atomic replace, in small memory; equal rows give equal bytes.
 
     Raises
     ------
@@ -168,10 +168,10 @@ def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None
 
 
 def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
-    """Least-squares estimates of each effect's parameters, beside the others that are or may be at work.
+    """Least-squares estimates of each effect's parameters, given the others that are or may be at work.
 
-    Of effects in all their places, those of ``names`` that were tried and taken out again, too: name, value, one sigma
-    (SI) and unit of the parameters of which the data know more than the expected size says.
+    Effects in all their places, including those of ``names`` that were removed: name, value, one sigma (SI) and unit of
+    the parameters that the data determine better than the prior.
     """
     e, likely = fit.explanation, _likely(fit)
     own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}
@@ -193,13 +193,13 @@ def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
 
 
 def _everywhere(fit: Fit, name: str) -> int:
-    """Return the block of an effect in all its places; where none is among those that were compared, the first."""
+    """Block of an effect in all its places, or the first that was compared."""
     blocks = fit.blocks_of(name)
     return next((b for b in blocks if not fit.explanation.linear.blocks[b].effect.places), blocks[0])
 
 
 def _likely(fit: Fit) -> dict[str, int]:
-    """Return by name the effects that were not found but may be at work: the most probable setting of each."""
+    """Most probable settings, by name, of effects that were not found but may be at work."""
     e = fit.explanation
     found = {fit.families[b] for b in e.best.blocks}
     others = (name for name in dict.fromkeys(fit.families) if name not in found)
@@ -208,7 +208,7 @@ def _likely(fit: Fit) -> dict[str, int]:
 
 
 def _alone(e: Explanation, linear: Linear, problem: Gram, blocks: Sequence[int]) -> list[Plain]:
-    """Return the parameters of the first of some blocks, free of its prior, the others held to theirs."""
+    """Parameters of the first of some blocks without its prior, the others with theirs."""
     problem = problem.some(blocks)
     tight = np.zeros_like(problem.matrix)
     for k, (number, at) in enumerate(zip(blocks, problem.slices, strict=True)):

@@ -1,4 +1,4 @@
-"""Every number of this room that somebody chose, with its unit and its reason: of all, compare, wear and fleets."""
+"""Chosen numbers of comparison, wear and fleets, each with its unit and reason."""
 
 from __future__ import annotations
 

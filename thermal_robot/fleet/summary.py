@@ -1,8 +1,8 @@
-"""Empirical Bayes summary of a fleet: what is wrong with which robot, and what several share.
+"""Empirical Bayes summary of a fleet: effects by robot, common parameters, outliers.
 
-Each parameter of each effect is a :func:`~thermal_robot.fleet.population.population` of its own, of values that every
-campaign tells whether the effect was found there or not (:mod:`thermal_robot.fleet.rows`). The table is read in pieces,
-and of parameters those of one effect at a time.
+Each parameter of each effect is fitted as a :func:`~thermal_robot.fleet.population.population` of the estimates of all
+campaigns, whether or not the effect was found there (:mod:`thermal_robot.fleet.rows`). The table is read in pieces, and
+of parameters those of one effect at a time.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ _FOUND = ("found", "contained", "confounded")
 
 @dataclass(frozen=True)
 class Count:
-    """How often an effect was found.
+    """Numbers of robots in which an effect was found, is testable, and is confounded.
 
     Attributes
     ----------
     effect
-        Its name; laws that were discovered count as one by what they follow.
+        Name of the effect; discovered laws of one quantity count as one.
     found, testable
-        In how many robots; found where the data cannot tell it from another, too.
+        Numbers of robots in which it was found, confounded or not, and in which it is testable.
     confounded
-        In how many of those in which it was found the data cannot tell it from another.
+        Number of robots in which it is confounded with another effect.
     places
-        In how many of them which place has the largest share, most often first.
+        Places with the largest share, with the number of robots, most frequent first.
     parameters
         Whether it is a known effect, whose parameters can be compared.
     """
@@ -56,7 +56,7 @@ class Count:
 
 @dataclass(frozen=True)
 class Gathered:
-    """An effect that is found in one group more often than elsewhere.
+    """Effect that is over-represented in one group of robots.
 
     ``p_value`` is that of so many by chance (hypergeometric law), times the number of groups and effects that were
     looked at.
@@ -74,9 +74,9 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Case:
-    """An effect that was found in a campaign: with what probability, which share of the gap (m) it has, and where.
+    """Effect found in a campaign: probability, rms distances (m) before and after, held-out share, and place.
 
-    ``confounded_with`` names what the data cannot tell it from. Without a name it is a gap that no effect explains.
+    ``confounded_with`` are its alternatives. An empty ``effect`` stands for a gap that no effect explains.
     """
 
     robot: str
@@ -92,7 +92,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Group:
-    """A group of robots and its mean, SI, with one sigma."""
+    """Group of robots: mean of a parameter, SI, with its standard deviation."""
 
     group: str
     robots: int
@@ -102,25 +102,25 @@ class Group:
 
 @dataclass(frozen=True)
 class Shared:
-    """A parameter over the fleet, SI.
+    """Distribution of a parameter over the fleet, SI.
 
     Attributes
     ----------
     effect, parameter, unit
-        Which.
+        Names of effect and parameter, and unit.
     robots
-        How many tell it.
+        Number of robots that determine it.
     mean, mean_std
-        Over the fleet, and one sigma.
+        Mean over the fleet, and its standard deviation.
     spread, spread_std
-        Between robots, one sigma, deviations of measurement taken out; and how well that is known. Where groups
-        differ it is that within a group.
+        Standard deviation between robots, corrected for measurement errors, and its own. Where groups differ it is that
+        within a group.
     p_mean
         P value of the mean being zero, times the number of parameters and labels that were looked at.
     label, p_label
-        By which robots differ, and the p value of that being chance, times the same; empty and 1 where they do not.
+        Label by which robots differ, and its p-value with the same correction; empty and 1 where they do not.
     groups
-        Of that label, farthest from the mean of all first.
+        Groups of that label, farthest from the overall mean first.
     """
 
     effect: str
@@ -139,7 +139,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Apart:
-    """A robot that is unlike its group in a parameter, SI: with which probability."""
+    """Robot that is an outlier of its group in a parameter, SI, with the probability."""
 
     robot: str
     effect: str
@@ -156,30 +156,31 @@ SCHEMA = "thermal-robot/fleet/1"
 
 @dataclass(frozen=True)
 class Summary:
-    """A fleet in short. Lists of robots hold the worst of them where there are many; the table holds all.
+    """Summary of a fleet. Long lists hold the most striking robots only; the table holds all.
 
     Attributes
     ----------
     campaigns, robots
-        How many.
+        Numbers of campaigns and robots.
     labels
-        By which robots were grouped, their type included.
+        Labels by which robots were grouped, their type included.
     outcomes
-        How many campaigns were ``diagnosed``, ``unusable`` (robot and table do not belong together) or ``failed``.
+        Numbers of campaigns that were ``diagnosed``, ``unusable`` (robot and table do not belong together) or
+        ``failed``.
     failures
-        Those without a diagnosis: name, outcome, reason.
+        Campaigns without a diagnosis: name, outcome, reason.
     effects
-        How often each effect was found, most often first.
+        Number of robots by effect, most frequent first.
     gathered
         Effects that were found in one group more often than chance allows, most striking first.
     shared
         Per parameter that differs from zero over the whole fleet, or between groups: mean and spread.
     apart
-        Robots that stand out, most probable first, each against its group.
+        Outlying robots relative to their group, most probable first.
     found
-        What is wrong with which robot: the campaigns with the largest gaps.
+        Campaigns with the largest gaps, and the effects found in each.
     parameters
-        How many were compared.
+        Number of parameters compared.
     """
 
     campaigns: int
@@ -195,14 +196,14 @@ class Summary:
     parameters: int
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/fleet/1``; SI throughout."""
+        """JSON object of the format ``thermal-robot/fleet/1``, SI."""
         return dict(jsonable({"schema": SCHEMA, **asdict(self)}))
 
 
 def summarise(
     table: Path, labels: Sequence[str] = (), progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> Summary:
-    """Summarise the table of a fleet, as :func:`~thermal_robot.fleet.rows.write_rows` writes it, by its labels.
+    """Summarise the table of a fleet (:func:`~thermal_robot.fleet.rows.write_rows`) by its labels.
 
     ``progress`` is called with a stage, how many effects are compared, and how many there are.
     """
@@ -230,14 +231,14 @@ def summarise(
 
 
 def _frames(table: Path, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
-    """Yield some columns of the table, a few thousand rows at a time."""
+    """Yield some columns of the table in chunks of rows."""
     with needed("pyarrow.parquet").ParquetFile(table) as file:
         for batch in file.iter_batches(settings.ROWS_AT_ONCE, columns=list(dict.fromkeys(columns))):
             yield batch.to_pandas()
 
 
 def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
-    """Return the campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
+    """Campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
     import pandas as pd
 
     columns = [CAMPAIGN, *labels, MODEL, "outcome", "reason"]
@@ -250,7 +251,7 @@ def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
 
 
 def _findings(table: Path, campaigns: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return every effect of every robot: where it can be tested, is at work, is there beyond doubt; and all cases.
+    """Return the findings by effect and robot: testable, at work, certain; and all cases.
 
     A case is an effect that is at work in a campaign, or a campaign whose gap no effect explains.
     """
@@ -301,7 +302,7 @@ def _counts(findings: pd.DataFrame) -> tuple[Count, ...]:
 
 
 def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
-    """Return the largest gaps: what explains each, or that nothing does."""
+    """Campaigns with the largest gaps, and their explanation, if any."""
     found = []
     largest = cases.sort_values("rms_before", ascending=False, kind="stable").head(settings.MOST_LISTED)
     for row in largest.to_dict("records"):
@@ -317,7 +318,7 @@ def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
 
 
 def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, ...]:
-    """Return what was found more often in a group than chance allows, however many groups were looked at."""
+    """Effects over-represented in a group, corrected for the number of groups."""
     from scipy.stats import hypergeom
 
     striking, tests = [], 0
@@ -357,7 +358,7 @@ def _shared(
     effects: Sequence[str],
     progress: Callable[[str, int, int], None],
 ) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
-    """Return what robots share, who stands out, the surest first each, and how many parameters were compared."""
+    """Return the common parameters and outlying robots, most certain first, and the number of parameters compared."""
     import pandas as pd
 
     codes, names = pd.factorize(campaigns[ROBOT])
@@ -392,7 +393,7 @@ def _compared(
     who: Codes,
     labels: dict[str, tuple[Codes, Any]],
 ) -> tuple[Shared, Array, Array]:
-    """Fit the population of a parameter, as one and by each label; what is usual for each robot, how it is unlike."""
+    """Return the population of a parameter, as one and by each label, with outlier probabilities of the robots."""
     whole = population(values, deviations)
     mean, std = float(whole.means[0]), float(whole.deviations[0])
     found = Shared(*what, len(who), mean, std, whole.spread, whole.spread_std, whole.nothing)

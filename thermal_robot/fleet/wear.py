@@ -1,4 +1,4 @@
-"""Change-point analysis of one robot over several campaigns: what moved, how fast and since when."""
+"""Change over time of one robot's parameters over several campaigns: change-point analysis."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def wear(
     false_alarm: float = settings.FALSE_ALARM,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Wear:
-    """Say which parameter of a robot moves over time: at once, steadily, or without a direction.
+    """Change-point analysis of a robot's parameters over time: constant, jump, linear trend or random walk.
 
-    Each campaign is fitted by itself, which names effects, outliers and noise. Then all are put into one linear
-    problem: the parameters of all effects that were named in any of them, and the zero of every joint, are constants
-    that all share, the unknown frames of each campaign its own. What moves beside is weighed by marginal likelihood.
+    Each campaign is fitted alone for its effects, outliers and noise. Then all enter one linear problem: the parameters
+    of all effects found in any campaign, and all joint zeros, are common constants; unknown frames are each campaign's
+    own. Changes of parameters compete by marginal likelihood.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ def wear(
         At least three of one robot: campaigns, their paths, or diagnoses, which need no new fit. In pairs with dates,
         ``[("2026-03-01", campaign), ...]``, in any order; else in the order of time.
     dates
-        Of the campaigns, where they stand by themselves: ISO 8601 text, or dates. Without dates a jump has its place
+        Dates of the campaigns, if not given in pairs: ISO 8601 text, or dates. Without dates a jump has its place
         between two campaigns, but a trend has no rate.
     limits
-        Of the absolute value of an effect's parameters, SI: ``{"backlash": 5e-4}``.
+        Limits of the absolute value of an effect's parameters, SI: ``{"backlash": 5e-4}``.
     effects
         Names of the effects to consider; all where it is left out. The zeros of joints are always followed.
     false_alarm
-        Stated probability that a series without any change rings at all.
+        Probability of any alarm in a series without change.
     progress
         Called with a few words at each stage.
 
@@ -119,7 +119,7 @@ def of_fits(
     limits: Mapping[str, float] | None = None,
     false_alarm: float = settings.FALSE_ALARM,
 ) -> Wear:
-    """Say what moved between K campaigns of one robot that were fitted already, in the order of time.
+    """Change-point analysis of K fitted campaigns of one robot, in the order of time.
 
     ``moments`` are K dates, none where they are not known; limits and false alarm are as for :func:`wear`.
 
@@ -150,7 +150,7 @@ def _wrong(problem: str, column: str, found: str, expected: str) -> CampaignErro
 
 
 def _members(campaigns: Any, dates: Sequence[Any] | None) -> tuple[list[Campaign | Diagnosis], list[datetime]]:
-    """Return campaigns in the order of time, with their dates; no dates where there are none."""
+    """Campaigns in the order of time, with their dates, if any."""
     require("wear()", campaigns, (Iterable,), _EXPECTED)
     listed = list(campaigns)
     if dates is not None:
@@ -180,7 +180,7 @@ def _opened(given: Any) -> Campaign | Diagnosis:
 
 
 def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
-    """Return the fit of one campaign by itself."""
+    """Fit of one campaign alone."""
     if isinstance(given, Diagnosis):
         if given.fit is None or not given.usable:
             why = given.reason if given.fit is not None else "was made without its fit: give the campaign itself"
@@ -196,7 +196,7 @@ def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
 
 
 def _notes(whole: Problem, visits: Sequence[Visit], factor: float) -> tuple[str, ...]:
-    """Return what a reader must know beside."""
+    """Remarks for the reader."""
     notes = []
     for effect in dict.fromkeys(effect for effect, _ in whole.keys):
         own = [k for k, (name, _) in enumerate(whole.keys) if name == effect]
@@ -228,7 +228,7 @@ def _limits(limits: Mapping[str, float]) -> dict[str, float]:
 
 
 def moment(given: Any) -> datetime:
-    """Return a date as a moment: midnight where it has no hour, UTC where it has a time zone.
+    """Parse a date as a time: midnight without an hour, converted to UTC from a time zone.
 
     Raises
     ------
@@ -249,13 +249,13 @@ def moment(given: Any) -> datetime:
 
 
 def days_since(moments: Sequence[datetime]) -> NDArray[np.float64]:
-    """(K,) days of moments since the first of them."""
+    """Days (K,) since the first of some times."""
     first = min(moments)
     return np.array([(each - first).total_seconds() / _DAY for each in moments])
 
 
 def as_date(first: datetime, day: float) -> str:
-    """Return the date of so many days after the first, rounded to a day; an hour is more than is known."""
+    """ISO date of a number of days after the first, rounded to a day."""
     try:
         return (first + timedelta(days=round(day, 6))).date().isoformat()
     except OverflowError:  # the year 10000 is as good as never
@@ -263,7 +263,7 @@ def as_date(first: datetime, day: float) -> str:
 
 
 def comparable(problem: Problem, series: Series) -> NDArray[np.bool_]:
-    """(P,) which parameters campaigns can be compared in: a change of the expected size would be seen at all."""
+    """Mask (P,) of the parameters of which a change of the expected size would be detectable."""
     known = np.maximum(np.diag(series.information)[series.middle], 0.0)
     return np.asarray((problem.has.sum(axis=0) >= 2) & (known * settings.COMPARABLE**2 > 1.0))
 
@@ -276,7 +276,7 @@ def told(
     limits: Mapping[str, float],
     false_alarm: float,
 ) -> tuple[Worn, ...]:
-    """Return all parameters: those that ring first, then by how probably they moved.
+    """Results of all parameters: alarms first, then by the probability of a change.
 
     ``found`` are the explanations of the series, the most probable first; ``first`` is the date of the first campaign,
     ``None`` without dates; ``limits`` are in SI, by effect.
@@ -304,13 +304,13 @@ def told(
 
 
 def _beside(found: Mapping[Moves, float], parameter: int, move: Move | None) -> Moves:
-    """Return the most probable combination in which a parameter moves just so, or stays."""
+    """Most probable combination in which a parameter has the given move, or stays."""
     own = [] if move is None else [move]
     return next(moves for moves in found if [m for m in moves if m.parameter == parameter] == own)
 
 
 def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> tuple[Worn, Array, Array]:
-    """Return a parameter as some moves have it; (2,) its last value and its change, and (2, 2) their covariance, SI."""
+    """Parameter under some moves: (2,) last value and change, and (2, 2) their covariance, SI."""
     bare, followed, size = problem.parameters[number], bool(series.followed[number]), problem.parameters[number].size
     state, free = State.of(series, moves), State.of(series, moves, free=number)
     path = state.path(number)
@@ -338,7 +338,7 @@ def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> t
 
 
 def _jump(series: Series, move: Move, ways: Mapping[Move, float], worn: Worn) -> Jump:
-    """Return a jump with the smallest set of days that holds 95 % of its probability."""
+    """Jump with its 95 % credible set of dates."""
     days = np.array([ways.get(Move(move.parameter, "jump", after), 0.0) for after in range(series.count - 1)])
     days = days / days.sum()
     likely = np.argsort(-days, kind="stable")
@@ -357,7 +357,7 @@ def _jump(series: Series, move: Move, ways: Mapping[Move, float], worn: Worn) ->
 def _crossing(
     limit: float, kind: str, line: Array, covariance: Array, series: Series, first: datetime | None
 ) -> Crossing:
-    """Return when the absolute value of a parameter reaches a limit, SI."""
+    """Time at which the absolute value of a parameter reaches a limit, SI."""
     if abs(line[0]) >= limit:
         return Crossing(limit, "passed")
     if kind in ("constant", "jump"):
@@ -375,7 +375,7 @@ def _crossing(
 
 
 def _alike(problem: Problem, series: Series, parameter: int) -> tuple[str, ...]:
-    """Return the names of parameters of whose changes the data cannot tell this one's."""
+    """Names of parameters whose changes are confounded with this one's."""
     own = series.information[np.ix_(series.middle, series.middle)]
     length = np.sqrt(np.maximum(np.diag(own), 1e-300))
     alike = (np.abs(own[parameter] / length[parameter] / length) > settings.SUBSTITUTE) & series.followed

@@ -1,14 +1,14 @@
-"""Bayesian change-point analysis: the evidence for any combination of moves between campaigns, from products alone.
+"""Bayesian change-point analysis: evidence of any combination of moves between campaigns, from Gram matrices alone.
 
 In campaign k the parameters are θ_k = θ + Σ_i a_i s_i(k) e_i: a constant for all campaigns, and moves. Of a move i,
 parameter e_i changes with a shape s_i over time: a step after campaign j (a jump), or a straight line (a trend). A walk
-is all steps of a parameter at once, the variance of each in proportion to the time that it took. With the whitened
-products of campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, everything follows from sums over k:
+is all steps of a parameter at once, the variance of each proportional to its time. With the whitened products of
+campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, everything follows from sums over k:
 
     V_ij = Σ s_i s_j G_k[e_i, e_j] − B_i A⁻¹ B_j',   g_i = Σ s_i b_k[e_i] − B_i A⁻¹ Σ b_k,
 
-with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves that is left beside the constants. For
-moves of prior variances τ, and a factor φ by which campaigns scatter more than their deviations say,
+with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves with the constants projected out. For moves
+of prior variances τ and overdispersion φ of the campaigns,
 
     log BF = −½ log|1 + √τ V √τ/φ²| + ½ g'(V + φ² τ⁻¹)⁻¹ g / φ².
 
@@ -40,7 +40,7 @@ from thermal_robot.inference.algebra import equations_of, whitener
 
 
 class Move(NamedTuple):
-    """A parameter by its number, how it moves, and after which campaign it jumps; −1 where it does not jump."""
+    """Change of one parameter over time: kind, and the campaign after which it jumps; −1 without a jump."""
 
     parameter: int
     kind: str
@@ -51,7 +51,7 @@ Moves = tuple[Move, ...]
 
 
 class Grid(NamedTuple):
-    """Points at which scales and scatter are tried.
+    """Grid of prior scales and of overdispersion.
 
     (H,) each: prior variance of moves, in expected sizes squared; φ²; log prior with the log likelihood if nothing
     moves.
@@ -64,7 +64,7 @@ class Grid(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """K campaigns in the order of time, as products in units of the P parameters' expected sizes.
+    """Normal equations of K campaigns in the order of time, in the P parameters' expected sizes.
 
     ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, frames projected out, zero for a parameter that a
     campaign does not have; ``times`` (K,) are days or numbers, not falling; ``followed`` (P,) tells which parameters
@@ -78,48 +78,48 @@ class Series:
 
     @property
     def count(self) -> int:
-        """Campaigns."""
+        """Number of campaigns."""
         return len(self.times)
 
     @property
     def span(self) -> float:
-        """From the first campaign to the last; 1 where all were measured at once."""
+        """Duration from the first to the last campaign; 1 where it is zero."""
         return float(self.times[-1] - self.times[0]) or 1.0
 
     @cached_property
     def shapes(self) -> Array:
-        """(K, K) a step after each campaign but the last, of length 1, then the straight line, which rises by 1."""
+        """Basis (K, K) of moves over the campaigns: unit steps after all but the last, then a line that rises by 1."""
         k = np.arange(self.count)
         steps = (k[None, :] > k[:-1, None]).astype(float)
         return np.vstack([steps, (self.times - self.times.mean())[None] / self.span])
 
     @cached_property
     def constants(self) -> Array:
-        """(P, P) A⁻¹: covariance of the constants, were nothing to move."""
+        """Posterior covariance (P, P), A⁻¹, of the constants if nothing moves."""
         total = self.matrices.sum(axis=0) + np.eye(len(self.followed)) / settings.WIDE**2
         return np.asarray(np.linalg.inv(total))
 
     @cached_property
     def crossed(self) -> Array:
-        """(P K, P) B: products of moves, parameter after parameter, with constants."""
+        """Cross products (P K, P), B, of moves, parameter after parameter, with constants."""
         return equations_of(np.einsum("ik,kpq->piq", self.shapes, self.matrices))
 
     @cached_property
     def information(self) -> Array:
-        """(P K, P K) V."""
+        """Information matrix (P K, P K), V, of the moves, constants projected out."""
         s, width = self.shapes, len(self.followed) * self.count
         own = np.einsum("ik,jk,kpq->piqj", s, s, self.matrices, optimize=True).reshape(width, width)
         return np.asarray(own - self.crossed @ self.constants @ self.crossed.T)
 
     @cached_property
     def pull(self) -> Array:
-        """(P K,) g."""
+        """Right-hand side (P K,), g, of the moves, constants projected out."""
         own = (self.vectors.T @ self.shapes.T).ravel()
         return np.asarray(own - self.crossed @ self.constants @ self.vectors.sum(axis=0))
 
     @cached_property
     def scattered(self) -> tuple[float, float]:
-        """Chi-square of the campaigns about what is common to all, and its degrees of freedom."""
+        """Chi-square of the campaigns about common constants, and its degrees of freedom."""
         roots = [whitener(matrix) for matrix in self.matrices]
         distance = sum(float(((r.T @ b) ** 2).sum()) for r, b in zip(roots, self.vectors, strict=True))
         total, shared = self.vectors.sum(axis=0), whitener(self.matrices.sum(axis=0)).shape[1]
@@ -128,7 +128,7 @@ class Series:
 
     @cached_property
     def grid(self) -> Grid:
-        """All scales of moves with all factors of scatter."""
+        """Grid of all prior scales and overdispersion factors."""
         scale, factor = np.array(settings.SCALES), np.array(settings.SCATTER)
         distance, degrees = self.scattered
         prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))
@@ -139,21 +139,21 @@ class Series:
 
     @property
     def loose(self) -> Grid:
-        """The one point at which moves are held least, and campaigns scatter as they say."""
+        """Single grid point with the widest prior and no overdispersion."""
         return Grid(self.grid.variance.max(keepdims=True), np.ones(1), np.zeros(1))
 
     @cached_property
     def columns(self) -> NDArray[np.int64]:
-        """(C,) numbers of the single moves that are weighed: steps and the line of each parameter that is followed."""
+        """Indices (C,) of the single moves that are tested: steps and line of each followed parameter."""
         return np.flatnonzero(np.repeat(self.followed, self.count))
 
     @property
     def middle(self) -> NDArray[np.int64]:
-        """(P,) numbers of each parameter's step in the middle of the series."""
+        """Index (P,) of each parameter's step in the middle of the series."""
         return np.arange(len(self.followed)) * self.count + (self.count - 2) // 2
 
     def made_of(self, moves: Sequence[Move]) -> tuple[NDArray[np.int64], Array]:
-        """(D,) columns of some moves, and the prior variance of each over the common one."""
+        """Columns (D,) of some moves, and the prior variance of each over the common one."""
         columns: list[int] = []
         shares: list[float] = []
         for move in moves:
@@ -180,7 +180,7 @@ class Beside(NamedTuple):
 
     @classmethod
     def of(cls, series: Series, moves: Sequence[Move], grid: Grid) -> Beside:
-        """Solve for some moves."""
+        """Posterior of some moves."""
         columns, share = series.made_of(moves)
         own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
         deviation = np.sqrt(grid.variance[:, None] * share)
@@ -192,7 +192,7 @@ class Beside(NamedTuple):
         return cls(grid.log_base + gain, mean, covariance, columns)
 
     def left(self, series: Series, others: NDArray[np.int64], grid: Grid) -> tuple[Array, Array]:
-        """Return (H, C) information on other columns beside these, and their pull; φ² = 1 in its units."""
+        """Information (H, C) on other columns given these, and their right-hand side; φ² = 1 in its units."""
         cross = series.information[np.ix_(others, self.columns)]
         along = cross @ self.covariance
         own = series.information[others, others] - (along * cross).sum(axis=2) / grid.inflation[:, None]
@@ -200,7 +200,7 @@ class Beside(NamedTuple):
 
 
 def log_prior(move: Move, series: Series) -> float:
-    """Return the log prior odds of one move against none: few change, and of many parameters each is less likely."""
+    """Log prior odds of one move against none: changes are few, and rarer for each of many parameters."""
     followed = max(int(series.followed.sum()), 1)
     one = 1.0 - (1.0 - settings.ANY_CHANGE) ** (1.0 / followed)
     days = series.count - 1 if move.kind == "jump" else 1
@@ -208,7 +208,7 @@ def log_prior(move: Move, series: Series) -> float:
 
 
 def explanations(series: Series) -> dict[Moves, float]:
-    """Return combinations of moves with their posterior probabilities, the most probable first; ``()`` is no move.
+    """Return the combinations of moves with posterior probabilities, most probable first; ``()`` is no move.
 
     Every single move is compared, then each more beside those that are likeliest so far (beam search).
     """
@@ -228,7 +228,7 @@ def explanations(series: Series) -> dict[Moves, float]:
 
 
 def moves_of(found: Mapping[Moves, float], parameter: int) -> dict[Move, float]:
-    """Return the posterior probability of each move of one parameter; what is left to 1 is that it stays."""
+    """Posterior probability of each move of one parameter; the rest to 1 is that it stays."""
     own: dict[Move, float] = {}
     for moves, probability in found.items():
         for move in moves:
@@ -238,7 +238,7 @@ def moves_of(found: Mapping[Moves, float], parameter: int) -> dict[Move, float]:
 
 
 def _one_more(series: Series, moves: Moves) -> dict[Moves, float]:
-    """Return the log posterior of combinations of these moves and one more, of a parameter that stayed so far."""
+    """Log posterior of combinations of these moves and one more, of a parameter without any."""
     grid, taken = series.grid, {move.parameter for move in moves}
     columns = np.array([c for c in series.columns if c // series.count not in taken], dtype=np.int64)
     beside = Beside.of(series, moves, grid)
@@ -269,7 +269,7 @@ class State:
 
     @classmethod
     def of(cls, series: Series, moves: Sequence[Move], free: int | None = None, grid: Grid | None = None) -> State:
-        """Solve for moves at the most probable scale and scatter, one parameter ``free`` as each campaign has it."""
+        """Posterior at the most probable scale and overdispersion, one parameter ``free`` in each campaign."""
         grid = grid or series.grid
         point = int(np.argmax(Beside.of(series, moves, grid).log_likelihood))
         inflation = float(grid.inflation[point])
@@ -287,7 +287,7 @@ class State:
         return cls(series, columns, np.concatenate([mean, amounts]), whole)
 
     def path(self, parameter: int) -> Array:
-        """(K, P + D) what the value of a parameter in each campaign is made of."""
+        """Design matrix (K, P + D) of a parameter's value in each campaign."""
         owner, shape = np.divmod(self.columns, self.series.count)
         along = np.zeros((self.series.count, len(self.mean)))
         along[:, parameter] = 1.0
@@ -295,12 +295,12 @@ class State:
         return along
 
     def told(self, along: Array) -> tuple[Array, Array]:
-        """(R,) values of linear combinations (R, P + D), and (R, R) their covariance."""
+        """Values (R,) of linear combinations (R, P + D), and their covariance (R, R)."""
         return along @ self.mean, along @ self.covariance @ along.T
 
 
 def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float, float | None] | None:
-    """Return when a straight line reaches ±limit: the expected time from now, and a 95 % interval (Fieller 1954).
+    """Time at which a straight line reaches ±limit, from now, with a 95 % interval (Fieller 1954).
 
     From its (2,) value now and rate and their (2, 2) covariance. The upper end is ``None`` where the line may as well
     never get there; all is ``None`` where it does not move.
@@ -321,7 +321,7 @@ def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float
 
 
 def chances(series: Series, moves: Moves) -> Array:
-    """(P,) bound on the chance that a series without change shows a move as clear as the clearest of each parameter.
+    """Bound (P,) on the false-alarm probability of the clearest move of each parameter.
 
     Each parameter is judged beside the ``moves`` of the others; 1 for one that is not followed.
     """
@@ -336,20 +336,20 @@ def chances(series: Series, moves: Moves) -> Array:
 
 
 def scatter(series: Series, moves: Moves) -> float:
-    """Return φ² as the campaigns show it beside some moves, not less than 1."""
+    """Overdispersion φ² of the campaigns about some moves, at least 1."""
     distance, degrees = _left(series, Beside.of(series, moves, series.loose))
     return max(distance / degrees, 1.0)
 
 
 def _left(series: Series, beside: Beside) -> tuple[float, float]:
-    """Return Q and ν: the chi-square of the campaigns about what some moves say, and its degrees of freedom."""
+    """Chi-square Q of the campaigns about some moves, and its degrees of freedom ν."""
     distance, degrees = series.scattered
     distance -= float(beside.mean[0] @ series.pull[beside.columns])
     return max(distance, 0.0), max(degrees - len(beside.columns), 2.0)
 
 
 def _chances(series: Series, moves: Moves) -> Array:
-    """(C,) bound on the chance of each single move beside others, which are taken as wide as the grid has them."""
+    """Bound (C,) on the p-value of each single move given others, at the widest prior of the grid."""
     if not len(series.columns):
         return np.zeros(0)
     beside, information = Beside.of(series, moves, series.loose), np.diag(series.information)[series.columns]

@@ -1,4 +1,4 @@
-"""Joint least squares of several campaigns of one robot: the same parameters in all, each campaign's frames its own.
+"""Joint least squares of several campaigns of one robot: common parameters, frames of each campaign its own.
 
 Parameters are those of the effects that were named in any campaign, and what somebody could set anew
 (:attr:`Effect.told_inside`): a collision shows in the zeros of joints, whether or not those were off before. All
@@ -40,7 +40,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Normal equations of K campaigns in the P parameters that they have in common, in units of their expected sizes.
+    """Normal equations of K campaigns in their P common parameters, in units of the expected sizes.
 
     ``keys`` are names of effect and parameter, ``parameters`` the same without responses, ``titles`` their effects in
     plain words; ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, what is a campaign's own taken off; ``has``
@@ -83,7 +83,7 @@ def require_alike(fits: Sequence[Fit]) -> None:
 
 
 def problem(fits: Sequence[Fit]) -> Problem:
-    """Put campaigns, each fitted by itself and in the order of time, into one problem.
+    """Joint problem of fitted campaigns in the order of time, by Gauss-Newton on common values.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
 
 
 def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect, ...]:
-    """Return the effects that all campaigns are followed by, in their most frequent setting, in all places named."""
+    """Effects of all campaigns in their most frequent settings, in all places named."""
     kept = [effect for effect in named if not _begins_anew(effect, observations)]
     found = [e for e in library().values() if e.told_inside and not gate.missing(e, observations)]
     always = {effect.name for effect in found}
@@ -125,7 +125,7 @@ def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect
 
 
 def _begins_anew(effect: Effect, observations: Observations) -> bool:
-    """Tell whether an effect is a campaign's own."""
+    """Whether an effect is independent in each campaign."""
     if effect.name in FRAMES or effect.name.startswith(PREFIX):
         return True
     try:
@@ -138,19 +138,19 @@ def _begins_anew(effect: Effect, observations: Observations) -> bool:
 
 @dataclass(frozen=True)
 class _AsTold(Effect):
-    """Parameters that are known with their responses, as one effect."""
+    """Pseudo-effect of given parameters and responses."""
 
     name: ClassVar[str] = "as told"
     told: tuple[Parameter, ...] = ()
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return them."""
+        """Return the given parameters."""
         return self.told
 
 
 @dataclass(eq=False)
 class _Visit:
-    """One campaign, linearised about a common model that is improved step by step.
+    """One campaign, linearised about the common model.
 
     ``here`` (P,) tells which of the common parameters it can tell; ``common`` are these with their responses in its
     rows, ``own`` its own; ``linear`` is the last linearisation, about ``frames``.
@@ -166,7 +166,7 @@ class _Visit:
 
     @classmethod
     def of(cls, fit: Fit, keys: Sequence[Key], told: dict[Key, Parameter]) -> _Visit:
-        """Read the parameters' responses in the rows of a campaign; an effect whose columns it lacks has none."""
+        """Responses of the common parameters in a campaign's rows; none for an effect whose columns it lacks."""
         fresh = [effect for effect, _ in fit.effects if _begins_anew(effect, fit.nominal)]
         own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
         white, linear = fit.explanation.whitening, fit.explanation.linear
@@ -175,7 +175,7 @@ class _Visit:
         return cls(fit, np.array([key in told for key in keys]), common, own, white, fit.nominal.frames, linear)
 
     def products(self, sizes: Array, values: Array) -> tuple[Array, Array]:
-        """Return (P, P) and (P,) products about values of the common parameters."""
+        """Return the normal equations (P, P) and (P,) about values of the common parameters."""
         here, campaign = self.here, self.fit.campaign
         nominal = observe(campaign, self.frames)
         change, instrument = displacement(nominal, [(_AsTold(told=self.common), values[here])])
@@ -191,7 +191,7 @@ class _Visit:
         return matrix, vector
 
     def step(self, values: Array) -> None:
-        """Move the frames to where they fit best with new values of the common parameters."""
+        """Refit the frames to new values of the common parameters."""
         common = self.linear.blocks[0].columns[:, :, : self.here.sum()]
         if self.linear.frames.shape[2]:
             step = frame_step(self.linear, self.whitening, self.linear.gap - common @ values[self.here])
@@ -199,7 +199,7 @@ class _Visit:
 
 
 def _told(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:
-    """Yield the parameters of effects that these rows tell, those of a larger effect without the smaller ones in it."""
+    """Yield the reported parameters that these rows determine, contained effects taken out of larger ones."""
     names = {effect.name for effect in effects if effect.told_inside}
     for effect in effects:
         if gate.missing(effect, observations):
@@ -212,12 +212,12 @@ def _told(effects: Sequence[Effect], observations: Observations) -> Iterator[tup
 
 
 def _named(effect: Effect, parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
-    """Give parameters names that are unique among all effects."""
+    """Parameters with names that are unique among all effects."""
     return tuple(replace(p, label=f"{effect.name}: {p.label}") for p in parameters)
 
 
 def _without_own(full: Array, flat: int, scale: Array, shared: int) -> tuple[Array, Array]:
-    """Take frames and a campaign's own parameters off the products of all columns: frames, parameters, gap."""
+    """Project frames and a campaign's own parameters out of the Gram matrix of frames, parameters and gap."""
     unit = np.concatenate([np.ones(flat), scale, [1.0]])
     full = full * np.outer(unit, unit)
     known = whitener(full[:flat, :flat])

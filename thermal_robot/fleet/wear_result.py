@@ -1,4 +1,4 @@
-"""Change points, rates and alarms of one robot over time: frozen values, as text and as JSON."""
+"""Change points, rates and alarms of one robot over time: frozen values and their JSON."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ SCHEMA = "thermal-robot/wear/1"
 
 @dataclass(frozen=True)
 class Visit:
-    """One campaign of a series.
+    """One campaign in a time series.
 
     Attributes
     ----------
     name
-        Of the campaign.
+        Name of the campaign.
     date
         ISO 8601; empty where none was given.
     time
         Days since the first campaign; its number, from 0, where no dates were given.
     rows
-        That were used.
+        Number of rows used.
     """
 
     name: str
@@ -39,20 +39,20 @@ class Visit:
 
 @dataclass(frozen=True)
 class Jump:
-    """A change at once, between two campaigns.
+    """Step change of a parameter between two campaigns.
 
     Attributes
     ----------
     after
         Number of the last campaign before it, from 0.
     probability
-        That it was then, and not between two others, if the parameter jumped at all.
+        Probability of this date, given that the parameter jumped.
     probabilities
         (K − 1,) the same after each campaign.
     earliest, latest
         Numbers of the campaigns between which it happened with 95 %: the last before it and the first after it.
     size, std
-        By how much, and its standard deviation; unit of the parameter.
+        Size of the step, and its standard deviation; unit of the parameter.
     """
 
     after: int
@@ -66,7 +66,7 @@ class Jump:
 
 @dataclass(frozen=True)
 class Rate:
-    """How fast a parameter moves, its unit per day."""
+    """Rate of change of a parameter, its unit per day."""
 
     value: float
     std: float
@@ -74,12 +74,12 @@ class Rate:
 
 @dataclass(frozen=True)
 class Crossing:
-    """When a parameter's absolute value reaches a limit.
+    """Time at which a parameter's absolute value reaches a limit.
 
     Attributes
     ----------
     limit
-        In the unit of the parameter.
+        Limit in the unit of the parameter.
     state
         ``passed`` (it is beyond in the last campaign), ``expected`` (a trend leads there), ``never`` (it does not move,
         or has jumped and stays), ``unknown`` (it wanders, or there are no dates for a rate).
@@ -101,18 +101,18 @@ class Crossing:
 
 @dataclass(frozen=True, kw_only=True)
 class Worn:
-    """One parameter over time; SI.
+    """Change of one parameter over time; SI.
 
     Attributes
     ----------
     effect, title
         Its effect's name, and in plain words.
     parameter, place, unit
-        Its own name, its joint or link, and its unit.
+        Name of the parameter, its joint or link, and its unit.
     comparable
         Whether campaigns can be compared in it; ``reason`` says why not.
     alarm
-        Whether it rings: its chance is at most the false-alarm rate.
+        Whether there is an alarm: its p-value is at most the false-alarm rate.
     chance
         Bound on the probability that a series without any change shows one as clear, in whatever parameter, on whatever
         day.
@@ -123,16 +123,16 @@ class Worn:
     kinds
         Probability of each.
     jump, rate
-        Where it is one; a rate needs dates.
+        Step or rate of the change, if it is one; a rate needs dates.
     change, change_std
-        From the first campaign to the last, as its kind has it; 0 where it is constant.
+        Change from the first campaign to the last under this kind of change; 0 where it is constant.
     values, stds
         (K,) as each campaign has it, all others as they are over time, and their standard deviations; ``None`` in a
         campaign that says nothing of it.
     fitted
         (K,) as its kind has it.
     crossing
-        Of a limit that was given for its effect; ``None`` without one.
+        Crossing of the limit of its effect; ``None`` without one.
     confounded_with
         Parameters of whose changes the data cannot tell this one's.
     """
@@ -162,26 +162,26 @@ class Worn:
 
 @dataclass(frozen=True, repr=False)
 class Wear:
-    """One robot over time.
+    """Change of one robot over time.
 
     Attributes
     ----------
     robot
-        Its name.
+        Name of the robot.
     campaigns
-        In the order of time.
+        Campaigns in the order of time.
     dated
         Whether dates were given.
     parameters
-        Those that ring first, then by how probably they moved.
+        Parameters, alarms first, then by the probability of a change.
     false_alarm
         Stated: at most so many series without any change ring at all.
     scatter
-        How much more the campaigns scatter about each other than their deviations say; 1 where they do not.
+        Overdispersion of the campaigns: their scatter over their standard deviations, at least 1.
     nothing
         Probability that nothing moved.
     notes
-        What a reader must know beside, one sentence each.
+        Remarks, one sentence each.
     """
 
     robot: str
@@ -195,24 +195,24 @@ class Wear:
 
     @property
     def alarms(self) -> tuple[Worn, ...]:
-        """The parameters that ring."""
+        """Parameters with an alarm."""
         return tuple(worn for worn in self.parameters if worn.alarm)
 
     @property
     def summary(self) -> str:
-        """What moved, how and when, in one sentence."""
+        """Result in one sentence: what moved, how and when."""
         span = f"{len(self.campaigns)} campaigns of {self.robot}"
         if not self.alarms:
             return f"Over {span} nothing moves that would not by chance in {_share(self.false_alarm)} of such series."
         return f"Over {span}: {'; '.join(_moves(self, worn) for worn in self.alarms)}."
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
+        """JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
         plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
         return plain
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        """Write :meth:`to_dict` to a file by an atomic replace."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
     def __repr__(self) -> str:
@@ -264,7 +264,7 @@ def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
 
 
 def _moves(wear: Wear, worn: Worn) -> str:
-    """Say how one parameter moves."""
+    """Describe the change of one parameter."""
     name = f"{worn.title}, {worn.parameter}"
     if worn.jump is not None:
         size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"

@@ -1,1 +1,1 @@
-"""Frames, columns, evidence, exact fit: from observations to an explanation."""
+"""Inference: candidate columns, marginal likelihoods, model selection, and the exact fit."""

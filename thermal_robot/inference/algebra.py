@@ -1,4 +1,4 @@
-"""Least squares in the directions that the data determine: the one place where weak directions are dropped.
+"""Rank-revealing least squares: the one place where weakly determined directions are dropped.
 
 Every function scales its columns to unit length first, so that one floor serves metres, radians and coefficients alike.
 """
@@ -12,7 +12,7 @@ from thermal_robot.inference import settings
 
 
 def equations_of(columns: Array) -> Array:
-    """(n·m, K) of columns (n, m, K): an equation a row; n and K may be 0, as where base and tool are known."""
+    """Reshape columns (n, m, K) to (n·m, K), one equation a row; n and K may be 0."""
     return columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2])
 
 
@@ -52,12 +52,12 @@ def orthonormal(columns: Array) -> Array:
 
 
 def without(columns: Array, basis: Array) -> Array:
-    """Return columns (E, ...) with the span of an orthonormal basis (E, r) projected out."""
+    """Project the span of an orthonormal basis (E, r) out of columns (E, ...)."""
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
 def ridge(products: Array, flat: int, prior: Array) -> Array:
-    """(K,) posterior mean of a linear fit with normal priors (ridge regression), from products (K + 1, K + 1) alone.
+    """Ridge regression: posterior mean (K,) with normal priors, from the Gram matrix (K + 1, K + 1) alone.
 
     The last column is the values. The first ``flat`` have no prior and stay at zero where nothing determines them;
     ``prior`` (K − flat,) is one over the variance of the others.

@@ -1,4 +1,4 @@
-"""From effects to columns: the derivative of the gap by each parameter, and by the unknown frames."""
+"""Design matrix: derivatives of the gap by the parameters of effects, and by the unknown frames."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
-from thermal_robot.observations import Observations
+from thermal_robot.observables import components, of_model, tool_width
+from thermal_robot.observations import Observations, observe
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
     """The P parameters of one effect, in one setting of its nonlinear arguments, as columns (N, m, P).
 
-    ``source`` is the columns, or the observations from which they are computed whenever asked for, as those of all
-    settings would fill the memory. ``bare`` are the parameters without responses, ``sizes`` (P,) their expected sizes
-    with the campaign's ``[priors]``, ``spread`` the standard deviation of the logarithm of their common factor, at most
-    ``largest_scale``.
+    ``source`` is the columns, or the observations from which they are recomputed on demand to save memory. ``bare`` are
+    the parameters without responses, ``sizes`` (P,) their expected sizes with the campaign's ``[priors]``, ``spread``
+    the standard deviation of the logarithm of their common factor, at most ``largest_scale``.
     """
 
     effect: Effect
@@ -38,7 +38,7 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """(N, m, P) derivative of the gap by each parameter, root frame axes; zero where it is but rounding."""
+        """Derivative (N, m, P) of the gap by each parameter, root frame axes; rounding errors are set to 0."""
         if not isinstance(self.source, Observations):
             return self.source
         found = moved_by(self.source, self.parameters)
@@ -47,29 +47,31 @@ class Block:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Its P parameters, with their responses unless it holds its columns themselves."""
+        """The P parameters, with their responses unless the block stores its columns."""
         return checked(self.effect, self.source) if isinstance(self.source, Observations) else self.bare
 
     @property
     def positive(self) -> NDArray[np.bool_]:
-        """(P,) which parameters cannot be negative."""
+        """Mask (P,) of the parameters that cannot be negative."""
         return np.array([p.positive for p in self.bare] or [False] * len(self.sizes), dtype=bool)
 
     @property
     def held(self) -> Block:
-        """The block with its columns, for who asks for them again and again."""
+        """Copy of the block with its columns in memory."""
         return replace(self, source=self.columns)
 
     def kept(self, values: Array) -> Array:
-        """(P,) share of each parameter's size to which it is held: next to none where it is zero and kept from less."""
+        """Prior shrinkage factors (P,): next to 0 for parameters that an inequality holds at zero, else 1."""
         return np.where(self.positive & (values <= 0.0), settings.LEAST_HELD, 1.0)
 
 
 def block(observations: Observations, effect: Effect) -> Block:
-    """Columns of an effect at the observations' place; :class:`EffectError` where it breaks the contract."""
+    """Block of an effect at the linearisation point of observations; :class:`EffectError` on a breach of contract."""
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])
+    if of_model(campaign):
+        sizes = sizes * effect.in_model_times
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
@@ -78,9 +80,9 @@ def block(observations: Observations, effect: Effect) -> Block:
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:
-    """(N, m, P) derivative of the gap by each of P parameters, root frame axes."""
+    """Return the derivative (N, m, P) of the gap by each of P parameters, root frame axes."""
     campaign = observations.campaign
-    measures = 6 if campaign.measures == "pose" else 3
+    measures = components(campaign)
     columns = np.zeros((campaign.samples, measures, len(parameters)))
     for p, parameter in enumerate(parameters):
         for response in parameter.responses:
@@ -89,25 +91,36 @@ def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Arr
 
 
 def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
-    """(N, m, f) derivative of the gap by the unknown frames, and what each column is.
+    """(N, m, f) derivative of the gap by the unknown frames and artefacts, and what each column is.
 
-    Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
-    measured. Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
+    Base: twist in the root frame, of rows that an instrument measured. Tool: translation of the target in the tool
+    frame, and its turn where orientation is measured. Artefacts: what rows share beside the robot, by their names.
+    Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
     """
-    campaign, names = observations.campaign, unknown_frames(observations.campaign)
-    measures = 6 if campaign.measures == "pose" else 3
+    campaign, names = observations.campaign, _unknown(observations.campaign)
+    measures = components(campaign)
     parts = []
     if "base" in names:
         parts.append(observations.base_sensitivity[:, :measures, :])
     if "tool" in names:
-        parts.append(observations.tool_sensitivity[:, :measures, :measures])
+        parts.append(observations.tool_sensitivity[:, :measures, : tool_width(campaign)])
+    shared, artefacts = observations.sight.columns()
+    if artefacts:
+        parts.append(shared)
     if not parts:
         return np.zeros((campaign.samples, measures, 0)), ()
-    return np.concatenate(parts, axis=2), names
+    return np.concatenate(parts, axis=2), (*names, *artefacts)
 
 
 def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
-    """Return to which frame, ``base`` or ``tool``, each of the columns of the unknown frames belongs."""
+    """Return to which frame, ``base`` or ``tool``, or artefact each of the columns of the unknown frames belongs."""
+    known = _unknown(campaign)
+    if campaign.position is not None or not campaign.measured:
+        return known
+    return (*known, *observe(campaign).sight.columns()[1])
+
+
+def _unknown(campaign: Campaign) -> tuple[str, ...]:
     base = 0 if campaign.base_known else 6
     fixed = campaign.tool_known or campaign.simulated_position is not None
-    return ("base",) * base + ("tool",) * (0 if fixed else 6 if campaign.measures == "pose" else 3)
+    return ("base",) * base + ("tool",) * (0 if fixed else tool_width(campaign))

@@ -1,4 +1,4 @@
-"""Which combination of effects the data speak for: marginal likelihoods from one Gram matrix.
+"""Marginal likelihood (evidence) of combinations of effects, from one Gram matrix.
 
 The whitened gap is y = F f + Σ_b X_b θ_b + e, with flat frames f, e ~ N(0, s²), and θ_b ~ N(0, λ_b² size²) for the
 blocks that are in the combination. F is projected out first. For a combination γ
@@ -11,14 +11,13 @@ the stated noise, and log-normal about the stated sizes, with a factor κ that a
 
     ln λ_b ~ N(ln κ, σ_b²) ,  ln κ ~ N(0, σ_κ²) ,  so that  ln λ ~ N(0, C) ,  C = diag(σ_b²) + σ_κ² 11ᵀ ,
 
-cut off where no robot reaches; ln λ is integrated out by Laplace's method, s held.
+truncated at the largest plausible size; ln λ is integrated out by Laplace's method, s held.
 
-A parameter that is at least zero has half a normal prior, of twice the density. The mode is looked for on that side: a
-column that would be negative is dropped (block principal pivoting, Portugal, Júdice and Vicente, *Mathematics of
-Computation* 63, 1994). What the side is worth is taken column by column, each along its own normal: with mean m and
-deviation σ of a column that stays beside the others that stay, log 2Φ(m/σ); of one that is dropped, with the slope −g
-and the curvature h of the log posterior at zero, log 2/(λ√h) + g²/2h + log Φ(−g/√h). For a single column both are
-exact, and the same.
+A non-negative parameter has a half-normal prior. The mode is constrained: a column that would be negative is dropped
+(block principal pivoting, Portugal, Júdice and Vicente, *Mathematics of Computation* 63, 1994). The factor of each half
+line is approximated column by column: with mean m and deviation σ of a free column, log 2Φ(m/σ); of a dropped one, with
+the slope −g and the curvature h of the log posterior at zero, log 2/(λ√h) + g²/2h + log Φ(−g/√h). For a single column
+both are exact, and the same.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ UNDETERMINED = "the measurements do not determine anything: too few, or all alik
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Reduced columns of one combination: G (D, D), b (D,), the block of each, and which cannot be negative."""
+    """Normal equations of one combination: G (D, D), b (D,), the block of each column, and which cannot be negative."""
 
     matrix: Array
     vector: Array
@@ -53,11 +52,11 @@ class Columns:
 
     @cached_property
     def sided(self) -> NDArray[np.int64]:
-        """Numbers of the columns that cannot be negative."""
+        """Indices of the columns with a non-negativity constraint."""
         return np.flatnonzero(self.positive)
 
     def some(self, kept: NDArray[np.int64]) -> Columns:
-        """Return those columns alone."""
+        """Subset of the columns."""
         if len(kept) == len(self.vector):
             return self
         return Columns(self.matrix[kept[:, None], kept], self.vector[kept], self.owner[kept], self.positive[kept])
@@ -65,11 +64,11 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Parameters of one combination at given scales and noise: posterior mode and covariance about it.
+    """Posterior of the parameters of one combination at given scales and noise: mode, and covariance about it.
 
-    Of a dropped column (``free`` (D,) False) zero, and its mean square. ``log_volume`` is the log of the posterior's
-    volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth; ``effective`` per block, how many of its
-    columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
+    Of a dropped column (``free`` (D,) False) the mode is zero, with its mean square. ``log_volume`` is the log ratio of
+    posterior to prior volume: −½ log|I + Λ G/s²|, and the factors of the half lines; ``effective`` per block, how many
+    of its columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
     """
 
     values: Array
@@ -82,9 +81,9 @@ class Posterior:
 
     @classmethod
     def at(cls, columns: Columns, scale: Array, variance: float, free: Mask | None = None) -> Posterior:
-        """Solve (G/s² + Λ⁻¹) θ = b/s² with θ ≥ 0 where that is asked; ``free`` is a guess of what is not dropped.
+        """Solve (G/s² + Λ⁻¹) θ = b/s² under non-negativity constraints; ``free`` is a first guess of the inactive ones.
 
-        Raises :class:`EstimationError` if rounding hides what the columns bring.
+        Raises :class:`EstimationError` if rounding errors dominate.
         """
         size, count = len(columns.vector), len(scale)
         free = np.ones(size, dtype=bool) if free is None else free
@@ -124,7 +123,7 @@ class Posterior:
         )
 
     def bend(self, owner: NDArray[np.int64], scale: Array, tight: Array) -> Array:
-        """Return minus the second derivative of the log integrand after ln λ, (B, B).
+        """Negative Hessian (B, B) of the log integrand in ln λ.
 
         With m and C mode and covariance of the values, a prior N(0, P⁻¹) of ln λ (P is ``tight``) and s held, it is
         H_bc = δ_bc 2 (m_bᵀm_b + tr C_bb)/λ_b² + P_bc − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
@@ -140,9 +139,9 @@ class Posterior:
         return np.asarray(bend)
 
     def step(self, bend: Array, scale: Array, tight: Array) -> tuple[Array, float]:
-        """Return the Newton step of ln λ, each at most one, and what it gains if the log integrand is parabolic.
+        """Newton step of ln λ, each component at most one, and the gain that a quadratic model predicts.
 
-        Where that is not convex, the step is of each scale for itself.
+        Where the problem is not convex, each scale steps separately.
         """
         slope = self.fitted - self.determined - tight @ np.log(scale)
         _, step, failed = dposv(bend, slope) if len(scale) else (None, slope, 0)
@@ -152,12 +151,12 @@ class Posterior:
 
 
 def _by_block(columns: Columns, values: Array, count: int) -> Array:
-    """(count,) sums over the columns of each block."""
+    """Return the sums (count,) over the columns of each block."""
     return np.asarray(np.bincount(columns.owner, values, count), dtype=float)
 
 
 def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
-    """Return what follows where just these columns are not dropped.
+    """Posterior with a given set of active constraints.
 
     Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood where a column is
     dropped, and which columns should change by more than rounding: those that stay and are negative, those dropped that
@@ -180,7 +179,7 @@ def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tupl
 
 
 def _both_sides(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:
-    """Return mean, covariance and log|I + Λ G/s²| without sides."""
+    """Unconstrained posterior mean, covariance and log|I + Λ G/s²|."""
     size = len(columns.vector)
     if not size:
         return np.zeros(0), np.zeros((0, 0)), 0.0
@@ -208,7 +207,7 @@ def _sides(
     tight: Array,
     s2: float,
 ) -> tuple[Array, Array, float]:
-    """Return mean and mean square of every column on its side, and the logarithm of what the sides are worth."""
+    """Mean and second moment of truncated normal columns, and the log probability of their half lines."""
     mean, own, worth = values.copy(), spread.copy(), 0.0
     if len(kept) < len(values):
         dropped = np.ones(len(values), dtype=bool)
@@ -233,7 +232,7 @@ def _sides(
 
 @dataclass(frozen=True, eq=False)
 class Gram:
-    """Normal equations of a linear problem after the frames are projected out, whitened, in units of prior sizes.
+    """Normal equations of a linear problem, frames projected out, whitened, in units of the prior sizes.
 
     G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
     (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
@@ -257,11 +256,11 @@ class Gram:
     most: Array | None = None
 
     def columns_of(self, blocks: Sequence[int]) -> NDArray[np.int64]:
-        """(D_γ,) numbers of the reduced columns of some blocks."""
+        """Return the indices (D_γ,) of the reduced columns of some blocks."""
         return np.array([k for b in blocks for k in range(self.slices[b].start, self.slices[b].stop)], dtype=int)
 
     def some(self, blocks: Sequence[int]) -> Gram:
-        """Return the problem of some of the blocks alone."""
+        """Return the normal equations of a subset of the blocks."""
         widths = [self.bases[b].shape[1] for b in blocks]
         ends = np.cumsum([0, *widths])
         own = self.columns_of(blocks)
@@ -280,7 +279,7 @@ class Gram:
 
 @dataclass(frozen=True, eq=False)
 class Combination:
-    """One combination of blocks, its scales at their most probable values.
+    """One combination of blocks with its evidence, at the most probable prior scales and noise.
 
     ``log_evidence`` is the log marginal likelihood with log prior odds; ``noise`` s, in units of the whitening noise;
     ``scales`` λ of each block; ``values`` and ``covariance`` the posterior mode of the reduced columns, block after
@@ -306,7 +305,7 @@ def evidence(
     floor: float = -np.inf,
     settled: float = settings.EVIDENCE_SETTLED,
 ) -> Combination:
-    """Log evidence of one combination with noise and scales at their most probable values (empirical Bayes).
+    """Log evidence of one combination at the most probable noise and prior scales (empirical Bayes).
 
     The iteration starts at the noise and scales of ``start``, ends once their logarithms move less than ``settled``,
     and early where it is clear that the log evidence ``floor`` is not reached.
@@ -316,12 +315,12 @@ def evidence(
     columns = Columns(gram.matrix[used[:, None], used], gram.vector[used], owner, gram.positive[used])
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
-    variance, alike = max(variance, settings.LEAST_VARIANCE), Alike.of(gram.spreads[list(blocks)])
+    variance, law = max(variance, settings.LEAST_VARIANCE), ScalePrior.of(gram.spreads[list(blocks)])
     known = prior + gram.offset
     most = np.full(len(scale), np.inf) if gram.most is None else gram.most[list(blocks)]
-    peak = _most_probable(gram, columns, np.minimum(scale, most), alike, most, variance, floor - known, settled)
+    peak = _most_probable(gram, columns, np.minimum(scale, most), law, most, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
-    log_evidence = known + _log_joint(gram, columns, found, scale, alike, variance) + _log_volume(peak.bend, alike)
+    log_evidence = known + _log_joint(gram, columns, found, scale, law, variance) + _log_volume(peak.bend, law)
     log_evidence += peak.promised or 0.0
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
@@ -333,21 +332,21 @@ def evidence(
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
-    """Prior N(0, C) of B logarithms of scales that share the factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
+class ScalePrior:
+    """Normal prior N(0, C) of B log scales with a common factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
 
     tight: Array
     root: Array
 
     @classmethod
-    def of(cls, spread: Array) -> Alike:
-        """Return it for scales that have the standard deviations ``spread`` (B,) about κ."""
+    def of(cls, spread: Array) -> ScalePrior:
+        """Prior of log scales with standard deviations ``spread`` (B,) about the common factor κ."""
         covariance = np.diag(spread**2) + settings.COARSENESS**2
         return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
 
 
 def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
-    """Return mean and standard deviations of ln λ of further blocks: N(0, C) given those of B known ones.
+    """Conditional mean and standard deviations of ln λ of further blocks, given those of B known ones.
 
     ``spread`` and ``log_scale`` (B,) are those of the known blocks, ``own`` (K,) the spreads of the further ones.
     """
@@ -357,7 +356,7 @@ def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Peak:
-    """Where the density of scales and noise is largest, or where it was left, and what it promised there to gain."""
+    """Maximum of the density of scales and noise; where the search stopped early, with the gain still expected."""
 
     posterior: Posterior
     bend: Array
@@ -370,19 +369,19 @@ def _most_probable(
     gram: Gram,
     columns: Columns,
     scale: Array,
-    alike: Alike,
+    law: ScalePrior,
     most: Array,
     variance: float,
     floor: float,
     settled: float,
 ) -> _Peak:
-    """Return the most probable scales and variance of the noise, left early where the log evidence stays below."""
+    """Maximise the density of scales and noise; stop early where the log evidence cannot reach ``floor``."""
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        bend = found.bend(columns.owner, scale, alike.tight)
-        step, gain = found.step(bend, scale, alike.tight)
+        bend = found.bend(columns.owner, scale, law.tight)
+        step, gain = found.step(bend, scale, law.tight)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, np.minimum(reach * step, np.log(most / scale))
@@ -393,26 +392,26 @@ def _most_probable(
             break
         if np.isfinite(floor):
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
-            reached = _log_joint(gram, columns, found, scale, alike, variance)
+            reached = _log_joint(gram, columns, found, scale, law, variance)
             if reached + settings.CLEARLY * gain < floor:
                 return _Peak(found, bend, scale, variance, gain)
         variance, scale = target, scale * np.exp(step)
     return _Peak(found, bend, scale, variance)
 
 
-def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, alike: Alike, variance: float) -> float:
-    """Return log p(y, s, λ) of one combination, up to what is common to all."""
+def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, law: ScalePrior, variance: float) -> float:
+    """Log joint density log p(y, s, λ) of one combination, up to a common constant."""
     held = gram.noise_dof
     quadratic = gram.total - columns.vector @ found.values
     fit = -0.5 * ((gram.equations + held) * np.log(variance) + (held + quadratic) / variance)
     log = np.log(scale)
-    return float(fit + found.log_volume - 0.5 * log @ alike.tight @ log)
+    return float(fit + found.log_volume - 0.5 * log @ law.tight @ log)
 
 
-def _log_volume(bend: Array, alike: Alike) -> float:
-    """Return −½ log|Rᵀ H R|, C = R Rᵀ: the volume of the peak over all ln λ against that of their prior N(0, C).
+def _log_volume(bend: Array, law: ScalePrior) -> float:
+    """Laplace approximation, −½ log|Rᵀ H R| with C = R Rᵀ: posterior over prior volume of ln λ with prior N(0, C).
 
-    H leaves out that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
+    H neglects the dependence of s on λ and higher orders: both within about 0.1 for well determined blocks.
     """
-    peak = np.linalg.eigvalsh(alike.root.T @ bend @ alike.root)
+    peak = np.linalg.eigvalsh(law.root.T @ bend @ law.root)
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

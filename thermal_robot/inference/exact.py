@@ -1,7 +1,7 @@
-"""Model selection at the exact fit: choose effects, refine their constants, refit, and choose again there.
+"""Model selection at the exact fit: choose effects, refine their constants, refit, and choose again.
 
-The exact fit is by Levenberg and Marquardt's steps over frames and parameters, priors held at their scales. Constants
-that are no linear parameters, such as a lag, are moved by coordinate search until the evidence gains nothing more.
+The exact fit is by Levenberg-Marquardt over frames and parameters, at fixed prior scales. Nonlinear constants, such as
+a lag, are refined by coordinate search on the evidence.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ def gauss_newton(
     settled: float,
     since: Sequence[tuple[Effect, Array]] | None = None,
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
-    """Refit frames and parameters with the exact model by Gauss-Newton, the priors held at their scales.
+    """Refit frames and parameters of the nonlinear model by Gauss-Newton, with fixed prior scales.
 
-    It begins at the (P,) values of a linear fit (``held``); where it then ends worse than ``since``, about which the
-    explanation was linearised, it begins there. It ends at a step of ``settled`` standard deviations.
+    Starts at the (P,) values of a linear fit (``held``); if the result is worse than ``since``, the linearisation
+    point, it starts there instead. Ends at a step of ``settled`` standard deviations.
     """
     observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
     if since is not None:
@@ -58,7 +58,7 @@ def _descended(
     settled: float,
     steps: int,
 ) -> tuple[Observations, list[tuple[Effect, Array]], float]:
-    """Return the corrected model and its effects after so many steps downhill at most, and what they cost."""
+    """Gauss-Newton descent of a limited number of steps: corrected model, its effects, and their cost."""
     whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
     chosen = [explanation.block_of(effect) for effect in effects]
@@ -98,7 +98,7 @@ def _descended(
 
 
 def _step_inside(products: Array, state: Array, prior: Array, least: Array, damping: float) -> tuple[Array, float]:
-    """Return the damped ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
+    """Damped ridge step under bounds 0 or −∞: parameters that would cross are held at zero."""
     flat, held = len(products) - 1 - len(prior), np.zeros(len(prior), dtype=bool)
     while True:
         step, size = _ridge_step(products, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
@@ -109,11 +109,10 @@ def _step_inside(products: Array, state: Array, prior: Array, least: Array, damp
 
 
 def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
-    """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
+    """Ridge step that minimises |gap − design step|² + |(state + step)/prior|², and its effect in units of noise.
 
     ``products`` are those of the columns of the design and of the gap, the last. The first columns have no prior.
-    Directions that nothing determines are not moved. A step along directions that do nearly the same moves little,
-    however long it is.
+    Undetermined directions are not moved.
     """
     matrix, vector = products[:-1, :-1].copy(), products[:-1, -1].copy()
     flat = len(matrix) - len(prior)
@@ -126,18 +125,17 @@ def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> 
 
 
 def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
-    """Observe with the effects at work; their responses are read from the nominal robot, as prediction reads them."""
+    """Observations displaced by the effects; responses are read at the nominal robot, as in prediction."""
     moved_by, instrument = displacement(observe(campaign, frames), pairs)
     return observe(campaign, frames, displacement=moved_by, instrument=instrument)
 
 
 def refined(explanation: Explanation, observations: Observations, factor: float) -> list[tuple[Effect, Array]]:
-    """Move the constants of chosen effects to where the evidence is largest, by coordinate search.
+    """Maximise the evidence over the constants of the chosen effects by coordinate search.
 
-    Of one effect after another settings nearby are tried. Where none is better by 0.1 nat they move closer, the
-    logarithm of ``factor`` (above 1) halved, until a parabola through them promises no more. Rows set aside are heard
-    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. Returns
-    the effects with their (P,) values.
+    For each effect in turn, neighbouring settings are tried; if none gains 0.1 nat, the logarithm of ``factor`` (above
+    1) is halved, until a parabola through them predicts no gain. Outliers are down-weighted instead of left out, as a
+    wrong constant makes outliers of the very rows that determine it. Returns the effects with their (P,) values.
     """
     kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
@@ -150,7 +148,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
 
 
 def constants_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
-    """Return the blocks with the constants of each moved in turn."""
+    """One sweep of the coordinate search: the blocks with the constants of each moved in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
         if _movable(item, factor):
@@ -159,20 +157,20 @@ def constants_moved(kept: Products, observations: Observations, blocks: Sequence
 
 
 def _movable(item: Block, factor: float) -> bool:
-    """Whether the block's effect has constants to move, or is shared in other ways."""
+    """Whether the effect of a block has constants to refine."""
     return len(gate.nearby(item.effect, factor)) > 1
 
 
 def weighed(kept: Products, blocks: Sequence[Block]) -> float:
-    """Return the log evidence of these effects with the prior odds of each."""
+    """Log evidence of these effects together, with the prior odds of each."""
     priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
     return _evaluated(kept, blocks)[2].log_evidence + priors
 
 
 def heard(explanation: Explanation) -> Whitening:
-    """Return the whitening in which rows set aside have a weight; what rows have in common is known of the others.
+    """Whitening in which outliers are down-weighted instead of left out, unless a smooth discrepancy is in it.
 
-    What is anew in every pose counts for nothing: a constant that is a little off leaves just that.
+    A per-pose discrepancy is left out of it, as it would absorb the residual of a slightly wrong constant.
     """
     whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
     if form is not None and form.anew:
@@ -181,11 +179,13 @@ def heard(explanation: Explanation) -> Whitening:
         return whitening
     noise = whitening.sigma() * explanation.best.noise
     distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
-    return replace(whitening, weights=np.where(aside, tail_weight(distance2, noise.shape[1]), whitening.weights))
+    return replace(
+        whitening, weights=np.where(aside, tail_weight(distance2, whitening.figures(noise.shape[1])), whitening.weights)
+    )
 
 
 def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:
-    """Return the block at one place with the setting of its effect that nothing nearby betters."""
+    """Block at one place after hill climbing over the constants of its effect."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
     seen: dict[Effect, float] = {}
 
@@ -214,14 +214,14 @@ def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], 
 
 
 def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
-    """Evaluate these blocks together and no others."""
+    """Evidence of exactly these blocks."""
     linear, problem = kept.problem(blocks)
     return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """An explanation, linearised at the exact model at which it was found, its effects with their (P,) values.
+    """Explanation linearised at the exact model of its own effects, which have the values (P,).
 
     ``families`` names the effect that each block belongs to.
     """
@@ -243,8 +243,8 @@ def settle(
 ) -> Settled:
     """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
 
-    It begins at ``start``, the exact model of effects that are ``held`` with their values, and with the weights that
-    were found there ``before``. The first search starts from each of the ``starts``, by default from what is held.
+    Starts at ``start``, the exact model of the effects ``held`` with their values, and at the weights of the
+    explanation ``before``. The first search starts from each of the ``starts``, by default from the effects held.
     """
     campaign, observations, held = start.campaign, start, list(held)
     begun = list(dict.fromkeys(effect for one in starts for effect in one))
@@ -287,14 +287,14 @@ def settle(
 
 
 def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
-    """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""
+    """Linear problem at the exact model: its gap, plus the displacement by the effects that it holds."""
     moved = (block(observations, effect).columns @ values for effect, values in held)
     gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
     return Linear(gap, frame_columns(observations)[0], tuple(blocks))
 
 
 def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
-    """Yield a setting in all places in those alone that do most, as fitted: in the two, three and more of them."""
+    """Yield an all-places setting restricted to the two, three and more places with the largest fitted effect."""
     if chosen.places or chosen.share is not None:
         return
     every = gate.places_of(item.parameters)
@@ -307,10 +307,10 @@ def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
 
 
 def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
-    """Yield what stays a rival of a setting while its constants are refined.
+    """Yield the alternatives of a setting that compete with it while its constants are refined.
 
-    One place more, less or another, other places alone, and all places; its places, and each of them, in other
-    settings. Of a law, all that were compared with it.
+    These are: one place more, less or exchanged, single places, all places, and other settings of its places. Of a law,
+    all laws compared with it.
     """
     if chosen.share is not None:
         yield from settings_of
@@ -332,9 +332,9 @@ def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Ef
 def _listed(
     variants: dict[str, tuple[Effect, ...]], observations: Observations, kept: Sequence[Effect]
 ) -> Iterator[Block]:
-    """Yield all settings but those with a place of which the data see nothing, or nothing beside the frames.
+    """Yield the blocks of all settings but those that the data or the unknown frames leave undetermined.
 
-    What is kept stays in any case.
+    Those ``kept`` stay in any case.
     """
     frames, names = frame_columns(observations)[0], observations.robot.joint_names
     basis = orthonormal(equations_of(frames))
@@ -355,7 +355,7 @@ def _listed(
 
 
 def _sees(item: Block) -> bool:
-    """Whether the data see something of each place of a setting in several places."""
+    """Whether the columns of each place of a multi-place setting differ from zero."""
     places = item.effect.places if len(item.effect.places) > 1 else ()
     if not places:
         return True
@@ -365,6 +365,6 @@ def _sees(item: Block) -> bool:
 
 
 def constant(effect: Effect, observations: Observations) -> bool:
-    """Whether an effect displaces each place by the same in all rows."""
+    """Whether the displacement of each place is the same in all rows."""
     responses = [r for p in gate.checked(effect, observations) for r in p.responses]
     return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)

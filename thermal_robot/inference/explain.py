@@ -1,6 +1,6 @@
-"""Bayesian model selection: effects, outliers, noise and a discrepancy, found together until they agree.
+"""Bayesian model selection: effects, outliers, noise and a correlated discrepancy, iterated until they are consistent.
 
-Combinations of effects are searched beside every size and form of a discrepancy, in one memo, and their evidence is
+Combinations of effects are searched for every kernel and amplitude of a discrepancy, in one memo, and their evidence is
 summed over these.
 """
 
@@ -41,10 +41,10 @@ PLAIN: Rung = (-1, 0.0)
 
 @dataclass(eq=False)
 class Ladder:
-    """Evaluates combinations of blocks beside discrepancies of several forms and sizes.
+    """Model search over combinations of blocks and over kernels and amplitudes of a discrepancy.
 
     ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
-    contains the other; of ``among`` forms these are left, and keep their share of the prior.
+    contains the other; ``among`` is the number of kernels that share the prior, of which ``forms`` are left.
     """
 
     linear: Linear
@@ -57,7 +57,7 @@ class Ladder:
     searches: dict[Rung, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Decompose the forms once for all sizes."""
+        """Decompose each kernel once for all amplitudes."""
         w = self.whitening
         self._stack = white_stack(self.stack or Stack.of(self.linear.columns), w)
         self._products, self._equations = self._stack.products(), self._stack.equations
@@ -84,7 +84,7 @@ class Ladder:
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
     def without(self, out: frozenset[int]) -> Ladder:
-        """Return the same without some blocks: what was evaluated of the others stays known."""
+        """Copy of the search without some blocks; evaluations of the others stay in the memo."""
         found = copy(self)
         found.forms, found._joined = list(self.forms), any(form.several for form in self.forms)
         found._spectra, found._along = list(self._spectra), list(self._along)
@@ -97,7 +97,7 @@ class Ladder:
         return found
 
     def bare(self) -> Ladder:
-        """Return the same without the rows' columns, unless what is anew in every pose may still ask for them."""
+        """Copy without the rows' columns, unless a per-pose discrepancy still needs them."""
         if any(form.anew for form in self.forms):
             return self
         found = copy(self)
@@ -105,9 +105,9 @@ class Ladder:
         return found
 
     def _consider(self, form: Form, log_prior: float) -> int:
-        """Add a form, which shares its prior among all sizes; return its number.
+        """Add a kernel, whose prior is divided among its amplitudes; return its number.
 
-        Products with all columns are kept where they are few: not those with what is anew in every pose.
+        Products with all columns are cached, but not for per-pose kernels, which have too many.
         """
         self.forms.append(form)
         w = self.whitening
@@ -120,7 +120,7 @@ class Ladder:
 
     @staticmethod
     def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
-        """Yield the larger block of each pair of which one contains the other, where the data see the smaller."""
+        """Yield the larger block of each nested pair of which the data determine the smaller."""
         for pair in inside:
             small, large = sorted(pair, key=lambda b: plain.ranks[b])
             own = plain.slices[small]
@@ -128,12 +128,12 @@ class Ladder:
                 yield large
 
     def whitened_at(self, rung: Rung) -> Whitening:
-        """Return the whitening with the discrepancy of a rung."""
+        """Whitening with a discrepancy of the given kernel and amplitude."""
         form, tau = rung
         return self.whitening if form < 0 else replace(self.whitening, smooth=Smooth(self._spectra[form], tau))
 
     def beside(self, rung: Rung) -> Search:
-        """Return the search beside one discrepancy, made once."""
+        """Search over blocks with one discrepancy in the covariance, made once."""
         if rung not in self.searches:
             white, products = self.whitened_at(rung), self._left(rung, np.arange(len(self._products)))
             plain = self.searches[PLAIN].gram
@@ -148,9 +148,9 @@ class Ladder:
         return found.without(self._out) if self._out else found
 
     def run(self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True) -> tuple[Rung, Combination]:
-        """Climb over combinations and discrepancies until neither betters the other, from several starts.
+        """Hill climbing over combinations and discrepancies from several starts.
 
-        With ``detours`` what single steps miss is looked for, too.
+        With ``detours`` larger moves are tried, too.
         """
         first = self.beside(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
@@ -169,9 +169,9 @@ class Ladder:
             rung, best = nearby
 
     def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
-        """Let several joints err in every pose or visit, one after another; return what is better, if any is.
+        """Extend a per-pose discrepancy to several joints, one after another; return an improvement, if any.
 
-        Once beside the best combination and once beside none, so that neither has the sizes that suit the other.
+        Tried with the best combination and with none, since the amplitudes of one need not suit the other.
         """
         if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
             return None
@@ -185,7 +185,7 @@ class Ladder:
     def _climbed(
         self, found: tuple[Rung, float, tuple[int, ...]], best: Combination
     ) -> tuple[Rung, Combination] | None:
-        """Climb where a size promises more than the best; return what is better, if anything is, rounding aside."""
+        """Climb where an amplitude promises more evidence than the best; return an improvement, if any."""
         rung, promised, blocks = found
         return self._better(rung, blocks, best) if promised > best.log_evidence + settings.BETTER else None
 
@@ -194,7 +194,7 @@ class Ladder:
         return (rung, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _further(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
-        """Look beside the discrepancy for what single steps miss; return it, if anything is better."""
+        """Search beyond single steps with the present discrepancy; return an improvement, if any."""
         found = self.beside(rung).run(best.blocks)
         return (rung, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
@@ -226,14 +226,14 @@ class Ladder:
         return self._size(self._consider(best, prior), blocks, tau)
 
     def _forget(self) -> None:
-        """Take the last form out again."""
+        """Remove the last kernel."""
         number = len(self.forms) - 1
         del self.forms[number], self._spectra[number], self._along[number]
         self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
         self._settled = {key: found for key, found in self._settled.items() if key[0] != number}
 
     def _size(self, form: int, blocks: tuple[int, ...], start: float = 1.0) -> tuple[Rung, float]:
-        """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
+        """Most probable amplitude of a kernel with one combination, and its log evidence; it is unimodal."""
         k = settings.TAUS.index(self._sizes.get(form, start))
         best = self._beside((form, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:
@@ -247,7 +247,7 @@ class Ladder:
         return (form, settings.TAUS[k]), best
 
     def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
-        """Return the log evidence of one combination beside one discrepancy, from the columns of its blocks alone."""
+        """Log evidence of one combination with one discrepancy, from the columns of its blocks alone."""
         key = rung, tuple(sorted(blocks))
         if key not in self._quick:
             flat, white = self.linear.frames.shape[2], self.whitened_at(rung)
@@ -268,21 +268,21 @@ class Ladder:
         return self._quick[key]
 
     def _like(self, form: int, blocks: tuple[int, ...]) -> Combination | None:
-        """Return the same combination beside the size tried last, or beside none: from there it is not far."""
+        """Warm start: the same combination with the last amplitude, or without a discrepancy."""
         if (form, blocks) in self._settled:
             return self._settled[form, blocks]
         known = self.searches[PLAIN].seen.get(blocks)
         return known and replace(known, scales={k: known.scales.get(b, 1.0) for k, b in enumerate(blocks)})
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
-        """Return the products of some columns, whitened by the discrepancy of a rung."""
+        """Gram matrix of some columns, whitened with a discrepancy."""
         kept, number = np.unique(self._stack.number[picked], return_inverse=True)
         plain = self._products[np.ix_(self._first[kept], self._first[kept])]
         found = self._spectra[rung[0]].products(rung[1], self._along_form(rung[0], kept), plain)
         return np.asarray(found[np.ix_(number, number)])
 
     def _along_form(self, form: int, kept: NDArray[np.int64]) -> list[Array]:
-        """Return the products of a form with some of the columns that differ."""
+        """Products of a kernel's factor with some of the distinct columns."""
         known = self._along[form]
         if known is not None:
             return [own[:, kept] for own in known]
@@ -292,9 +292,9 @@ class Ladder:
         return self._last[1]
 
     def in_question(self, best: Combination) -> tuple[Form, ...]:
-        """Return the forms that may be at work beside the best combination.
+        """Kernels with substantial posterior probability beside the best combination.
 
-        One whose most probable size is the smallest is noise, and one that is far less probable is out of the question.
+        A kernel whose most probable amplitude is the smallest is noise; one that is far less probable is left out.
         """
         peaks: dict[int, tuple[float, float]] = {}
         for ((form, tau), blocks), log in self._quick.items():
@@ -307,7 +307,7 @@ class Ladder:
         return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
 
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
-        """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
+        """Evaluate the neighbours with all plausible discrepancies; return an improvement, if any."""
         near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
         for other in dict.fromkeys((PLAIN, *near)):
             if self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best):
@@ -321,10 +321,10 @@ class Ladder:
         return log_evidence > best.log_evidence - settings.RUNG_REACH
 
     def weigh_pairs(self, rung: Rung, best: Combination) -> None:
-        """Weigh two changes of the best combination together, where each by itself is in doubt.
+        """Evaluate pairs of changes of the best combination of which each alone is uncertain.
 
-        Of two effects in doubt that have nothing to do with each other, both may be at work. Left out, each would take
-        from the probability of the other.
+        Two uncertain effects that are independent may both be at work; without such pairs each would lower the
+        probability of the other.
         """
         search = self.beside(rung)
         own = set(best.blocks)
@@ -345,7 +345,7 @@ class Ladder:
                 search.evaluate(blocks, best)
 
     def consensus(self, families: Sequence[str]) -> tuple[Rung, Combination]:
-        """Return the best combination of the most probable set of names, settings and discrepancies summed over."""
+        """Best combination of the most probable set of effects, summed over settings and discrepancies."""
         compared, probabilities = self.probabilities()
         mass: dict[frozenset[str], float] = {}
         for combination, p in zip(compared, probabilities, strict=True):
@@ -362,14 +362,14 @@ class Ladder:
         return rung, self.beside(rung).evaluate(best.blocks)
 
     def probabilities(self) -> tuple[list[Combination], Array]:
-        """Return all combinations seen beside all discrepancies, most probable first, with their probabilities."""
+        """Posterior probabilities of all combinations, summed over discrepancies, most probable first."""
         masses = [(mass, c) for own in self._masses().values() for mass, c in own]
         masses.sort(key=lambda item: -item[0])
         weight = np.exp(np.array([mass for mass, _ in masses]) - masses[0][0])
         return [c for _, c in masses], weight / weight.sum()
 
     def forms_in_question(self) -> dict[str, float]:
-        """Return the posterior probability of each form by its name, and by an empty name that of none."""
+        """Posterior probability of each kernel by its name, and by an empty name that of none."""
         held = {rung: np.array([mass for mass, _ in own]) for rung, own in self._masses().items()}
         top = max(own.max() for own in held.values())
         mass: dict[str, float] = {}
@@ -379,9 +379,9 @@ class Ladder:
         return {name: m / sum(mass.values()) for name, m in mass.items()}
 
     def _masses(self) -> dict[Rung, list[tuple[float, Combination]]]:
-        """Return beside each discrepancy searched all combinations, with the log evidence of the sizes it stands for.
+        """Log evidence of all combinations for each discrepancy, weighted by the amplitudes that it represents.
 
-        A sum over all sizes by those that were computed: each stands for those that are nearer to it than to another.
+        Sum over all amplitudes by those computed: each represents the amplitudes nearest to it.
         """
         seen = {rung: list(search.seen.values()) for rung, search in self.searches.items()}
         best = max((c for own in seen.values() for c in own), key=lambda c: c.log_evidence)
@@ -404,7 +404,7 @@ NOTHING = np.zeros(0)
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """What no effect accounts for: the probability that there is any, and of each form by its name.
+    """Posterior of a correlated discrepancy: the probability of any, and of each kernel by its name.
 
     Beside the best combination: ``form`` and ``tau``, its rms over the noise (``None`` and 0 where there is none), and
     ``noise`` in units of the whitening noise.
@@ -419,7 +419,7 @@ class Discrepancy:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """The most probable combination of effects, with its outliers and noise, and the probability of each rival.
+    """Most probable combination of effects, its outliers and noise, and the probabilities of all combinations.
 
     ``problem`` is the Gram matrix of the ``linear`` problem at the final ``whitening``; ``combinations`` all that were
     compared, most probable first, without values; ``values`` mean and covariance per block of the best; ``remainder``
@@ -442,28 +442,28 @@ class Explanation:
     searched: _Round | None = None
 
     def without(self, out: Sequence[int]) -> Explanation:
-        """Return the best explanation without some blocks, at the same weights, from all that was weighed before."""
+        """Best explanation without some blocks, at the same weights, from the memo."""
         if self.searched is None:
             raise ValueError("what was weighed for this explanation is no longer known")
         return self.searched.without(frozenset(out)).told(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
-        """Return the block of the best combination that is this effect, in whatever setting."""
+        """Block of the best combination that belongs to this effect, in whatever setting."""
         return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
 
     def held(self, block: int) -> Array:
-        """(P,) prior standard deviation of a block's parameters, SI; one that is held at zero has next to none."""
+        """Prior standard deviations (P,) of a block's parameters, SI; next to 0 for those held at zero."""
         item = self.linear.blocks[block]
         return item.sizes * self.best.scales[block] * item.kept(self.values[block][0])
 
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(N,) True for those of the given rows whose residual is larger than noise allows."""
+        """Outliers (N,) among the given rows."""
         beyond = self.whitening.sigma() * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
         distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
-        return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
+        return np.asarray(rows & (distance2 > distance_limit(self.whitening.figures(self.linear.measures), len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
-        """Posterior probability that any of the blocks is at work."""
+        """Posterior probability that any of the blocks is in the model."""
         held = [bool(set(c.blocks) & set(blocks)) for c in self.combinations]
         return min(float(self.probabilities[held].sum()), 1.0)
 
@@ -480,13 +480,13 @@ def explain(
     forms: Sequence[Form] = (),
     log_prior: Sequence[float] | None = None,
 ) -> Explanation:
-    """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
+    """Bayesian model selection of blocks together with outliers, noise and a correlated discrepancy.
 
     Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
-    (N,) bear on nothing. Blocks of one family are settings that exclude each other and share its prior probability.
-    ``starts`` and ``outliers`` are where the search starts. Where a problem like it was explained ``before``, its
-    weights and noise are kept, and of the forms those that it left in question; where the first of the starts comes out
-    again beside the same form, that is the answer. ``log_prior`` is by default that of the blocks' effects.
+    (N,) are ignored. Blocks of one family are settings that exclude each other and share its prior probability.
+    ``starts`` and ``outliers`` are where the search starts. With an explanation of a similar problem ``before``, its
+    weights, noise and plausible kernels are reused; if the first of the starts is found again with the same kernel, the
+    iteration ends. ``log_prior`` is by default that of the blocks' effects.
     """
     samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
@@ -524,13 +524,13 @@ def explain(
 
 
 def _state(blocks: tuple[int, ...], form: Form | None, whitening: Whitening) -> tuple[object, ...]:
-    """Return what tells one round from another: blocks, form of the discrepancy, and which rows are used."""
+    """Key of an iteration, to detect convergence: blocks, kernel of the discrepancy, and rows in use."""
     return blocks, form and form.words, np.packbits(whitening.weights > 0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What stays the same in all rounds."""
+    """Inputs that stay the same in all iterations."""
 
     linear: Linear
     families: Sequence[str]
@@ -542,7 +542,7 @@ class _Asked:
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """One search with given weights: the best combination, the discrepancy beside it, and what both leave."""
+    """One search at fixed weights: best combination, its discrepancy, and both residuals."""
 
     asked: _Asked
     ladder: Ladder
@@ -559,7 +559,7 @@ class _Round:
         return cls._on(asked, ladder, seeds, detours=False)
 
     def without(self, out: frozenset[int]) -> _Round:
-        """Return the round without some blocks, started from the best of what was weighed without them."""
+        """Return the round without some blocks, started from the best combination without them."""
         return self._on(self.asked, self.ladder.without(out), [tuple(b for b in self.best.blocks if b not in out)])
 
     @classmethod
@@ -580,12 +580,12 @@ class _Round:
 
     @property
     def rough(self) -> Array:
-        """(N, m) what neither effects nor a smooth discrepancy follow; one that is anew hides no gross error."""
+        """Residual (N, m) less a smooth discrepancy; a per-pose discrepancy is not subtracted."""
         return self.remainder if self.form is None or self.form.anew else self.remainder - self.smooth
 
     @property
     def leverage(self) -> float:
-        """Share of the equations that effects, frames and a smooth discrepancy take up."""
+        """Share of the equations fitted by effects, frames and a smooth discrepancy."""
         flat, smooth = self.asked.linear.frames.shape[2], self.ladder.whitened_at(self.rung).smooth
         followed = self.best.effective + flat
         if smooth is not None and self.form is not None and not self.form.anew:
@@ -594,10 +594,10 @@ class _Round:
         return float(min(followed / max(equations, 1), settings.MOST_LEVERAGE))
 
     def told(self, aside: NDArray[np.bool_]) -> Explanation:
-        """Return the explanation.
+        """Explanation of this round.
 
-        Settings and values are those that correct best: beside a smooth discrepancy, which is no part of the
-        correction, the effects are fitted as if there were none, at a noise that holds it.
+        Settings and values are those of the best correction: with a smooth discrepancy, which no correction contains,
+        the effects are refitted without it, at a noise that includes it.
         """
         linear, ladder = self.asked.linear, self.ladder
         rung = self.rung if self.form is None or self.form.anew else PLAIN
@@ -629,22 +629,21 @@ class _Round:
 
 
 def log_odds() -> float:
-    """Return the log prior odds of one effect."""
+    """Log prior odds of one effect."""
     return float(np.log(settings.PRIOR_PROBABILITY / (1.0 - settings.PRIOR_PROBABILITY)))
 
 
 def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
-    """Return the pairs of blocks that are settings of one effect: they exclude each other."""
+    """Pairs of blocks that are settings of one effect, and exclude each other."""
     pairs = combinations(range(len(families)), 2)
     return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
 
 
 def log_priors(effects: Sequence[Effect]) -> list[float]:
-    """Return the log prior odds of each setting of an effect: it has its share of those of its name.
+    """Log prior odds of each setting of an effect: a share of the odds of its name.
 
-    An effect is as likely in all its places as in one of them, in two half as likely, in three half of that; places are
-    alike, and settings of the same places share by their weight. What is listed beside a setting in other places does
-    not change its share.
+    An effect is as probable in all its places as in one, half as probable in two, and so on; places are exchangeable,
+    and settings of the same places share by weight. The share does not depend on settings in other places.
     """
     single: dict[str, set[str]] = {effect.name: set() for effect in effects}
     for effect in effects:
@@ -665,12 +664,12 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
 
 
 def share_of_places(count: int, among: int) -> float:
-    """Prior probability that an effect acts in exactly so many given places, in all where 0; 1 where it has none."""
+    """Prior probability that an effect acts in exactly so many given places, in all where 0; 1 without places."""
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
 
 
 def left_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
-    """(N, m) gap less effects and frames."""
+    """Residual (N, m): gap less effects and frames."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
     left = linear.gap - sum(moved, np.zeros_like(linear.gap))
     return np.asarray(left - linear.frames @ frame_step(linear, whitening, left))

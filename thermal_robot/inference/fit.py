@@ -1,9 +1,8 @@
-"""The whole fit: frames, then effects jointly, then the exact model of the explanation by Gauss-Newton.
+"""The whole fit: frames, joint model selection of effects, and Gauss-Newton on the exact model.
 
-Effects are selected (:func:`fit`, :func:`refit`, :func:`less`) or named (:func:`fit_named`). In the latter all are at
-work, whatever the data say for each: they are fitted in one linear problem with noise and prior scales at their most
-probable values and rows far off set aside, then by the exact model; from there again, until the same rows are set
-aside.
+Effects are selected (:func:`fit`, :func:`refit`, :func:`less`) or named (:func:`fit_named`). Named effects are all
+kept: fitted in one linear problem with most probable noise and prior scales, then by the exact model, repeatedly until
+the outliers converge.
 """
 
 from __future__ import annotations
@@ -28,12 +27,13 @@ from thermal_robot.inference.problem import Linear, Products, frame_step, gram, 
 from thermal_robot.inference.registration import found_frames, frames_known, moved, refined_frames, register
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.weights import Noise, first_whitening, reweigh
+from thermal_robot.observables import components
 from thermal_robot.observations import Frames, Observations, observe
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What was fitted, at the two places that a diagnosis compares.
+    """Fit of a campaign, at the nominal and at the corrected robot.
 
     ``nominal`` are the observations of the nominal robot with its unknown frames fitted, ``before`` the linear problem
     there; ``corrected`` those of the corrected model, where ``explanation`` is linearised. ``effects`` have their (P,)
@@ -52,15 +52,15 @@ class Fit:
     variants: dict[str, tuple[Effect, ...]]
 
     def blocks_of(self, name: str) -> list[int]:
-        """Return the blocks of one effect: its settings."""
+        """Blocks of one effect: its settings."""
         return [b for b, family in enumerate(self.families) if family == name]
 
     def names_of(self, combination: Combination) -> frozenset[str]:
-        """Return the effects of a combination of blocks."""
+        """Effects of a combination of blocks."""
         return frozenset(self.families[b] for b in combination.blocks)
 
     def probability(self, name: str) -> float:
-        """Posterior probability that an effect is at work, in whatever setting."""
+        """Posterior probability that an effect is in the model, in whatever setting."""
         return self.explanation.probability(self.blocks_of(name))
 
     def probability_of_just(self, names: Set[str]) -> float:
@@ -69,13 +69,13 @@ class Fit:
         return min(float(e.probabilities[[self.names_of(c) == names for c in e.combinations]].sum()), 1.0)
 
     def odds(self, name: str) -> float:
-        """Odds of an effect of the explanation against nothing in its place."""
+        """Posterior odds of an effect of the explanation against nothing in its place."""
         best = self.names_of(self.explanation.best)
         return self.probability_of_just(best) / max(self.probability_of_just(best - {name}), settings.TINY)
 
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """Fit frames, choose effects and refit the choice exactly, until a Gauss-Newton step moves nothing measurable.
+    """Fit frames, select effects and refit the selection exactly until Gauss-Newton converges.
 
     Raises :class:`EstimationError` if there are too few different poses for the unknown frames.
     """
@@ -89,15 +89,15 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
 
 
 def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect that are compared, in all its joints and in each alone."""
+    """Return the settings of an effect that are compared: in all its joints, and in each alone."""
     known = gate.variants(effect, observations)
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
 
 def less(known: Fit, *names: str) -> Fit:
-    """Backward elimination: a fit without some effects, the others chosen anew in the same linear problem.
+    """Backward elimination: fit without some effects, the others selected anew in the same linear problem.
 
-    Weights and all that was weighed stay; the choice is fitted exactly.
+    Weights and memo are reused; the selection is fitted exactly.
     """
     explanation = known.explanation.without([b for name in names for b in known.blocks_of(name)])
     linear = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
@@ -114,7 +114,7 @@ def refit(
     starts: Sequence[Sequence[Effect]] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
-    """Choose again at the exact model of a fit, with other settings to choose from, such as discovered laws.
+    """Repeat the model selection at the exact model of a fit, with other settings, such as discovered laws.
 
     ``variants`` replace those of the fit by name, or join them; none takes the effect out. The search starts from each
     of the ``starts``, by default from the effects of the fit.
@@ -140,11 +140,11 @@ def _fitted(
 
 
 def require_enough(campaign: Campaign) -> None:
-    """Refuse a campaign that leaves nothing to tell effects by once the frames are fitted and a fold is held out."""
+    """Refuse a campaign with too few rows for the frames, the effects and a held-out fold."""
     still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
     poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
-    unknown, measures = len(unknown_frames(campaign)), campaign.orientation is not None
-    fewest = -(-(unknown + settings.SPARE_EQUATIONS) // (6 if measures else 3)) + 2
+    unknown = len(unknown_frames(campaign))
+    fewest = -(-(unknown + settings.SPARE_EQUATIONS) // components(campaign)) + 2
     if poses < fewest:
         raise EstimationError(
             f"{poses} different poses are too few: {unknown} unknowns of the frames need at least {fewest} of them, "
@@ -156,13 +156,13 @@ Held = list[tuple[Effect, Array]]
 
 
 def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """Fit the unknown frames and all of these effects, each of another name: one combination, of probability 1.
+    """Fit the unknown frames and all of these effects, without model selection.
 
-    One that lies in another and is told inside it (:attr:`Effect.told_inside`) is not fitted beside it: it stands in
-    the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it. Constants that are no linear
-    parameters start at the most probable setting in all places. Raises :class:`EffectError` where the campaign lacks
-    what an effect needs, or one breaks the contract; :class:`EstimationError` where poses are too few for the frames,
-    or nothing is determined.
+    An effect contained in another one and reported inside it (:attr:`Effect.told_inside`) is not fitted separately: it
+    is among the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it. Constants that are no
+    linear parameters start at the most probable setting in all places. Raises :class:`EffectError` where the campaign
+    lacks what an effect needs, or one breaks the contract; :class:`EstimationError` where poses are too few for the
+    frames, or nothing is determined.
     """
     progress("unknown frames")
     require_enough(campaign)
@@ -192,7 +192,7 @@ def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[
 def _exact(
     start: Observations, explanation: Explanation, progress: Callable[[str], None]
 ) -> tuple[Explanation, Observations, Held]:
-    """Refit by the exact model and explain there, until the rows set aside and the noise stay."""
+    """Alternate exact refits and explanations until outliers and noise converge."""
     observations, held = start, [(b.effect, np.zeros(len(b.sizes))) for b in explanation.linear.blocks]
     for revision in range(1, settings.REVISIONS + 1):
         progress(f"exact fit, revision {revision}")
@@ -206,7 +206,7 @@ def _exact(
 
 
 def _exact_model(observations: Observations, explanation: Explanation, held: Held) -> tuple[Observations, Held]:
-    """Refit by the exact model, from the values of the linear fit; from those before where that ends worse."""
+    """Exact refit from the values of the linear fit, or from the former ones if that has the smaller cost."""
     linear, campaign = explanation.linear, observations.campaign
     values = [mean for mean, _ in explanation.values.values()]
     left = linear.gap - sum((linear.contribution(b, own) for b, own in enumerate(values)), np.zeros_like(linear.gap))
@@ -220,7 +220,7 @@ def _exact_model(observations: Observations, explanation: Explanation, held: Hel
 
 
 def _cost(explanation: Explanation, observations: Observations, held: Held) -> float:
-    """Penalised sum of squares: what is left over the noise, and values over their prior sizes."""
+    """Penalised sum of squares: residual over the noise, and values over their prior sizes."""
     noise = explanation.whitening.sigma() * explanation.best.noise
     left = (observations.gap / noise) ** 2 * explanation.whitening.weights[:, None]
     over = [(own / explanation.held(explanation.block_of(effect))) ** 2 for effect, own in held]
@@ -230,9 +230,9 @@ def _cost(explanation: Explanation, observations: Observations, held: Held) -> f
 def _explained(
     observations: Observations, effects: Sequence[Effect], held: Held, before: Explanation | None = None
 ) -> Explanation:
-    """Explain the gap by all of these effects: noise, scales, values and rows set aside, until these stay.
+    """Explanation by all of these effects: noise, scales, values and outliers, iterated to convergence.
 
-    Where they were explained ``before`` nearby, it begins with the weights and scales that were found there.
+    Starts at the weights and scales of a nearby explanation ``before``, if any.
     """
     noise, use = Noise.of(observations.campaign), np.ones(observations.campaign.samples, dtype=bool)
     linear = at_exact_model(observations, [block(observations, effect).held for effect in effects], held)
@@ -260,7 +260,7 @@ def _explained(
 def _best_settings(
     explanation: Explanation, observations: Observations, settings_of: Sequence[tuple[Effect, ...]]
 ) -> list[Effect]:
-    """Return the most probable setting of each effect, one after another, their constants moved."""
+    """Most probable setting of each effect by coordinate search, with its constants refined."""
     if all(len(own) == 1 and len(gate.nearby(own[0], settings.REFINEMENT)) == 1 for own in settings_of):
         return [own[0] for own in settings_of]
     kept = Products(explanation.linear, explanation.whitening)

@@ -1,8 +1,8 @@
-"""Candidate terms that nobody listed: change points, ripple of the gears, and laws of any quantity at any place.
+"""Candidate terms that nobody listed: change points, gear ripple, and laws of any quantity at any place.
 
 Change points: every run of rows in the order of measurement is weighed at every place by a likelihood ratio (Page,
 *Biometrika* 42, 1955, for one change; Siegmund, *Annals of Statistics* 14, 1986, for a run between two), from
-cumulative sums. Rows that were set aside near each other count fully: they are what is to be explained.
+cumulative sums. Clustered outliers count fully, as they may be the event.
 
 Ripple: a matching pursuit (Mallat and Zhang, *Matching pursuits with time-frequency dictionaries*, 1993) over all
 joints and orders at once, all that is known fitted anew beside each wave.
@@ -43,6 +43,7 @@ from thermal_robot.inference.screening import (
     scan,
     shaped,
 )
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
@@ -52,7 +53,7 @@ Runs = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Products of a place's d moves in each row (N, ·), in the order of measurement, and their cumulative sums.
+    """Cumulative sums, in the order of measurement, of products of a place's d displacement columns.
 
     They are those with each other, with the r columns of the design, and with the residual, of which ``squares`` (N,)
     are the squared lengths; ``total`` and ``freedom`` as of a :class:`~thermal_robot.inference.screening.Seat`.
@@ -67,7 +68,7 @@ class _Sums:
 
     @classmethod
     def of(cls, target: Target, moves: Array, order: NDArray[np.int64]) -> _Sums:
-        """Sum the moves (N, m, d) of a place over a residual."""
+        """Cumulative sums of the columns (N, m, d) of a place over a residual."""
         (rows, m, d), seat = moves.shape, target.seat(moves)
         parts = (seat.weight, seat.design.transpose(2, 0, 1), seat.remainder)
         products = np.concatenate([part.reshape(rows, -1) for part in parts], axis=1)[order]
@@ -77,12 +78,12 @@ class _Sums:
 
     @property
     def fewest(self) -> int:
-        """Number of rows that a run has at least, and leaves at either end."""
+        """Smallest number of rows in a run, and before or after it."""
         m, d, _ = self.size
         return settings.FEWEST_ASIDE + -(-2 * d // m)
 
     def gains(self, sums: Array, total: float, freedom: int) -> Array:
-        """(C,) log evidence gained by a move of some rows (:attr:`Worth.gain`), from (C, ·) sums over these rows."""
+        """Log evidence (C,) of a displacement of some rows (:attr:`Worth.gain`), from sums (C, ·) over these rows."""
         (_, d, r), runs = self.size, len(sums)
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
@@ -90,21 +91,21 @@ class _Sums:
         return gained(total, explained, rank, freedom)
 
     def best(self, runs: Runs) -> Runs:
-        """Return (2,) the run that gains most, or the empty one where there is none."""
+        """Run (2,) of rows with the largest gain; the empty one where there is none."""
         if not len(runs):
             return np.zeros(2, dtype=np.int64)
         sums = self.summed[runs[:, 1]] - self.summed[runs[:, 0]]
         return np.asarray(runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))])
 
     def best_step(self) -> Runs:
-        """Return the best run from the first row, or to the last."""
+        """Best run that begins with the first row, or ends with the last."""
         rows = len(self.products)
         inner = np.arange(self.fewest, rows - self.fewest + 1)
         steps = [np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])]
         return self.best(np.concatenate(steps))
 
     def best_run(self) -> Runs:
-        """Return the best run between two changes: between marks that are spread evenly, then by pattern search."""
+        """Best run between two change points: coarse grid, then pattern search."""
         rows, least = len(self.products), self.fewest
 
         def best(runs: Runs) -> Runs:
@@ -121,9 +122,9 @@ class _Sums:
         return run
 
     def shared(self, rows: Rows) -> float:
-        """Log evidence gained by a move of rows (N,), or if it is less by it in all but the few that are farthest off.
+        """Log evidence of a displacement of rows (N,), or if smaller that without the few farthest rows.
 
-        In an event all rows share, in gross errors side by side a few.
+        All rows contribute to an event, but only a few to consecutive gross errors.
         """
         few, far = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE), self.squares * rows
         out = np.argsort(-far)[:few]
@@ -135,11 +136,11 @@ class _Sums:
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
-    """Events that may be at work in a fit: steps in time, runs, and sessions apart; the plainest first, one a place."""
+    """Change points of a fit: steps in time, runs of rows, and sessions; the simplest first, one a place."""
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations, order = fit.corrected, in_order(fit.campaign)
-    turns, joints = fit.campaign.measures == "pose", fit.campaign.robot.joint_names
+    turns, joints = components(fit.campaign) == 6, fit.campaign.robot.joint_names
     plain = Discovered(quantity="none", shape="constant", turns=turns)
     where = [("base", "base"), ("tool", "tool"), *(("joint", joint) for joint in joints)]
     places = [replace(plain, kind=kind, place=place) for kind, place in where]
@@ -157,10 +158,10 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
 
 
 def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
-    """Yield what a fit leaves of all rows but single gross errors, and what an event in it has to gain at least.
+    """Yield residuals, of all rows but single outliers, and the gain that an event in each must exceed.
 
-    Once as these rows stand, once less of what is far off; and without each effect, which may stand in for an event:
-    that has to gain more than the effect does.
+    Twice with all effects, with and without down-weighting of far rows; then without each effect, which may imitate an
+    event: the event must gain more than the effect.
     """
     e = fit.explanation
     single = e.outliers & ~gathered(fit, e.outliers)
@@ -168,7 +169,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
 
     def target(some: Iterable[int], trusted: Rows) -> Target:
         design = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in some)], axis=2)
-        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise)
+        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise, seen=e.whitening.seen)
 
     yield target(blocks, ~single), 0.0
     yield target(blocks, e.outliers & ~single), 0.0
@@ -178,7 +179,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
 
 
 def gathered(fit: Fit, aside: Rows) -> Rows:
-    """(N,) those rows set aside that have others near them in the order of measurement: more than chance puts there."""
+    """Outliers (N,) that cluster in the order of measurement more than chance allows."""
     order = in_order(fit.campaign)
     near = np.convolve(aside[order], np.ones(2 * settings.NEAR_IN_ORDER + 1), "same")
     found = np.zeros_like(aside)
@@ -189,7 +190,7 @@ def gathered(fit: Fit, aside: Rows) -> Rows:
 def _at_place(
     observations: Observations, place: Discovered, sums: _Sums, order: NDArray[np.int64]
 ) -> Iterator[tuple[float, Discovered]]:
-    """Yield what the best step, run and session at a place gain, and their laws, with how many were tried there."""
+    """Yield the best step, run and session at a place: gain, law, and number of those tried."""
     rows, labels = len(order), observations.campaign.labels.get("session")
     sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
     kinds, inner = 3 if len(sessions) > 1 else 2, max(rows - 2 * sums.fewest + 1, 0)
@@ -214,7 +215,7 @@ def _at_place(
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Cross-validation of a ridge regression, from sums of products over the rows of each of F folds.
+    """Cross-validation of a ridge regression from Gram matrices over each of F folds.
 
     ``stacks`` (n·m, K + 1) are the weighted columns in each fold, the values last, ``products`` (F, K + 1, K + 1).
     """
@@ -225,13 +226,13 @@ class HeldOut:
 
     @classmethod
     def of(cls, columns: Array, values: Array, folds: Sequence[Rows]) -> HeldOut:
-        """Sum columns (N, m, K) and values (N, m) over folds that divide the rows."""
+        """Gram matrices of columns (N, m, K) and values (N, m) over disjoint folds."""
         stack = np.concatenate([columns, values[:, :, None]], axis=2)
         stacks = tuple(equations_of(stack[fold]) for fold in folds)
         return cls(folds, stacks, np.array([own.T @ own for own in stacks]))
 
     def left(self, flat: int, prior: Array, further: Array | None = None) -> float:
-        """Sum of squares that fits to the other rows leave in each fold, in units of the noise.
+        """Held-out sum of squares over all folds, in units of the noise.
 
         The first ``flat`` columns have no prior, the others ``prior`` (K − flat,), 1/variance; ``further`` columns
         (N, m, k) may join.
@@ -256,13 +257,12 @@ class HeldOut:
 
 
 def waves(fit: Fit) -> JointRipple:
-    """Return the ripple that the remainder of a fit shows, beside all its other effects; without waves where none does.
+    """Ripple of the joints in the residual of a fit, by matching pursuit; without waves where none is significant.
 
-    The chance of the best of so many orders counts: a wave costs the logarithm of the number of independent orders of
-    all joints (Baluev, *MNRAS* 385, 2008), one that another joint has that of the number of such waves. It must gain
-    that in all equations, and in one a row, the part of the remainder that goes with the joint: what else is left is
-    rarely independent in the components of a pose. And rows held out by time must be left with no more than without
-    it, regions held out with hardly more.
+    A wave must gain more log evidence than the logarithm of the number of independent orders of all joints (Baluev,
+    *MNRAS* 385, 2008), or, at the order of another joint's wave, of the number of such waves. It must do so in all
+    equations and in one equation a row, along the joint, since the components of a pose are rarely independent. The
+    held-out residual must not grow by time, and hardly by region.
     """
     thin = Thin.of(fit)
     others = [b for b in fit.explanation.best.blocks if not isinstance(thin.linear.blocks[b].effect, JointRipple)]
@@ -274,12 +274,12 @@ def waves(fit: Fit) -> JointRipple:
 
 
 def ripple_of(fit: Fit) -> JointRipple:
-    """Return the ripple that a fit holds, without waves where it holds none."""
+    """Ripple of a fit; without waves where it has none."""
     return next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
 
 
 def alike(one: JointRipple, other: JointRipple) -> bool:
-    """Whether two ripples have the same waves, but for what refining their orders may move these by."""
+    """Whether two ripples have the same waves, up to the refinement of their orders."""
     first, second = (sorted(zip(ripple.joints, ripple.orders, strict=True)) for ripple in (one, other))
     return [joint for joint, _ in first] == [joint for joint, _ in second] and np.allclose(
         [order for _, order in first], [order for _, order in second], rtol=0.0, atol=settings.SAME_ORDER
@@ -288,7 +288,7 @@ def alike(one: JointRipple, other: JointRipple) -> bool:
 
 @dataclass(frozen=True)
 class _Wave:
-    """A wave of a joint, and among how many it was picked."""
+    """A wave of a joint, and the number of waves among which it was selected."""
 
     joint: str
     order: float
@@ -297,7 +297,7 @@ class _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Pursuit:
-    """Waves that are found one after another (matching pursuit), at the rows that are looked at.
+    """Matching pursuit: waves are added one after another.
 
     ``gap`` (N, m) is what all effects and waves explain; ``design`` (N, m, K) the columns of ``flat`` frame parameters
     and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried by joint,
@@ -336,7 +336,7 @@ class _Pursuit:
 
     @property
     def allowed(self) -> Array:
-        """(S,) how much more may be left in rows held out by each scheme than before: by time nothing."""
+        """Largest ratio (S,) of held-out residuals after and before, by scheme: 1 by time, slightly more by region."""
         return np.array([1.0, settings.WORSE_ELSEWHERE**2])
 
     @property
@@ -345,7 +345,7 @@ class _Pursuit:
         return max(sum(independent(grid) for grid in self.grids.values()), 1.0)
 
     def run(self, found: list[_Wave]) -> JointRipple:
-        """Return the waves, beginning with those that were found before."""
+        """Add waves to those that were found before, then eliminate those that became needless."""
         astray, target = np.ones(len(self.folds)), self._target(found)
         while len(found) < settings.MOST_WAVES:
             wider = self._wider(found, astray, target)
@@ -356,9 +356,9 @@ class _Pursuit:
         return _ripple(self._pruned(found, target))
 
     def _wider(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
-        """Return the waves with the one that is worth most of those that do no harm; ``None`` where none is worth it.
+        """Add the wave of the largest gain that does not harm held-out rows; ``None`` where none qualifies.
 
-        ``astray`` (S,) is what rows held out are left with by each scheme, times the least that any wave before left.
+        ``astray`` (S,) is the held-out residual of each scheme over the smallest so far.
         """
         along = {joint: _along(target, self._moves(joint)[1][:, :, 0]) for joint in self.grids}
         root, columns = target.root[:, :, None], self._columns(found)
@@ -383,7 +383,7 @@ class _Pursuit:
         return None
 
     def _pruned(self, found: list[_Wave], target: Target) -> list[_Wave]:
-        """Backward elimination: return the waves less those that later ones made needless."""
+        """Backward elimination of the waves that later ones made needless."""
         kept = list(found)
         while kept:
             whole = self._columns(kept) * target.root[:, :, None]
@@ -401,9 +401,9 @@ class _Pursuit:
         return kept
 
     def _peaks(self, target: Target, found: Sequence[_Wave], seen: Sequence[_Wave]) -> Iterator[_Wave]:
-        """Yield each joint's best wave beyond those that were seen, and its best of the orders of other joints.
+        """Yield each joint's best new wave, and its best at the orders of other joints.
 
-        Joints of one size have gears of one kind: a wave that another joint has is one of few.
+        Joints often have gears of one kind, so that a wave at another joint's order is one of few.
         """
         for joint, grid in self.grids.items():
             q, moves = self._moves(joint)
@@ -423,38 +423,39 @@ class _Pursuit:
                         yield _Wave(joint, order, tried)
 
     def _functions(self, wave: _Wave) -> Array:
-        """(N, 1, 2) sine and cosine of a wave."""
+        """Sine and cosine (N, 1, 2) of a wave."""
         q, _ = self._moves(wave.joint)
         return np.stack([np.sin(wave.order * q), np.cos(wave.order * q)], axis=1)[:, None, :]
 
     def _wave(self, wave: _Wave) -> Array:
-        """(N, m, 2) what sine and cosine of a wave do."""
+        """Displacements (N, m, 2) by sine and cosine of a wave."""
         return np.asarray(self._moves(wave.joint)[1] * self._functions(wave))
 
     def _columns(self, found: Sequence[_Wave]) -> Array:
-        """(N, m, K + 2W) the design and waves, in this order."""
+        """Design matrix and waves, (N, m, K + 2W), in this order."""
         return np.concatenate([self.design, *(self._wave(wave) for wave in found)], axis=2)
 
     def _priors(self, found: Sequence[_Wave]) -> Array:
-        """(2W,) one over the prior variance of the amplitudes of waves."""
+        """Prior precisions (2W,) of the amplitudes of waves."""
         return block(self.observations, _ripple(found)).sizes ** -2.0
 
     def _target(self, found: Sequence[_Wave], like: Target | None = None) -> Target:
-        relative = self.observations.campaign.relative_noise
-        return Target.of(self.gap, self._columns(found), self.changed, relative, like)
+        campaign = self.observations.campaign
+        relative, seen = campaign.relative_noise, seen_components(campaign)
+        return Target.of(self.gap, self._columns(found), self.changed, relative, like, seen)
 
     def _moves(self, joint: str) -> tuple[Array, Array]:
-        """(N,) positions of a joint, and (N, m, 1) what a unit of it moves."""
+        """Positions (N,) of a joint, and its displacement (N, m, 1) of the target per unit."""
         j = self.observations.robot.joint_names.index(joint)
         return self.observations.q[:, j], self.observations.joint_sensitivity[:, : self.gap.shape[1], j, None]
 
     def _gain(self, target: Target, along: Target, wave: _Wave) -> float:
-        """Return the log evidence that a wave gains: the lesser of all equations and of one a row, along its joint."""
+        """Log evidence of a wave: the lesser of that in all equations and in one equation a row."""
         return min(target.worth(self._wave(wave)).gain, along.worth(self._functions(wave)).gain)
 
 
 def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
-    """(W,) log evidence that each pair of columns (E, K) gains beside all others, by their fit without it.
+    """Log evidence (W,) of each pair of columns (E, K) beside all others.
 
     Without a pair the sum of squares is larger by β_wᵀ C_ww⁻¹ β_w, β the values fitted and C their covariance.
     """
@@ -475,21 +476,21 @@ def _ripple(waves: Sequence[_Wave]) -> JointRipple:
 
 
 def _orders(q: Array, slides: bool) -> Array:
-    """(K,) orders that are tried in a joint at positions (N,): those of which its range holds a whole wave."""
+    """Orders (K,) of the grid of a joint at positions (N,): those with a whole wave in its range."""
     grid = orders(q, slides)
     least = 2.0 * np.pi / max(float(np.ptp(q)), settings.TINY)
     return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
 
 
 def _way(target: Target, moves: Array) -> tuple[Array, Array]:
-    """(N, m) unit vectors along what a joint moves, moves (N, m) weighted, and (N,) how far."""
+    """Return the unit vectors (N, m) along a joint's displacement (N, m), weighted, and its lengths (N,)."""
     own = moves * target.root
     length = np.linalg.norm(own, axis=1)
     return own / np.where(length > 0.0, length, 1.0)[:, None], length
 
 
 def _along(target: Target, moves: Array) -> Target:
-    """Return the target of one equation a row: the part of it that goes with moves (N, m) of one joint, a unit each."""
+    """Target of one equation a row: the component along the displacement (N, m) of one joint."""
     way, length = _way(target, moves)
     basis = orthonormal(np.einsum("nm,nmr->nr", way, target.basis.reshape(*way.shape, -1)))
     white = np.einsum("nm,nm->n", way, target.white.reshape(way.shape))
@@ -498,7 +499,7 @@ def _along(target: Target, moves: Array) -> Target:
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """A law of a fit with its probability, and rival places and quantities with theirs, the most probable first."""
+    """Discovered law with its probability, and alternative places and quantities, most probable first."""
 
     law: Discovered
     probability: float
@@ -507,10 +508,10 @@ class Discovery:
 
 
 def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[Discovered, ...]:
-    """Laws that may be worth their place, best first, the events that may have happened before all others.
+    """Candidate laws by log evidence, best first; possible events before all others.
 
-    Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
-    each effect: known effects may have absorbed an unlisted cause. A law is called ``discovered.<number>``.
+    Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
+    have absorbed an unlisted cause. A law is called ``discovered.<number>``.
     """
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
@@ -527,7 +528,7 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
 
 
 def listed(thin: Thin, law: Discovered) -> bool:
-    """Whether a known effect in that joint, with a zero that is off, does exactly what a law does: then it is none."""
+    """Whether a known effect, with a zero that is off, is identical to a law in its joint."""
     if law.kind != "joint":
         return False
     own = [item for item in thin.linear.blocks if item.effect.places == (law.place,)]
@@ -542,7 +543,7 @@ def listed(thin: Thin, law: Discovered) -> bool:
 
 
 def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
-    """Yield the blocks of the explanation that are taken out of each remainder that is scanned."""
+    """Yield the subsets of blocks that are projected out of the gap, one for each residual that is scanned."""
     best = fit.explanation.best.blocks
     laws = tuple(b for b in best if fit.families[b].startswith(PREFIX))
     effects = [b for b in best if b not in laws]
@@ -554,7 +555,7 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
 
 
 def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
-    """Return a remainder's best laws, at a segment also in the joint behind it, with how many it was picked among."""
+    """Best laws of a residual, with the number of those tried; for a segment also the law of the joint behind it."""
     first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
     joints = thin.observations.robot.joint_names
     at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
@@ -571,7 +572,7 @@ def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discove
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
-    """Return the best candidates; where one is at a segment, also the law of the joint behind it, which is simpler."""
+    """Best candidates; for one at a segment also the simpler law of the joint behind it."""
     first = list(own[: settings.SHAPED])
     simpler = {(i.law.place, i.law.follows) for i in first if i.law.kind == "link"}
     return first + [
@@ -580,7 +581,7 @@ def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
 
 
 def discovered(fit: Fit) -> tuple[Discovery, ...]:
-    """Return the laws of a fit with the probabilities of their places and quantities among all that were compared."""
+    """Laws of a fit, with posterior probabilities of their places and quantities among all compared."""
     e = fit.explanation
     laws = {b: item.effect for b, item in enumerate(e.linear.blocks) if isinstance(item.effect, Discovered)}
     found = []
@@ -605,7 +606,7 @@ def _sorted(found: dict) -> tuple:  # type: ignore[type-arg]
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:
-    """Return a law's place as a diagnosis names it: a segment by the link that carries it."""
+    """Place of a law as a diagnosis names it: a segment by the link that carries it."""
     if law.kind != "link":
         return law.kind, law.place
     return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)

@@ -1,4 +1,4 @@
-"""Which rows belong together: repeats of a pose and neighbours in joint space."""
+"""Groups of rows: repeats of a pose, neighbours in joint space, blocks in time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Labels = NDArray[np.int64]
 
 
 def near_repeats(campaign: Campaign) -> Labels:
-    """(N,) label of the cluster of commands that lie within :data:`settings.NEAR` of each other.
+    """Cluster label (N,) of commands that lie within :data:`settings.NEAR` of each other.
 
     Samples along a path chain into one cluster; the distance is then halved until no cluster holds more than a tenth
     of the rows, so that only closer repeats count. Rows with the same ``pose`` label always belong together.
@@ -43,13 +43,13 @@ def near_repeats(campaign: Campaign) -> Labels:
 
 
 def in_order(campaign: Campaign) -> Labels:
-    """(N,) row numbers in the order of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
+    """Row numbers (N,) in the order of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
     clock = campaign.clock
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 
 def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) those rows set aside that follow each other in time, three or more: a change, and not gross errors."""
+    """Outliers (N,) in runs of three or more consecutive rows: a change, not gross errors."""
     order = in_order(campaign)
     own = aside[order]
     run = np.cumsum(np.diff(own, prepend=False))  # odd within runs
@@ -59,7 +59,7 @@ def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def neighbourhoods(campaign: Campaign, count: int) -> Labels:
-    """(N,) label of one of about ``count`` boxes of joint space with equally many rows (median splits)."""
+    """Label (N,) of one of about ``count`` boxes of joint space with equally many rows (median splits)."""
     labels = np.zeros(campaign.samples, dtype=np.int64)
     boxes = [np.arange(campaign.samples)]
     while len(boxes) < count:
@@ -77,9 +77,9 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
 
 
 def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
-    """(N,) label 0..B−1 of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
+    """Label (N,), 0..B−1, of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
 
-    A block is what a hold-out holds out at a time, and what its figures' uncertainty is told by.
+    Blocks are the folds of cross-validation, and the groups of the jackknife.
     """
     cluster = near_repeats(campaign)
     rank = np.empty(campaign.samples)
@@ -95,13 +95,26 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
     return np.unique(block, return_inverse=True)[1].astype(np.int64)
 
 
+STAND = "stand"  # Label of what stays in one place while the robot is brought to it
+
+
+def held_together(campaign: Campaign) -> tuple[Labels, str]:
+    """(N,) label of the rows that are held out at a time, and what they are: stands, or blocks where these are few."""
+    stands = campaign.labels.get(STAND)
+    if stands is not None and campaign.position is None:
+        number = np.unique(stands, return_inverse=True)[1].ravel()
+        if number.max() + 1 >= settings.FEWEST_STANDS:
+            return number.astype(np.int64), STAND
+    return blocks(campaign), "blocked"
+
+
 def each(labels: Labels) -> list[NDArray[np.bool_]]:
-    """Return for each label, in order, a mask (N,) of its rows."""
+    """Mask (N,) of the rows of each label, in order."""
     return [labels == label for label in np.unique(labels)]
 
 
 def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
-    """(N,) number of the commanded pose of each row: the same ``pose`` label, or without that column the same command.
+    """Return number (N,) of each row's commanded pose: by its ``pose`` label, or without that column by its command.
 
     A row whose label is empty stands alone.
     """

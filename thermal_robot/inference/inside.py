@@ -1,10 +1,9 @@
-"""Reparametrisation: one effect of a fit told in other parameters, as many as the data can tell apart.
+"""Reparametrisation of a fitted effect by smaller effects that it contains.
 
-A large effect has more parameters than the data determine: many do the same, alone or with the unknown frames. Of a
-list of parameters that are combinations of them, in the order in which a reader wants them, each is kept that the data
-see beside those before it, until together they do all that the effect does; no prior bears on those of an effect
-inside. For the geometry of robots such base parameters were listed by Khalil, Gautier and Enguehard (*Robotica* 9,
-1991).
+A large effect has more parameters than the data determine. From an ordered list of combinations of them, each is kept
+that the data determine in addition to those before it, until together they span the effect; the parameters of a
+contained effect have no prior. For the geometry of robots such base parameters were given by Khalil, Gautier and
+Enguehard (*Robotica* 9, 1991).
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from thermal_robot.inference.problem import Linear, gram
 
 @dataclass(frozen=True, eq=False)
 class Portion:
-    """What one effect does of all that a larger one was found to do, or the larger one's rest.
+    """Part of a fitted effect that a contained effect accounts for, or the rest of it.
 
     (k,) value, posterior (``spread``) and ``prior`` standard deviation of each parameter, in its unit; ``unseen`` are
     those that the data do not tell from the ones before, or from the frames.
@@ -40,7 +39,7 @@ class Portion:
 
 
 def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
-    """Divide an effect of a fit: first what is inside it and told there, the rest last; empty where nothing is.
+    """Divide a fitted effect into contained effects and its rest; empty where it contains none.
 
     All parts together move the target as the effect does, but for the unknown frames.
     """
@@ -74,10 +73,10 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
 def _freed(
     values: Array, covariance: Array, scale: float, across: Array, free: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array]:
-    """Return (k,) values, (k, k) covariance and (k,) prior deviation in other coordinates, some free of their prior.
+    """Values (k,), covariance (k, k) and prior deviations (k,) in other coordinates, some without their prior.
 
-    Of a posterior N(values, covariance) under the prior N(0, scale²), the likelihood is what the data say. With the
-    columns of ``across`` as new coordinates, the prior of those that are free is wide, that of the others the old one.
+    The likelihood follows from the posterior N(values, covariance) and the prior N(0, scale²). In the new coordinates,
+    the columns of ``across``, free ones have a wide prior, the others the old one.
     """
     tight = np.linalg.inv(covariance)
     data = across.T @ (tight - np.eye(len(tight)) / scale**2) @ across
@@ -87,15 +86,15 @@ def _freed(
 
 
 def _inside(fit: Fit, effect: Effect) -> list[Effect]:
-    """Return in all their places the candidates that are told where this effect was found, and not themselves."""
+    """Candidates, in all their places, that this effect contains; not itself."""
     first, held = [known[0] for known in fit.variants.values() if known], {e.name for e, _ in fit.effects}
     return [e for e in first if e.told_inside and effect.name in e.contained_in and e.name not in held]
 
 
 def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return (P, D) the directions of an effect that the data see, (D, W) what each parameter is in them, and whether.
+    """Directions (P, D) of an effect that the data determine, parameters (D, W) in them, and which lie in their span.
 
-    All in prior sizes. What is no combination of the effect's parameters, as far as the data tell, is not in them.
+    All in prior sizes.
     """
     e, sizes = fit.explanation, np.array([p.size for p in wanted])
     asked = Block(item.effect, tuple(wanted), moved_by(fit.corrected, wanted), sizes)
@@ -109,7 +108,7 @@ def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Ar
 
 
 def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
-    """Tell which parameters the data identify, by their posterior and prior standard deviations."""
+    """Mask of the parameters that the data identify, by posterior over prior standard deviation."""
     return np.asarray(np.asarray(spread) < settings.DETERMINED * np.asarray(prior))
 
 

@@ -1,4 +1,4 @@
-"""What no effect and no law accounts for: a smooth discrepancy in the rows' covariance (Kennedy and O'Hagan 2001).
+"""Smooth model discrepancy as a Gaussian process in the rows' covariance (Kennedy and O'Hagan 2001).
 
 The whitened gap is y = F f + X θ + δ + e with e ~ N(0, s²) and δ ~ N(0, s² τ² K). K has one of several forms, each of
 mean one on its diagonal, so that τ is the discrepancy's rms over the noise:
@@ -30,6 +30,7 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.grouping import repeated_poses
+from thermal_robot.observables import components
 from thermal_robot.observations import Observations
 
 Numbers = NDArray[np.int64]
@@ -37,7 +38,7 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """K columns over E = n·m equations, n rows of m components, those that settings of an effect share kept once.
+    """Design matrix of K columns over E = n·m equations; columns shared by several settings are stored once.
 
     ``different`` are U arrays (N, m) of all rows, ``number`` (K,) which of them each column is, ``used`` (n,) the rows
     in use, ``root`` (n, m) by what they are multiplied.
@@ -50,7 +51,7 @@ class Stack:
 
     @classmethod
     def of(cls, columns: Iterable[Array]) -> Stack:
-        """Take columns (N, m, ·), some at a time, of all rows as they are."""
+        """Stack of columns (N, m, ·) over all rows, unweighted."""
         different: list[Array] = []
         number: list[int] = []
         seen: dict[bytes, int] = {}
@@ -66,26 +67,26 @@ class Stack:
 
     @classmethod
     def around(cls, array: Array, measures: int) -> Stack:
-        """Take the (E, K) columns of an array as they are."""
+        """Stack of the columns (E, K) of an array."""
         different = tuple(column.reshape(-1, measures) for column in array.T)
         rows = len(array) // measures
         return cls(different, np.arange(len(different)), np.arange(rows), np.ones((rows, measures)))
 
     def weighed(self, used: Numbers, root: Array) -> Stack:
-        """Return the columns over the rows in use, (n,), multiplied by ``root`` (n, m); they are not held anew."""
+        """Columns over the rows in use, (n,), times ``root`` (n, m), computed on demand."""
         return replace(self, used=used, root=root)
 
     @property
     def equations(self) -> int:
-        """E."""
+        """Number of equations E."""
         return self.root.size
 
     def differing(self, kept: Numbers) -> Stack:
-        """Return some of the columns that differ, each once."""
+        """Stack of some of the distinct columns."""
         return replace(self, different=tuple(self.different[k] for k in kept), number=np.arange(len(kept)))
 
     def rows(self, which: slice | Numbers) -> Array:
-        """(r, m, U) the different columns of some rows."""
+        """Distinct columns (r, m, U) of some rows."""
         rows, root = self.used[which], self.root[which]
         found = np.empty((*root.shape, len(self.different)))
         for k, own in enumerate(self.different):
@@ -93,12 +94,12 @@ class Stack:
         return found
 
     def chunks(self) -> Iterator[tuple[slice, Array]]:
-        """Yield the rows in chunks: which they are, and (r, m, U) their columns."""
+        """Yield slices of rows with their distinct columns (r, m, U)."""
         for part in chunks(len(self.used)):
             yield part, self.rows(part)
 
     def products(self) -> Array:
-        """(K, K) products of the columns, summed over the equations."""
+        """Gram matrix (K, K) of the columns."""
         found = np.zeros((len(self.different),) * 2)
         for _, rows in self.chunks():
             flat = equations_of(rows)
@@ -107,14 +108,14 @@ class Stack:
 
 
 def chunks(rows: int) -> Iterator[slice]:
-    """Yield the slices of so many rows that are worked on at a time."""
+    """Yield slices of rows of a fixed chunk size."""
     for start in range(0, rows, settings.CHUNK):
         yield slice(start, min(start + settings.CHUNK, rows))
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """B = functions (N, k) × moves (N, m, c) of the rows in use (n,), times the square ``root`` (n,) of their weights.
+    """Factor of a kernel: B = functions (N, k) × displacements (N, m, c), times ``root`` (n,) of the rows' weights.
 
     Moves are in units of the noise; (m, c) where all rows have the same.
     """
@@ -125,19 +126,19 @@ class Part:
     root: Array
 
     def rows(self, chunk: slice) -> tuple[Array, Array]:
-        """Return functions (r, k), square roots of the weights included, and moves of some of the rows in use."""
+        """Weighted functions (r, k) and displacements of some of the rows in use."""
         which = self.used[chunk]
         moves = self.moves if self.moves.ndim == 2 else self.moves[which]
         return self.functions[which] * self.root[chunk, None], moves
 
     def adjoint(self, stack: Array, chunk: slice) -> Array:
-        """Bᵀ times the columns (r, m, s) of some rows: (c k, s)."""
+        """Product Bᵀ (c k, s) with the columns (r, m, s) of some rows."""
         functions, moves = self.rows(chunk)
         carried = np.moveaxis(np.matmul(np.swapaxes(moves, -1, -2), stack), 1, 0)
         return np.asarray(equations_of(np.matmul(functions.T, carried)))
 
     def times(self, inner: Array, chunk: slice) -> Array:
-        """B times (c k, s), for some rows: (r, m, s)."""
+        """Product of B with (c k, s), for some rows: (r, m, s)."""
         functions, moves = self.rows(chunk)
         carried = np.matmul(functions, inner.reshape(moves.shape[-1], functions.shape[1], inner.shape[1]))
         return np.asarray(np.matmul(moves, np.moveaxis(carried, 0, 1)))
@@ -148,7 +149,7 @@ class Part:
         return bool(len(self.used) * self.moves.shape[-2] <= self.functions.shape[1] * self.moves.shape[-1])
 
     def own(self) -> Array:
-        """B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
+        """Smaller Gram matrix of the factor: B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
         if self.wide:
             functions, moves = self.rows(slice(None))
             m, c = moves.shape[-2:]
@@ -174,7 +175,7 @@ Labels = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """1 + τ²BBᵀ where B has c columns for each of G groups of rows: all is done group by group.
+    """Covariance 1 + τ²BBᵀ of a block-diagonal factor B: c columns for each of G groups of rows.
 
     With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ²
     Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|. ``moves`` (n, m, c) are in units of the
@@ -191,7 +192,7 @@ class Grouped:
 
     @classmethod
     def of(cls, moves: Array, groups: NDArray[np.int64], weights: Array, noise: Array) -> Grouped:
-        """Scale moves (N, m, c) to a mean square of one a component, in units of the noise, and decompose all M_g."""
+        """Scale displacements (N, m, c) to unit mean square, in units of the noise, and decompose each group."""
         everywhere = moves / noise[:, None]
         everywhere = everywhere / np.sqrt(max(float((everywhere**2).sum(axis=2).mean()), settings.TINY))
         used = np.flatnonzero(weights > 0)
@@ -202,7 +203,7 @@ class Grouped:
         return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
 
     def along(self, stack: Array | Stack) -> list[Array]:
-        """Return BᵀS in the eigenvectors of every group: one array (G c, U), S the columns that differ."""
+        """Product BᵀS (G c, U) in the eigenvectors of every group, S the distinct columns."""
         stack = stack if isinstance(stack, Stack) else Stack.around(stack, self.moves.shape[1])
         found = np.zeros((*self.value.shape, len(stack.different)))
         for groups, rows, starts in _in_chunks(self.group):
@@ -211,7 +212,7 @@ class Grouped:
         return [equations_of(found)]
 
     def products(self, tau: float, along: list[Array], plain: Array) -> Array:
-        """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
+        """Gram matrix Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
         weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
         found = plain.copy()
         for part in chunks(len(weight)):
@@ -227,7 +228,7 @@ class Grouped:
         return float((tau**2 * self.value / (1.0 + tau**2 * self.value)).sum())
 
     def whitened(self, tau: float, stack: Array) -> Array:
-        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
+        """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K)."""
         value = self.value.ravel()
         power = np.expm1(-0.5 * np.log1p(tau**2 * value)) / np.maximum(value, settings.SMOOTH_FLOOR)
         return np.asarray(
@@ -235,14 +236,14 @@ class Grouped:
         )
 
     def mean(self, tau: float, left: Array) -> Array:
-        """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
+        """Posterior mean (N, m) of the discrepancy, given the (E,) residual of the rows in use, in noise units."""
         weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
         inner = weight[:, None] * self.along(left[:, None])[0]
         rows = len(self.groups), self.everywhere.shape[1]
         return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
 
     def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
-        """Return SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken <.discrepancy.Smooth.taken>`."""
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken <.discrepancy.Smooth.taken>`."""
         heard = tau**2 * self.value > floor
         unit = self.vector * np.where(heard, 1.0 / np.sqrt(np.where(heard, self.value, 1.0)), 0.0)[:, None, :]
         tight = 1.0 / np.where(heard, tau**2 * self.value, 1.0)
@@ -257,13 +258,13 @@ class Grouped:
         return found
 
     def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:
-        """Return B times (G c, K) in the eigenvectors of the groups."""
+        """Product of B with (G c, K) in the eigenvectors of the groups."""
         turned = self.vector @ inner.reshape(*self.value.shape, inner.shape[1])
         return np.asarray((moves @ turned[group]).reshape(shape))
 
 
 def _in_chunks(group: Labels) -> Iterator[tuple[Labels, Labels, Labels]]:
-    """Yield groups by the thousand: which they are, the numbers of their rows, and where in these each group starts."""
+    """Yield groups in chunks: the groups, their row numbers, and where in these each group starts."""
     order = np.argsort(group, kind="stable")
     starts = np.flatnonzero(np.diff(group[order], prepend=-1))
     for part in chunks(len(starts)):
@@ -273,7 +274,7 @@ def _in_chunks(group: Labels) -> Iterator[tuple[Labels, Labels, Labels]]:
 
 
 def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:
-    """(count, ...) sums of what belongs to each group."""
+    """Return the sums (count, ...) over each group."""
     found = np.zeros((count, *each.shape[1:]))
     order = np.argsort(group, kind="stable")
     first = np.flatnonzero(np.diff(group[order], prepend=-1))
@@ -284,7 +285,7 @@ def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One form of the discrepancy: K = B Bᵀ over all rows, B the products of functions and moves.
+    """Kernel of the discrepancy: K = B Bᵀ over all rows, B the products of functions and displacements.
 
     ``functions`` (N, k) are smooth in what is commanded and recorded; of a form that is ``anew`` (N,) the number of
     each pose or visit. ``moves`` (N, m, c) or, the same for all rows, (m, c): displacement of the target by each
@@ -301,22 +302,22 @@ class Form:
 
     @property
     def words(self) -> frozenset[str]:
-        """What it is: the words of its name, as several joints have no order."""
+        """Name of the kernel in words; the order of several joints does not matter."""
         return frozenset(self.name.split(", "))
 
     @property
     def several(self) -> bool:
-        """Whether several joints err in it."""
+        """Whether several joints err in this kernel."""
         return bool(self.further)
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints that err in it; empty where it enters elsewhere."""
+        """Names of the joints that err in this kernel; empty where it enters elsewhere."""
         kind, name = self.place
         return (name, *self.further) if kind == "joint" else ()
 
     def over(self, relative: Array | None) -> Form:
-        """Return the form with what each row sees of it over the row's relative noise (N, m), ``None`` for all one."""
+        """Kernel with each row divided by its relative noise (N, m); ``None`` if all are one."""
         if relative is None:
             return self
         if not self.anew and bool((relative == relative[:, :1]).all()):
@@ -325,7 +326,7 @@ class Form:
         return replace(self, moves=self.moves / (relative[0, :, None] if alike else relative[:, :, None]))
 
     def beside(self, other: Form, part: float) -> Form:
-        """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
+        """Kernel with one more joint, whose rms is a part of that of all joints so far."""
         length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
         moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
         joint = other.place[1]
@@ -334,21 +335,21 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use."""
+    """Covariance 1 + τ²BBᵀ of the rows in use, in units of the noise."""
 
     spectrum: Spectrum | Grouped
     tau: float
 
     def products(self, stack: Array) -> Array:
-        """Return Sᵀ (1 + τ²BBᵀ)⁻¹ S of (E, K) columns S."""
+        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S of (E, K) columns S."""
         return self.spectrum.products(self.tau, self.spectrum.along(stack), stack.T @ stack)
 
     def whitened(self, stack: Array) -> Array:
-        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns; dearer than :meth:`products`."""
+        """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K); slower than :meth:`products`."""
         return self.spectrum.whitened(self.tau, stack)
 
     def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
+        """Reduction SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
 
         ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
         """
@@ -361,17 +362,17 @@ class Smooth:
 
     @property
     def degrees(self) -> float:
-        """How many equations the discrepancy follows: the trace of its smoother."""
+        """Degrees of freedom of the smoother: its trace."""
         return self.spectrum.degrees(self.tau)
 
     def mean(self, left: Array) -> Array:
-        """(N, m) posterior mean of the discrepancy, in noise, of the (E,) residual in use, whitened as independent."""
+        """Posterior mean (N, m) of the discrepancy, in units of the noise, given the whitened residual (E,)."""
         return self.spectrum.mean(self.tau, left)
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One form on the rows in use, ready for every size τ: one Cholesky factor a size, and no (E, M) array.
+    """Decomposed kernel on the rows in use for every amplitude τ: one Cholesky factor each, no (E, M) array.
 
     With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity, Sᵀ(1 + τ²BBᵀ)⁻¹S =
     SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|. The (m, m) orthonormal ``axes`` are
@@ -388,7 +389,7 @@ class Spectrum:
 
     @classmethod
     def of(cls, form: Form, weights: Array, noise: Array) -> Spectrum:
-        """Scale a form to a mean of one on its diagonal, in units of the noise."""
+        """Scale a kernel to unit mean diagonal, in units of the noise."""
         used = np.flatnonzero(weights > 0)
         moves = form.moves / noise[:, None]
         weight = (form.functions**2).sum(axis=1) if moves.ndim == 3 else (form.functions**2).sum(axis=1).mean()
@@ -406,7 +407,7 @@ class Spectrum:
         return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
 
     def along(self, stack: Array | Stack) -> list[Array]:
-        """Return BᵀS of each part, or, where B is wide, the part's rows of S; S the columns that differ."""
+        """Product BᵀS of each part, or, where B is wide, the part's rows of S; S the distinct columns."""
         stack = stack if isinstance(stack, Stack) else Stack.around(stack, len(self.axes))
         found = [np.zeros((len(own), len(stack.different))) for own in self.own]
         for chunk, rows in stack.chunks() if stack.different else ():
@@ -419,26 +420,26 @@ class Spectrum:
         return found
 
     def apart(self, rows: Array) -> list[Array]:
-        """Split (n, m, K) columns into those of each part."""
+        """Split (n, m, K) columns by part."""
         if len(self.parts) == 1:
             return [rows]
         return [np.einsum("a,nak->nk", axis, rows)[:, None] for axis in self.axes.T]
 
     def joined(self, rows: list[Array]) -> Array:
-        """Put back together what :meth:`apart` split: (n, m, K)."""
+        """Inverse of :meth:`apart`: (n, m, K)."""
         if len(self.parts) == 1:
             return rows[0]
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
 
     def back(self, parts: Sequence[Part], inner: Sequence[Array]) -> Array:
-        """(n, m, K) B times (c k, K) of each part."""
+        """Product (n, m, K) of B with (c k, K) of each part."""
         found = np.empty((len(parts[0].used), len(self.axes), inner[0].shape[1]))
         for chunk in chunks(len(found)):
             found[chunk] = self.joined([part.times(own, chunk) for part, own in zip(parts, inner, strict=True)])
         return found
 
     def factor(self, tau: float, k: int) -> Array:
-        """Cholesky factor of 1 + τ² times a part's own matrix, made once."""
+        """Cholesky factor of 1 + τ² times a part's own matrix, cached."""
         if (tau, k) not in self.factors:
             matrix = self.own[k] * tau**2
             matrix.ravel()[:: len(matrix) + 1] += 1.0
@@ -446,7 +447,7 @@ class Spectrum:
         return self.factors[tau, k]
 
     def decomposed(self, k: int) -> tuple[Array, Array]:
-        """Eigenvalues and vectors of a part's own matrix, made once."""
+        """Eigenvalues and eigenvectors of a part's own matrix, cached."""
         if k not in self.vectors:
             value, vector = np.linalg.eigh(self.own[k])
             self.vectors[k] = np.maximum(value, 0.0), vector
@@ -458,7 +459,7 @@ class Spectrum:
         return float(sum(2.0 * np.log(np.diag(factor)).sum() for factor in factors))
 
     def products(self, tau: float, along: list[Array], plain: Array) -> Array:
-        """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
+        """Gram matrix Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
         found = plain.copy()
         for k, (part, own) in enumerate(zip(self.parts, along, strict=True)):
             solved, _ = dtrtrs(self.factor(tau, k), own, lower=1)
@@ -467,14 +468,14 @@ class Spectrum:
         return found
 
     def spread(self, tau: float, stack: Array) -> Array:
-        """Return Sᵀ(1 + τ²BBᵀ)S of (E, K) columns S."""
+        """Gram matrix Sᵀ(1 + τ²BBᵀ)S of (E, K) columns S."""
         found = stack.T @ stack
         for part, own, along in zip(self.parts, self.own, self.along(stack), strict=True):
             found += tau**2 * (along.T @ own @ along if part.wide else along.T @ along)
         return np.asarray(found)
 
     def whitened(self, tau: float, stack: Array) -> Array:
-        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
+        """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K)."""
         found = []
         for k, (part, along) in enumerate(zip(self.parts, self.along(stack), strict=True)):
             value, vector = self.decomposed(k)
@@ -490,7 +491,7 @@ class Spectrum:
         return stack + self.back(self.parts, found).reshape(stack.shape)
 
     def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
-        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        """Eigendecomposition τ²BBᵀ = U diag(d) Uᵀ: U (E, r) orthonormal, d (r,) above a floor."""
         found, variance = [], []
         m = len(self.axes)
         for k, part in enumerate(self.parts):
@@ -508,7 +509,7 @@ class Spectrum:
         return np.concatenate(found, axis=1), np.concatenate(variance)
 
     def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Return SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken`."""
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken`."""
         basis, variance = self.eigen(tau, floor)
         columns = white(np.flatnonzero(rows))
         own = basis[np.repeat(rows, len(self.axes))]
@@ -516,12 +517,12 @@ class Spectrum:
         return np.asarray(along.T @ np.linalg.solve(np.diag(1.0 / variance) + own.T @ own, along))
 
     def degrees(self, tau: float) -> float:
-        """Trace of the smoother."""
+        """Degrees of freedom of the smoother: its trace."""
         factors = [self.factor(tau, k) for k in range(len(self.parts))]
         return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
 
     def mean(self, tau: float, left: Array) -> Array:
-        """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
+        """Posterior mean (N, m) given the (E,) residual of the rows in use, in units of the noise."""
         found = []
         for k, (part, along) in enumerate(zip(self.parts, self.along(left[:, None]), strict=True)):
             solved = dpotrs(self.factor(tau, k), along, lower=1)[0]
@@ -532,7 +533,7 @@ class Spectrum:
 
 
 def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
-    """Make a form ready for every size: scaled to a mean of one on K's diagonal, in units of the noise."""
+    """Decompose a kernel for every amplitude: unit mean diagonal, in units of the noise."""
     if not form.anew:
         return Spectrum.of(form, weights, noise)
     moves = np.broadcast_to(form.moves, (len(form.functions), *form.moves.shape[-2:]))
@@ -541,7 +542,7 @@ def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
 
 def forms(observations: Observations) -> tuple[Form, ...]:
     """Return the forms of the discrepancy that a campaign allows."""
-    measures = 6 if observations.campaign.measures == "pose" else 3
+    measures = components(observations.campaign)
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
     found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
@@ -560,7 +561,7 @@ def forms(observations: Observations) -> tuple[Form, ...]:
 
 
 def _at_one_place(observations: Observations, what: str, functions: Array, measures: int, *, anew: bool) -> list[Form]:
-    """Return a form for each joint that moves, and one for the base, with the same functions (N, k)."""
+    """Kernels with the same functions (N, k): one for each joint that moves, and one for the base."""
     moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
     seen = np.flatnonzero(moving(observations.q))
     found = [Form(f"{what}, {names[j]}", functions, moves[:, :, [j]], anew, ("joint", names[j])) for j in seen]
@@ -569,7 +570,7 @@ def _at_one_place(observations: Observations, what: str, functions: Array, measu
 
 
 def _together(observations: Observations) -> list[Array]:
-    """(N, M) features of a squared exponential of joints and conditions, by length scale (Nyström, even landmarks)."""
+    """Nyström features (N, M) of a squared-exponential kernel of joints and conditions, by length scale."""
     campaign = observations.campaign
     varying = [observations.covariates[c] for c in observations.covariates if observations.varies(c)]
     inputs = np.column_stack([campaign.q[:, moving(campaign.q)], *varying])
@@ -586,7 +587,7 @@ def _together(observations: Observations) -> list[Array]:
 
 
 def _moves(observations: Observations, measures: int) -> Array:
-    """(N, m, c) what a unit error in each joint, and in each component at the base and the tool, does to the target."""
+    """Displacement (N, m, c) of the target by a unit error in each joint, and in base and tool components."""
     joints = observations.joint_sensitivity[:, :measures] * settings.ERROR_AT_JOINT
     base = observations.base_sensitivity[:, :measures] * settings.ERROR_ELSEWHERE
     tool = observations.tool_sensitivity[:, :measures, :measures] * settings.ERROR_ELSEWHERE
@@ -594,7 +595,7 @@ def _moves(observations: Observations, measures: int) -> Array:
 
 
 def _spectral(values: Array) -> Array:
-    """(N, K) cosines of a quantity over its range, their amplitudes those of an integrated Wiener process (1/k²)."""
+    """Cosines (N, K) of a quantity over its range, with the amplitudes 1/k² of an integrated Wiener process."""
     u = (values - values.min()) / max(float(np.ptp(values)), settings.TINY)
     order = np.arange(1, min(settings.COSINES, len(np.unique(values)) - 1) + 1)
     return np.asarray(np.cos(np.pi * order * u[:, None]) / order**2)

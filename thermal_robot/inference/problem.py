@@ -1,4 +1,4 @@
-"""The linear problem that all combinations of effects share, and its Gram matrix for any rows and weights."""
+"""Linear problem of all candidate columns, and its normal equations for any rows and weights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from thermal_robot.inference.kernels import Smooth, Stack
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """gap ≈ F f + Σ_b X_b θ_b + noise, in the root frame's axes: gap (N, m), m and rad, frames F (N, m, f).
+    """Linear model gap ≈ F f + Σ_b X_b θ_b + noise, root frame axes: gap (N, m), m and rad, frames F (N, m, f).
 
     Values that were already applied are added back to the gap, so that θ is the whole value.
     """
@@ -33,23 +33,23 @@ class Linear:
 
     @property
     def measures(self) -> int:
-        """Components a row: 3 for positions, 6 for poses."""
+        """Components m of a row: 3 for positions, 6 for poses."""
         return int(self.gap.shape[1])
 
     @property
     def columns(self) -> Iterator[Array]:
-        """(N, m, ·) frames, each block's columns, gap, one after another."""
+        """Columns (N, m, ·) of frames, blocks and gap, one after another."""
         yield self.frames
         yield from (b.columns for b in self.blocks)
         yield self.gap[:, :, None]
 
     @cached_property
     def stack(self) -> Array:
-        """(N, m, f + P + 1) all columns in one array."""
+        """All columns in one array (N, m, f + P + 1)."""
         return self.rows(np.arange(len(self.gap)))
 
     def rows(self, rows: NDArray[np.int64]) -> Array:
-        """(n, m, f + P + 1) all columns of some rows, never held twice."""
+        """All columns (n, m, f + P + 1) of some rows, not cached."""
         width = self.frames.shape[2] + sum(len(b.sizes) for b in self.blocks) + 1
         found, start = np.empty((len(rows), self.measures, width)), 0
         for columns in self.columns:
@@ -58,16 +58,17 @@ class Linear:
         return found
 
     def contribution(self, block: int, values: Array) -> Array:
-        """(N, m) what a block's parameter values do to the gap."""
+        """Displacement (N, m) of the gap by a block's parameter values."""
         return np.asarray(self.blocks[block].columns @ values)
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Weight of each row (N,), 0 where it is not used, else up to 1, and noise (m,) of each component, m and rad.
+    """Row weights (N,), 0 where not used, else up to 1, and noise (m,) of each component, m and rad.
 
     ``held``: degrees of freedom of the noise's prior, 0 where none is stated. ``smooth``: the correlated part of the
-    rows' covariance. ``relative`` (N, m): noise of each figure over that of its component.
+    rows' covariance. ``relative`` (N, m): noise of each figure over that of its component. ``seen`` (N, m/3): how many
+    components of its place and turn a row sees, ``None`` for all in all rows.
     """
 
     weights: Array
@@ -75,14 +76,24 @@ class Whitening:
     held: float
     smooth: Smooth | None = None
     relative: Array | None = None
+    seen: NDArray[np.int64] | None = None
+
+    @property
+    def unseen(self) -> int:
+        """How many components the rows in use do not see: they are no equations."""
+        return 0 if self.seen is None else int((3 - self.seen[self.weights > 0]).sum())
+
+    def figures(self, measures: int) -> NDArray[np.int64] | int:
+        """Return how many figures a row has: (N,) where rows differ."""
+        return measures if self.seen is None else np.maximum(self.seen.sum(axis=1), 1)
 
     def sigma(self, rows: NDArray[Any] | slice = slice(None)) -> Array:
-        """(n, m) one sigma of each figure of some rows, m and rad; (1, m) where all rows are alike."""
+        """One sigma (n, m) of each component of some rows, m and rad; (1, m) where all rows are alike."""
         return self.noise[None] if self.relative is None else self.noise * self.relative[rows]
 
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
-    """Form the normal equations, project the frames out, and reduce each block to what the data determine of it."""
+    """Return normal equations: frames projected out, each block reduced to the directions that the data determine."""
     if whitening.smooth is None:  # rows are then apart, and never all held at once
         stack = white_stack(Stack.of(linear.columns), whitening)
         return normal_equations(linear, whitening, stack.products(), stack.equations)
@@ -91,7 +102,7 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
 
 
 def white_stack(stack: Stack, whitening: Whitening) -> Stack:
-    """Return the columns over the rows with weight, in units of noise, a discrepancy left aside."""
+    """Columns over the rows with weight, in units of the noise, without the discrepancy."""
     used = np.flatnonzero(whitening.weights > 0)
     return stack.weighed(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
 
@@ -99,7 +110,7 @@ def white_stack(stack: Stack, whitening: Whitening) -> Stack:
 def normal_equations(
     linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None
 ) -> Gram:
-    """Project the frames out of the products of all columns, and reduce each block, or take the reduction of ``like``.
+    """Return the normal equations from the Gram matrix of all columns; ``like`` gives the reduction of each block.
 
     ``full`` (f + P + 1, f + P + 1) are the products of the whitened columns.
     """
@@ -122,7 +133,7 @@ def normal_equations(
         _positive(linear, bases),
         ranks,
         np.array([b.spread for b in linear.blocks]),
-        equations - known.shape[1],
+        equations - whitening.unseen - known.shape[1],
         whitening.held,
         -0.5 * (log_det + (whitening.smooth.log_det if whitening.smooth else 0.0)),
         np.array([b.largest_scale for b in linear.blocks]),
@@ -130,9 +141,9 @@ def normal_equations(
 
 
 def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[int, ...]]:
-    """Return for each block the directions that the data see, and how many they are.
+    """Directions of each block that the data determine, and their number.
 
-    Where a parameter of it cannot be negative, each parameter that the data see is a direction by itself.
+    In a block with non-negative parameters, each determined parameter is its own direction.
     """
     bases, ranks, parameter = [], [], 0
     for item in linear.blocks:
@@ -152,13 +163,13 @@ def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array,
 
 
 def _positive(linear: Linear, bases: Sequence[Array]) -> NDArray[np.bool_]:
-    """(D,) which reduced columns cannot be negative."""
+    """Mask (D,) of the reduced columns that cannot be negative."""
     pairs = zip(linear.blocks, bases, strict=True)
     return np.concatenate([*((item.positive @ basis).astype(bool) for item, basis in pairs), np.zeros(0, dtype=bool)])
 
 
 def _reduced(rows: Array, bases: Sequence[Array]) -> Array:
-    """(n, D) rows (n, P) over all parameters, those of each block times its basis."""
+    """Rows (n, D) in the reduced coordinates of each block, from rows (n, P) over all parameters."""
     result = np.empty((len(rows), sum(b.shape[1] for b in bases)))
     parameter, column = 0, 0
     for basis in bases:
@@ -169,36 +180,36 @@ def _reduced(rows: Array, bases: Sequence[Array]) -> Array:
 
 
 def _log_det(matrix: Array, rank: int) -> float:
-    """Return the logarithm of the product of the largest ``rank`` eigenvalues."""
+    """Logarithm of the product of the largest ``rank`` eigenvalues."""
     if not rank:
         return 0.0
     return float(np.log(np.linalg.eigvalsh(matrix)[-rank:]).sum())
 
 
 def whitened(linear: Linear, whitening: Whitening) -> Array:
-    """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
+    """Whitened design (rows·m, f + P + 1) of frames, parameters and gap, over the rows with weight."""
     used = np.flatnonzero(whitening.weights > 0)
     return _white(linear.rows(used), used, whitening)
 
 
 def whitened_columns(columns: Array, whitening: Whitening) -> Array:
-    """(rows·m, K) of columns (N, m, K) the rows with weight, in units of noise."""
+    """Whitened columns (rows·m, K) over the rows with weight."""
     used = np.flatnonzero(whitening.weights > 0)
     return _white(columns[used], used, whitening)
 
 
 def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array:
-    """Whiten columns (n, m, K) of the rows in use, in their place."""
+    """Whiten columns (n, m, K) of the rows in use, in place."""
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
     flat = equations_of(stack)
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
 
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
-    """Return the pairs of blocks of which the smaller lies, as far as the data can tell, in the span of the larger.
+    """Nested pairs of blocks: the smaller lies, as far as the data can tell, in the span of the larger.
 
-    The two are confounded and never named together. The smaller is preferred where it suffices; otherwise the larger
-    stands for both. One with parameters that cannot be negative does not span what its columns do: it contains none.
+    The two exclude each other; the smaller is preferred where it suffices. A block with non-negative parameters
+    contains none, as it does not span its columns.
     """
     matrix, slices = problem.matrix, problem.slices
     sizes = np.array(problem.ranks, dtype=int)
@@ -217,7 +228,7 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
 
 
 def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[int, tuple[Array, Array]]:
-    """Return for each block of a combination the (P,) posterior mode and (P, P) covariance of its parameters, SI.
+    """Posterior mode (P,) and covariance (P, P) of the parameters of each block of a combination, SI.
 
     Directions that the data do not see keep their prior variance.
     """
@@ -235,7 +246,7 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
 
 
 def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
-    """(f,) step of the unknown frames that fits the remainder, by least squares over the rows with weight."""
+    """Least-squares step (f,) of the unknown frames, over the rows with weight."""
     flat = linear.frames.shape[2]
     if not flat:
         return np.zeros(0)
@@ -245,7 +256,7 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
 
 
 def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
-    """(N, m) posterior mean of the discrepancy in a remainder; zero where there is none."""
+    """Posterior mean (N, m) of the discrepancy in a residual; zero without one."""
     if whitening.smooth is None:
         return np.zeros_like(remainder)
     used = np.flatnonzero(whitening.weights > 0)
@@ -272,10 +283,9 @@ def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
 
 
 class Products:
-    """Gram matrices of many selections of blocks with the same gap, frames and whitening.
+    """Memo of Gram matrices for many selections of blocks with the same gap, frames and whitening.
 
-    A block that takes the place of another costs its own columns and their products with the others. What is kept of a
-    block goes with it.
+    A block exchanged for another one costs its own products alone. The memo of a block is freed with it.
     """
 
     def __init__(self, linear: Linear, whitening: Whitening) -> None:
@@ -288,7 +298,7 @@ class Products:
         self._pairs: WeakKeyDictionary[Block, WeakKeyDictionary[Block, Array]] = WeakKeyDictionary()
 
     def problem(self, blocks: Sequence[Block]) -> tuple[Linear, Gram]:
-        """Return the linear problem of some blocks and its normal equations, as ``gram`` forms them."""
+        """Linear problem of some blocks and its normal equations, as ``gram`` forms them."""
         linear, flat = Linear(self._gap, self._frames, tuple(blocks)), self._frames.shape[2]
         ends = np.cumsum([flat, *(len(item.sizes) for item in blocks)]).tolist()
         spans = [slice(a, b) for a, b in pairwise(ends)]
@@ -306,7 +316,7 @@ class Products:
         return linear, normal_equations(linear, self._whitening, full, len(self._flat))
 
     def _pair(self, one: Block, other: Block) -> Array:
-        """Return the (P, Q) products of the columns of two blocks."""
+        """Cross products (P, Q) of the columns of two blocks."""
         for first, second in ((one, other), (other, one)):
             known = self._pairs[first].get(second) if first in self._pairs else None
             if known is not None:

@@ -1,12 +1,13 @@
-"""Registration: base and tool frames that are unknown are fitted before any effect, wherever the tracker stands.
+"""Registration: fit of the unknown base and tool frames, before any effect.
 
-From nothing, the rigid alignment of the base and the place of the target go by turns: each of the two is linear while
-the other is held, and a third of the rows may be grossly wrong. Starts go side by side, each until its own median
-distance settles: what one start finds does not depend on the others.
+The rigid alignment of the base and the linear fit of the target's place alternate, robust to a third of gross errors.
+Starts run side by side, each until its own median distance converges, independently of the others.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import permutations, product
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -14,24 +15,34 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.names import POSITION
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
-from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
+from thermal_robot.observables import instrument_rows, tool_width
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
 
+CUBE = [
+    np.asarray(turn)
+    for axes in permutations(np.eye(3))
+    for signs in product((1.0, -1.0), repeat=3)
+    if np.linalg.det(turn := np.array(axes) * np.array(signs)[:, None]) > 0.0
+]
+"""The 24 turns of a cube: no turn is farther than 63° from the next of them."""
+
 
 class Placed(NamedTuple):
-    """Where the robot stands and the target sits: (..., 4, 4) each, for columns side by side."""
+    """Poses of base and target, (..., 4, 4) each, for data sets side by side."""
 
     base: Array
     tool: Array
 
 
 class Paired(Protocol):
-    """Commands paired with measurements, as a campaign holds them; see :class:`~thermal_robot.campaign.Campaign`."""
+    """Protocol of commands paired with measurements; see :class:`~thermal_robot.campaign.Campaign`."""
 
     @property
     def robot(self) -> Robot: ...  # noqa: D102
@@ -50,19 +61,19 @@ class Paired(Protocol):
 
 
 def starts(campaign: Paired) -> Array:
-    """(S, 3) shifts of the target, m, from which :func:`alternate` begins; the first is none."""
+    """Return the initial shifts (S, 3) of the target, m, for :func:`alternate`; the first is zero."""
     fixed = campaign.tool_known or campaign.simulated_position is not None
     return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
 
 
 def soft(distance: Array) -> Array:
-    """Cauchy weights of distances (..., N) at the scale of their median: a third of the rows may be grossly wrong."""
+    """Cauchy weights of distances (..., N) at the scale of their median, robust to a third of gross errors."""
     scale = settings.CAUCHY_SCALE * middle(distance)[..., None] + settings.UNSEEN
     return np.asarray(1.0 / (1.0 + (distance / scale) ** 2))
 
 
 def middle(values: Array) -> Array:
-    """(...) median along the last axis of finite values (..., N), as NumPy's, which spends most of its time on NaN."""
+    """Median (...) along the last axis of finite values (..., N); faster than NumPy's, which checks for NaN."""
     half, odd = divmod(values.shape[-1], 2)
     parted = np.partition(values, half if odd else (half - 1, half), axis=-1)
     return np.asarray(parted[..., half] if odd else 0.5 * (parted[..., half - 1] + parted[..., half]))
@@ -76,7 +87,7 @@ def alternate(
     some: NDArray[np.int64] | slice = slice(None),
     poses: Array | None = None,
 ) -> tuple[Array, Placed]:
-    """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
+    """Robust registration by alternation: rigid alignment of the base, then linear fit of the target's place.
 
     Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front
     (..., N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...)
@@ -91,7 +102,7 @@ def alternate(
         origin, turns = poses[..., :3, 3], poses[..., :3, :3]
 
     def repeated(own: Array, axes: int) -> Array:
-        """(S, ...) columns side by side, each as often as there are targets; as they are where none are in front."""
+        """Return the data repeated (S, ...) for each start; unchanged without leading axes."""
         if not lead:
             return own
         shape = own.shape[own.ndim - axes :]
@@ -111,7 +122,7 @@ def alternate(
 
 
 def _turn(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
-    """(..., 3, 3) turn of the target on the tool frame: the weighted mean (..., N) of what each row says."""
+    """Weighted mean rotation (..., 3, 3) of the target on the tool frame, weights (..., N)."""
     seen = turns.swapaxes(-1, -2) @ base[..., None, :3, :3].swapaxes(-1, -2) @ measured
     u, _, vt = np.linalg.svd(np.einsum("...n,...nij->...ij", weights, seen))
     upright = np.ones(u.shape[:-1])
@@ -128,7 +139,7 @@ def _alternated(
     known: tuple[bool, bool],
     rounds: int,
 ) -> tuple[Array, Array, Array, Array]:
-    """Alternate S starts side by side: bases (S, 4, 4), places of the target (S, 3), weights (S, N), medians (S,).
+    """Alternation from S starts side by side: bases (S, 4, 4), targets (S, 3), weights (S, N), medians (S,).
 
     Measured points and origins (N, 3) and turns (N, 3, 3) of the tool frame are those of all starts, or have the S in
     front; ``known``: base and tool.
@@ -157,14 +168,14 @@ def _alternated(
 
 
 def _predicted(origin: Array, turns: Array | None, place: Array) -> Array:
-    """(S, N, 3) origin and place in the root frame, or what the simulator says."""
+    """Predicted target (S, N, 3) in the root frame, or the simulator's prediction."""
     if turns is None:
         return np.broadcast_to(origin, (len(place), *origin.shape[-2:]))
     return np.asarray(origin + (turns @ place[:, None, :, None])[..., 0])
 
 
 def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:
-    """Fit the unknown frames to the nominal robot, and nothing else; known ones stay as declared.
+    """Register the unknown frames at the nominal robot; known frames stay as declared.
 
     Alternates the rigid alignment of the base with the linear fit of the target's place, from several starts (the
     target may sit 0.3 m from the tool frame), on a sample of the rows, robustly; then Gauss-Newton on all rows, or by
@@ -177,29 +188,70 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
 
 
 def frames_known(campaign: Campaign) -> bool:
-    """Tell whether no frame has to be fitted: both are declared, or a simulator holds the tool."""
+    """Tell whether nothing has to be fitted: both frames are declared, or a simulator holds the tool."""
+    if campaign.position is None and campaign.measured and unknown_frames(campaign):
+        return False
     return campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None)
 
 
 def found_frames(campaign: Campaign) -> Frames:
-    """Find the unknown frames to where they are nearly linear; :class:`EstimationError` below three rows."""
+    """Return the initial registration, close enough to linearise; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
+    if campaign.position is None:
+        return _turned(campaign, _found_by_instrument(campaign, frames))
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     some = np.linspace(0, rows - 1, min(rows, settings.START_ROWS)).astype(np.int64)
     return Frames(*alternate(campaign, frames, frames.tool[:3, 3] + starts(campaign), some=some)[1])
 
 
+def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
+    """Find the base by those rows that an instrument measured; where there are none it stands as declared."""
+    rows = np.flatnonzero(instrument_rows(campaign))
+    if campaign.base_known or len(rows) < 3:
+        return frames
+    some, places = campaign.take(rows), np.column_stack([campaign.readings[axis][rows] for axis in POSITION])
+    found = found_frames(replace(some, position=places, readings={}))
+    return found if not campaign.tool_known else replace(found, tool=frames.tool)
+
+
+def _turned(campaign: Campaign, frames: Frames) -> Frames:
+    """Find how the target is turned on the tool, where that matters: by the turn of a cube that leaves least."""
+    if campaign.tool_known or tool_width(campaign) == 3:
+        return frames
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
+    some, found = campaign.take(rows), list[tuple[float, Frames]]()
+    for turn in CUBE:
+        tool = frames.tool.copy()
+        tool[:3, :3] = turn
+        begun = replace(frames, tool=tool)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            found.append((_away(some, begun), begun))
+    nearest = sorted(found, key=lambda one: one[0])[: settings.TURNS_TRIED]
+    tried = [refined_frames(some, begun, robust=True) for _, begun in nearest]
+    best = min(tried, key=lambda one: _away(some, one))
+    return replace(best, artefacts={})
+
+
+def _away(campaign: Campaign, frames: Frames) -> float:
+    """Return the median distance that frames leave, m; infinite where it is no number."""
+    distance = float(np.median(np.linalg.norm(observe(campaign, frames).gap, axis=1)))
+    return distance if np.isfinite(distance) else np.inf
+
+
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
     """Return the frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
-    base_step, tool_step = (step[np.array(names, dtype=object) == name] for name in ("base", "tool"))
+    own = np.array(names, dtype=object)
+    base_step, tool_step = (step[own == name] for name in ("base", "tool"))
+    shared = {name: each for name, each in frames.artefacts.items() if name in names}
+    artefacts = {name: each.moved(step[own == name]) for name, each in shared.items()}
     base = frames.base @ exp6(base_step) if base_step.size else frames.base
     turn = exp6(np.concatenate([tool_step, np.zeros(6 - tool_step.size)])) if tool_step.size else np.eye(4)
-    return Frames(base, turn @ frames.tool)
+    return Frames(base, turn @ frames.tool, {**frames.artefacts, **artefacts})
 
 
 def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
-    """Gauss-Newton on position and orientation, each at the scale of its own median; noisier rows count less."""
+    """Gauss-Newton registration of positions and orientations, each scaled by its median; noisy rows weigh less."""
     relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
     for _ in range(settings.START_ROUNDS):
         observations = observe(campaign, frames)
@@ -212,7 +264,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
-        frames = moved(frames, step, names)
+        frames = moved(observations.frames, step, names)
         if np.abs(step).max() < settings.ROUNDING:
             break
     return frames

@@ -1,4 +1,4 @@
-"""Variance components of a residual (REML): which joints scatter beside the instrument, by visit or by pose.
+"""Variance components of a residual (REML): scatter of the joints beside the instrument, by visit or by pose.
 
 Told from it are errors that follow a smooth law, by F tests, and the steps of an encoder, by their likelihood ratio.
 """
@@ -26,6 +26,7 @@ from thermal_robot.inference.grouping import repeated_poses
 from thermal_robot.inference.problem import Linear, generalised
 from thermal_robot.inference.screening import Target, smooth_columns
 from thermal_robot.inference.weights import distance_limit
+from thermal_robot.observables import of_model
 
 Component = tuple[str, int]
 """Anew at each ``visit`` or once a commanded ``pose``, and the number of a joint."""
@@ -35,7 +36,7 @@ _GRID = np.log(settings.VARIANCE_GRID)
 
 @dataclass(frozen=True, eq=False)
 class IndependentRows:
-    """Residual as R independent rows, in units of the noise: contrasts within each pose, and √k times its mean.
+    """Residual as R independent rows, in units of the noise: Helmert contrasts within each pose, √k times its mean.
 
     ``columns`` (R, m, n) are the effects of the joints, of unit mean square by division by ``lever`` (n,); ``repeats``
     (R,) is k for a mean, 0 for a contrast.
@@ -48,12 +49,12 @@ class IndependentRows:
 
     @property
     def contrasts(self) -> int:
-        """Number of rows that compare visits of one pose."""
+        """Number of contrasts between visits of one pose."""
         return int((self.repeats == 0).sum())
 
 
 def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], freedom: int) -> IndependentRows:
-    """Turn the visits of each pose into independent rows: Helmert's contrasts among them, and their mean.
+    """Helmert transform of the visits of each pose: contrasts among them, and their mean.
 
     With one Jacobian J for the k visits of a pose, the contrasts have the covariance Σ + J Λ_v Jᵀ, and √k times their
     mean has Σ + J (Λ_v + k Λ_u) Jᵀ (Searle, Casella, McCulloch, *Variance Components*, 1992, ch. 3). Parameters that
@@ -81,7 +82,7 @@ def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], fre
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Mode of the posterior density of the variances of some components, and its logarithm there (``value``).
+    """Posterior mode of the variances of some components, and the log density there (``value``).
 
     ``logs``: of variances over squares of the noise: instrument (one for every three axes), what visits of a pose have
     in common from no joint (where there are repeats), then the components; ``spread`` is their covariance.
@@ -97,7 +98,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Restricted likelihood of rows; ``stated`` says for every three axes whether the noise is stated.
+    """Restricted likelihood (REML) of rows; ``stated`` says for every three axes whether the noise is stated.
 
     ``tails``: degrees of freedom of Student's law in m dimensions (infinite: normal), of the model's covariance.
     """
@@ -108,11 +109,11 @@ class Likelihood:
 
     @property
     def nuisances(self) -> int:
-        """Number of variances that every model has."""
+        """Number of variances in every model."""
         return len(self.stated) + int(self.rows.contrasts > 0)
 
     def fit(self, components: tuple[Component, ...], start: Array | None = None, held: int | None = None) -> Fitted:
-        """Maximise the posterior density by Fisher scoring of the logarithms of variances, one of them ``held``."""
+        """Maximise the posterior density by Fisher scoring in log variances, one of them ``held``."""
         at = self.density(components)
         logs = self._start(len(components)) if start is None else start
         free = np.arange(len(logs)) != held
@@ -133,7 +134,7 @@ class Likelihood:
         return Fitted(components, logs, value, covariance, np.asarray(np.linalg.inv(information), dtype=float))
 
     def density(self, components: tuple[Component, ...]) -> Callable[[Array], tuple[float, Array, Array, Array]]:
-        """Return the log posterior density of logarithms of variances, its slope, Fisher's information, covariances."""
+        """Log posterior density of log variances, its gradient, Fisher information and covariances."""
         rows, (factor, member) = self.rows, self._factors(components)
         m, turned = rows.values.shape[1], np.swapaxes(factor, 1, 2)
 
@@ -160,11 +161,10 @@ class Likelihood:
         return at
 
     def log_widths(self, fitted: Fitted) -> float:
-        """Logarithm of posterior over prior width, summed over all variances but the instrument's.
+        """Log ratio of posterior to prior width, summed over all variances but the instrument's.
 
-        A priori the logarithm of each is anywhere on the grid. Laplace's width where the data determine it to a factor
-        of e; where they but bound it, the mean of the likelihood over the grid, as what is far below the noise is seen
-        by nothing.
+        The prior of each logarithm is uniform on the grid. Laplace's approximation where the data determine it to a
+        factor of e; where they only bound it, the mean of the likelihood over the grid.
         """
         grid, total, at = _GRID[::2], 0.0, self.density(fitted.components)
         for k in range(len(self.stated), len(fitted.logs)):
@@ -180,7 +180,7 @@ class Likelihood:
         return float(total)
 
     def screen(self, base: Fitted, candidates: tuple[Component, ...]) -> Array:
-        """(G, C) log posterior density with one more component of each variance of the grid, all else in proportion.
+        """Log posterior densities (G, C) with one more component at each variance of a grid, all else in proportion.
 
         A component adds a rank-one term to each covariance, so that inverse and determinant follow from those of
         ``base`` (Sherman and Morrison 1950).
@@ -209,7 +209,7 @@ class Likelihood:
         return np.repeat(logs, [len(self.stated), self.nuisances - len(self.stated), components])
 
     def _factors(self, components: tuple[Component, ...]) -> tuple[Array, Array]:
-        """(R, m, F) columns whose outer products, times variances, add up to a covariance; and (logs, F) which count.
+        """Columns (R, m, F) whose outer products, times variances, sum to the covariance; (logs, F) says which count.
 
         Each column has the variance of the group to which it belongs.
         """
@@ -228,7 +228,7 @@ class Likelihood:
         return np.concatenate(parts, axis=2), member.astype(float)
 
     def _prior(self, logs: Array) -> tuple[Array, Array, Array]:
-        """(...) log inverse χ² of the noise's variances (..., parts) about the stated ones; slope and information.
+        """Log inverse-χ² prior (...) of the noise variances (..., parts) about the stated ones; gradient, information.
 
         Bounded, as the noise may have been stated wrongly.
         """
@@ -239,7 +239,7 @@ class Likelihood:
         return value, np.where(near, -half * (1.0 - np.exp(-logs)), 0.0), np.where(near, half, 0.0)
 
     def _law(self, distance2: Array, logdet: Array) -> tuple[Array, Array]:
-        """Log density of rows at squared distances, normal or Student's, and the weight of each in the slope."""
+        """Log density of squared distances, normal or Student's, and the weight of each in the gradient."""
         m, dof = self.rows.values.shape[1], self.tails
         if np.isinf(dof):
             return -0.5 * (distance2 + logdet + m * np.log(2.0 * np.pi)), np.ones_like(distance2)
@@ -251,7 +251,7 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class JointScatter:
-    """Standard deviation of one joint's scatter, anew at each ``visit`` or once a commanded ``pose``.
+    """Standard deviation of one joint's scatter, drawn anew at each ``visit`` or once a commanded ``pose``.
 
     ``sigma`` with its 95 % interval (profile likelihood), rad or m.
     """
@@ -284,7 +284,7 @@ class Scatter:
     note: str = ""
 
     def chosen(self, kind: str) -> tuple[JointScatter, ...]:
-        """Return the components of one kind."""
+        """Components of one kind."""
         return tuple(c for c in self.components if c.kind == kind)
 
     def covariance(
@@ -294,7 +294,7 @@ class Scatter:
         without: int | None = None,
         visits: Array | float = 1.0,
     ) -> Array:
-        """(N, m, m) covariance of rows: N = diag(noise²) + Σ_j σ_j² J_j J_jᵀ over all joints, or all but one.
+        """Covariance (N, m, m) of rows, N = diag(noise²) + Σ_j σ_j² J_j J_jᵀ, over all joints or all but one.
 
         ``noise`` (m,), or (N, m) where it differs by row, takes the place of the estimated one. Of rows that are means
         over ``visits`` (N,) of a pose the variance of what comes anew at each visit is divided by their number.
@@ -312,7 +312,7 @@ class Scatter:
     def errors(
         self, joint: int, residual: Array, sensitivity: Array, visits: NDArray[np.int64] | None = None
     ) -> tuple[Array, Array]:
-        """(N,) error of one joint in each row, rad or m, and its variance from everything else.
+        """Estimated error (N,) of one joint in each row, rad or m, and its variance from everything else.
 
         Generalised least squares: (Jᵀ S⁻¹ r) / (Jᵀ S⁻¹ J) with S of the noise and the other joints. Where rows are
         means over ``visits`` (N,) of a pose, what comes anew at each visit averages out, what a pose brings does not: S
@@ -340,14 +340,14 @@ def variance_components(
     used: NDArray[np.bool_] | None = None,
     start: Sequence[Component] = (),
 ) -> Scatter:
-    """Estimate variance components (REML): how much each joint scatters, and how much the instrument.
+    """Variance components (REML): scatter of each joint, and of the instrument.
 
     Row i of pose p is r_i = e_i + J_i (u_p + v_i): e is the instrument's noise, v (``visit``) comes anew at each visit
     and u (``pose``) once a commanded pose. Evidence of a component is Laplace's in the logarithm of its standard
     deviation, which beforehand is anything between a tenth and a hundred times the noise, so that the bound at zero is
     infinitely far (Kass and Raftery, *Bayes Factors*, 1995, §4.1). Joints are added one by one while the posterior
-    grows; whatever was compared shares the probability. Without repeats u and v cannot be told apart: only ``pose`` is
-    asked for. Of very many rows, whole poses drawn at random stand for all.
+    grows; probabilities are over all sets compared. Without repeats u and v are confounded, and only ``pose`` is
+    estimated. Very many rows are represented by a random sample of whole poses.
 
     ``residual`` (N, m), m and rad, m = 3 or 6; ``sensitivity`` (N, m or 6, n), Jacobian of the joints at the target, in
     the same axes; ``noise`` (m,), held near that where ``stated``, for all or for every three axes; ``pose`` (N,),
@@ -393,7 +393,7 @@ def _check(residual: Array, sensitivity: Array, noise: Array) -> None:
 
 
 def enough_rows(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the numbers of the used rows, or of very many those of whole poses drawn at random."""
+    """Row numbers of all used rows, or of a random sample of whole poses where there are very many."""
     rows = np.flatnonzero(used)
     if len(rows) <= settings.ENOUGH_ROWS:
         return rows
@@ -405,7 +405,7 @@ def enough_rows(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[n
 
 @dataclass(eq=False)
 class _Search:
-    """Stepwise search for the most probable set of components."""
+    """Stepwise search for the most probable set of variance components."""
 
     likelihood: Likelihood
     chosen: tuple[Component, ...] = ()
@@ -416,7 +416,7 @@ class _Search:
         return ("visit", "pose") if self.likelihood.rows.contrasts else ("pose",)
 
     def fit(self, components: tuple[Component, ...]) -> tuple[Fitted, float]:
-        """Fit a set once, in the first order that was asked for; return it with its log evidence times prior."""
+        """Fit a set of components once; return it with its log evidence plus log prior."""
         key = frozenset(components)
         if key not in self.fits:
             fitted = self.likelihood.fit(components)
@@ -427,7 +427,7 @@ class _Search:
         return self.fit(components)[1]
 
     def _prior(self, components: tuple[Component, ...]) -> float:
-        """Log prior of joints, for each kind: that of an effect of joints (:func:`share_of_places`)."""
+        """Log prior of a set of joints for each kind (:func:`share_of_places`)."""
         n, at_work, total = len(self.likelihood.rows.lever), settings.PRIOR_PROBABILITY, 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
@@ -441,10 +441,10 @@ class _Search:
         return tuple((kind, j) for kind in self.kinds for j in seen if (kind, j) not in self.chosen)
 
     def run(self, start: Sequence[Component]) -> _Search:
-        """Climb from nothing, from a start, and where a joint scatters beside too large a noise down from all joints.
+        """Stepwise search from the empty set, from a start, and, if the noise stays too large, from all joints.
 
-        Of one variance alone, what visits have in common may pass for it; several that scatter alike may pass for a
-        larger noise, beside which none of them alone brings much.
+        The variance common to visits may imitate a single component; several similar ones may imitate a larger noise,
+        with which no single one gains much.
         """
         within = self._candidates()
         for begin in dict.fromkeys(((), tuple(c for c in start if c in within))):
@@ -464,7 +464,7 @@ class _Search:
         self.chosen = max(before, self.chosen, key=self._posterior)
 
     def _added(self) -> bool:
-        """Add the component that brings most, of those that promise most; tell whether one does."""
+        """Forward step: add the component with the largest gain; whether one was added."""
         candidates, (fitted, log_posterior) = self._candidates(), self.fit(self.chosen)
         gain = self.likelihood.screen(fitted, candidates).max(axis=0) - fitted.value
         likely = [k for k in np.argsort(-gain)[: settings.FULLY_TRIED] if gain[k] > settings.CONVINCING]
@@ -474,7 +474,7 @@ class _Search:
         return better
 
     def _revised(self) -> bool:
-        """Leave one component out, or move it to the other kind; keep the best of these sets if it is better."""
+        """Backward or exchange step: drop a component or change its kind; whether that improved the set."""
         others = [tuple(o for o in self.chosen if o != c) for c in self.chosen]
         moved = [(*rest, (k, c[1])) for rest, c in zip(others, self.chosen, strict=True) for k in self.kinds]
         others += [m for m in moved if len(set(m)) == len(m)]
@@ -506,7 +506,7 @@ class _Search:
         )
 
     def _probability(self, candidates: tuple[Component, ...], factors: Array) -> dict[str, float]:
-        """Share the probability among all sets that were compared, and those with one component more."""
+        """Posterior probability of each kind, over all sets compared and those with one component more."""
         models = {key: posterior for key, (_, posterior) in self.fits.items()}
         own = self._posterior(self.chosen) - self._prior(self.chosen)
         for candidate, factor in zip(candidates, factors.tolist(), strict=True):
@@ -519,7 +519,7 @@ class _Search:
         }
 
     def _interval(self, fitted: Fitted, place: int) -> tuple[float, float]:
-        """Logarithms of the variances at which the profile likelihood has dropped; ∓∞ where it does not drop."""
+        """Profile likelihood interval (95 %) of a log variance; ∓∞ where the likelihood does not drop."""
         estimate = fitted.logs[place]
         step = settings.SIGMAS_95 * float(np.sqrt(fitted.spread[place, place]))
         if len(self.likelihood.rows.columns) > settings.NORMAL_ROWS and step < 1.0:
@@ -548,7 +548,7 @@ Rows = NDArray[np.bool_]
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
-    """F test of each recorded quantity: name that which errors (K,) of weight 1/variance follow smoothly, or none.
+    """F test of each recorded quantity: name of the one that errors (K,) of weight 1/variance follow, or empty.
 
     The p-value is multiplied by their number (Bonferroni); a law must also explain a good part of the errors. ``pose``
     (K,): where errors are those within a pose, the mean of each was taken out of them.
@@ -567,9 +567,10 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
 
 @dataclass(frozen=True)
 class Steps:
-    """Distance of an encoder's steps, rad or m, and the log Bayes factor of steps over none.
+    """Step of an encoder, rad or m, and the log Bayes factor of quantisation against none.
 
-    Where none is seen the distance is what the errors' size implies, and the factor 0 where it cannot be asked.
+    Without visible steps the distance is that implied by the size of the errors; the factor is 0 where it cannot be
+    computed.
     """
 
     step: float
@@ -577,7 +578,7 @@ class Steps:
 
 
 def period(errors: Array, variance: Array, command: Array, step: float) -> Steps:
-    """Periodogram of a sawtooth: look for the distance of the only positions at which a joint stands, an encoder's.
+    """Periodogram of a sawtooth: distance of the lattice of positions at which an encoder lets a joint stand.
 
     The joint stands at the multiple of the step s, from a first position φ on, that is nearest to its command. Its
     error (K,) is then a sawtooth of the command, u s with u from -½ to ½, seen with its variance v and a slack of the
@@ -599,7 +600,7 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
 
 
 def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tuple[Array, Array]:
-    """Return frequencies, none where there are too many, and the log likelihood of steps of each, its mean over phase.
+    """Frequencies, none where there are too many, and the log likelihood of each, averaged over phase.
 
     All are in implied steps.
     """
@@ -624,7 +625,7 @@ def _normal(x: Array, mean: Array | float, variance: Array) -> Array:
 
 
 def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex128]:
-    """(K, H) Fourier coefficients, over the place of the first position, of each row's log likelihood; in steps.
+    """Fourier coefficients (K, H) of each row's log likelihood over the phase of the first position.
 
     Of the positions around a command the nearest is taken, up to the slack.
     """
@@ -637,7 +638,7 @@ def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex1
 
 
 def _sums(weights: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
-    """(H, count) Fourier sums Σ weight exp(-2π i k f place) of weights (K, H), k = 0…, at frequencies a width apart.
+    """Fourier sums (H, count) Σ weight exp(−2π i k f place) of weights (K, H), k = 0…, at equidistant frequencies.
 
     A frequency is a coarse one and a fine one, so that the sums are a product of two small matrices.
     """
@@ -652,10 +653,10 @@ def _sums(weights: NDArray[np.complex128], place: Array, lowest: float, width: f
 
 
 def stepped(log_factors: Iterable[float]) -> float:
-    """Posterior probability that joints which err anew from pose to pose do so by the steps of their encoders.
+    """Posterior probability that per-pose errors of the joints are quantisation by their encoders.
 
-    From the log Bayes factor of each joint, of which some steps may stay hidden. That later visits of a pose find the
-    same error does not tell steps.
+    From the log Bayes factor of each joint, allowing for steps that stay hidden. Repeatable errors alone are no
+    evidence of steps.
     """
     shown = np.log1p(-settings.STEPS_HIDDEN) + np.array(list(log_factors), dtype=float)
     return float(expit(np.logaddexp(shown, np.log(settings.STEPS_HIDDEN)).sum() - np.log(settings.RIVALS)))
@@ -663,7 +664,7 @@ def stepped(log_factors: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class Kept:
-    """A component that counts as scatter, and the step that an encoder would have, rad or m."""
+    """Variance component that is scatter, and the encoder step that it would imply, rad or m."""
 
     component: JointScatter
     step: float
@@ -671,12 +672,12 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class RandomGap:
-    """What is random in the gap beyond the instrument, by the variances of ``scatter``.
+    """Random part of the gap beyond the instrument, by the variance components of ``scatter``.
 
-    ``kept`` are its components that are scatter. ``explains_size``: no more is left than instrument and scatter allow,
-    by a χ² test (``p_value``); what poses bring counts where it is more probably an encoder's. By joint: ``steps``, the
-    log Bayes factor of steps of the command against errors that follow nothing, and ``laws``, the quantity that its
-    errors follow, so that they are no scatter. ``note`` says what limits the answer.
+    ``kept`` are its components that are scatter. ``explains_size``: the gap is no larger than instrument and scatter
+    allow, by a χ² test (``p_value``); per-pose errors count where they are more probably an encoder's. By joint:
+    ``steps``, the log Bayes factor of steps of the command against errors that follow nothing, and ``laws``, the
+    quantity that its errors follow, so that they are no scatter. ``note`` says what limits the answer.
     """
 
     kept: tuple[Kept, ...]
@@ -689,22 +690,25 @@ class RandomGap:
 
     @property
     def stepped(self) -> float:
-        """Probability that what poses bring is due to such steps."""
+        """Probability that the per-pose errors are quantisation by encoders."""
         return stepped(self.steps.values())
 
 
 def nothing_random(fit: Fit) -> RandomGap:
-    """Return the random gap of which nothing can be said."""
+    """Empty result, for a gap whose random part cannot be estimated."""
     noise = fit.explanation.whitening.noise
     return RandomGap((), False, 1.0, Scatter((), (), {}, noise, 0.0 * noise), {}, {})
 
 
 def random_gap(fit: Fit) -> RandomGap:
-    """Say which joints scatter beyond the instrument, anew at each visit or once a pose; without repeats these are one.
+    """Which joints scatter beyond the instrument, per visit or per pose; without repeats these are one kind.
 
     If a joint's errors follow a smooth law of a recorded quantity, they are no scatter. Errors of an encoder are a
     sawtooth of the command with the period √12 σ; without repeats only that separates its steps from wear.
     """
+    # what rows do not see would count as no scatter, and a model scatters nothing
+    if fit.explanation.whitening.seen is not None or of_model(fit.campaign):
+        return nothing_random(fit)
     e, observed, even = fit.explanation, fit.corrected, _even(fit)
     m = even.shape[1]
     gap, sensitivity = observed.gap / even, observed.joint_sensitivity[:, :m] / even[:, :, None]
@@ -742,9 +746,10 @@ def random_gap(fit: Fit) -> RandomGap:
 def _stands(
     estimate: Callable[..., Scatter], scatter: Scatter, gap: Array, sensitivity: Array, used: Rows
 ) -> tuple[Scatter, Rows, list[int]]:
-    """Ask whether scatter is seen without the few rows that speak most for it; scatter is in all rows.
+    """Sensitivity of the scatter to its few most influential rows: real scatter is in all rows.
 
-    Returns it, the rows that count, and the joints of which a few rows had told it: it is then that of the other rows.
+    Returns the scatter, the rows that count, and the joints whose scatter only a few rows supported; these rows are
+    then left out.
     """
     if not scatter.components:
         return scatter, used, []
@@ -761,7 +766,7 @@ def _stands(
 
 
 def _in_joints(fit: Fit) -> list[Component]:
-    """Return the kind and the joints of a discrepancy that is anew in every pose or visit."""
+    """Kind and joints of a per-pose or per-visit discrepancy."""
     form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
     if form is None or not form.anew:
         return []
@@ -770,7 +775,7 @@ def _in_joints(fit: Fit) -> list[Component]:
 
 
 def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None) -> Array:
-    """(P, ...) weighted mean of the rows of each pose."""
+    """Weighted mean (P, ...) of the rows of each pose."""
     weight = np.ones(len(number)) if weight is None else weight
     total = np.bincount(number, weight)
     sums = np.zeros((len(total), *values.shape[1:]))
@@ -779,10 +784,10 @@ def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None
 
 
 def _even(fit: Fit) -> Array:
-    """(N, m) what figures and sensitivities are divided by, so that all rows have the same noise.
+    """Divisors (N, m) that give all rows the same noise.
 
-    Of rows that repeat a pose it is their root mean square: what the pose brings then cancels in their contrasts, as it
-    must, and the mean square of a contrast stays that of the noise.
+    For repeats of a pose it is their root mean square, so that per-pose errors cancel in contrasts, whose mean square
+    stays that of the noise.
     """
     relative = fit.campaign.relative_noise
     if relative is None:
@@ -792,10 +797,10 @@ def _even(fit: Fit) -> Array:
 
 
 def _refitted(fit: Fit, scatter: Scatter, sensitivity: Array, used: Rows, even: Array) -> Array:
-    """(N, m) residual of generalised least squares: frames and explanation in the covariance of the scatter.
+    """Residual (N, m) of generalised least squares, with the scatter in the covariance.
 
-    If the noise were taken for the instrument's alone, a joint that scatters would pull the frames far off, and their
-    error would then count as scatter of the other joints.
+    With the instrument's noise alone, a scattering joint would bias the frames, and their error would count as scatter
+    of other joints.
     """
     e = fit.explanation
     blocks = [e.linear.blocks[b].columns * e.linear.blocks[b].sizes for b in e.best.blocks]
@@ -817,9 +822,9 @@ def _distance2(scatter: Scatter, gap: Array, sensitivity: Array) -> Array:
 def _judge(
     fit: Fit, scatter: Scatter, gap: Array, sensitivity: Array, pose: NDArray[np.int64], used: Rows, freedom: int
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Sort the components: those that follow a law, and scatter; with what speaks for steps of each joint.
+    """Classify components: those that follow a law, and scatter; with the evidence for encoder steps of each joint.
 
-    What was fitted took errors of the poses with it: a share of so many parameters in all that was measured of them.
+    The fitted parameters absorb a share of the per-pose errors: their number over that of the measurements.
     """
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
@@ -849,7 +854,7 @@ def _judge(
 def _within_poses(
     errors: Array, variance: Array, sigma: float, recorded: Mapping[str, Array], number: NDArray[np.int64]
 ) -> str:
-    """F test as :func:`followed`, of what errors (N,) of visits differ by from the mean of their pose."""
+    """F test as :func:`followed` of the deviations of visits, errors (N,), from the mean of their pose."""
     weight, repeated = 1.0 / (variance + sigma**2), np.bincount(number)[number] > 1
 
     def within(values: Array) -> Array:
@@ -860,7 +865,7 @@ def _within_poses(
 
 
 def _chance_of_size(distance2: Array, m: int, freedom: int) -> tuple[float, bool]:
-    """χ² test of squared distances (N,) of rows in their whole covariance; heavy tails reduce its degrees of freedom.
+    """χ² test of squared distances (N,) in the rows' covariance; heavy tails reduce its degrees of freedom.
 
     Returns the p-value, and whether the size is explained.
     """

@@ -1,4 +1,4 @@
-"""Screening: how much further columns would explain of a residual, and which law, entering where, explains it best.
+"""Screening of further columns against a residual: which law, entering where, explains it best.
 
 The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`gained`). Screened are
 laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
@@ -30,12 +30,13 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import robust_noise
+from thermal_robot.observables import components, seen_components
 from thermal_robot.observations import Observations
 
 
 @dataclass(frozen=True)
 class Worth:
-    """How much further columns explain beyond what was fitted: p-value of their F test, share, and gain.
+    """Score of further columns: p-value of their F test, share of the residual explained, and gain of log evidence.
 
     ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayes information
     criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, S₀ and S₁ the residual sums of squares without and with the k columns, ν the
@@ -63,14 +64,16 @@ def gained(total: Array | float, explained: Array | float, rank: Array | float, 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
+    """Residual to be explained: ``white`` (N·m,), the gap with a design projected out, in units of the noise.
 
-    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design;
+    ``unseen``: how many of the N·m components no row sees.
     """
 
     white: Array
     root: Array
     basis: Array
+    unseen: int = 0
 
     @classmethod
     def of(
@@ -80,37 +83,38 @@ class Target:
         trusted: NDArray[np.bool_] | None = None,
         relative: Array | None = None,
         like: Target | None = None,
+        seen: NDArray[np.int64] | None = None,
     ) -> Target:
-        """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
+        """Project a design (N, m, K) out of a gap (N, m), with Cauchy weights of the rows.
 
         Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
-        differs, ``relative`` (N, m) says how. Weights are found by iteration, or at once from those of a target that is
-        nearly ``like`` this one.
+        differs, ``relative`` (N, m) says how; where rows see fewer components, ``seen`` (N, m/3). Weights
+        are found by iteration, or at once from those of a target that is nearly ``like`` this one.
         """
         if relative is not None:
             like = None if like is None else replace(like, root=like.root * relative)
-            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like)
-            return cls(even.white, even.root / relative, even.basis)
-        found = _weighed(gap, design, gap if like is None else like.left, first=like is None)
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like, seen=seen)
+            return replace(even, root=even.root / relative)
+        found = _weighed(gap, design, gap if like is None else like.left, seen, first=like is None)
         for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
-            found = _weighed(gap, design, found.left)
+            found = _weighed(gap, design, found.left, seen)
         if trusted is not None and trusted.any():
-            noise = np.repeat(robust_noise(found.left), 3)
+            noise = np.repeat(robust_noise(found.left, seen=seen), 3)
             found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
-        return found
+        return found if seen is None else replace(found, unseen=int((3 - seen).sum()))
 
     @property
     def left(self) -> Array:
-        """(N, m) what is left of the gap, m and rad."""
+        """Residual (N, m), m and rad."""
         return self.white.reshape(self.root.shape) / self.root
 
     @property
     def freedom(self) -> int:
         """Residual degrees of freedom: equations less the rank of the design."""
-        return max(int(len(self.white) - self.basis.shape[1]), 1)
+        return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
     def worth(self, columns: Array) -> Worth:
-        """Return what further columns (N, m, K) explain; nothing where they would leave too few degrees of freedom."""
+        """Score of further columns (N, m, K); zero where they leave too few degrees of freedom."""
         whole = equations_of(columns * self.root[:, :, None])
         flat = without(whole, self.basis)
         # what is left of an exact alias of the design is rounding, no column
@@ -129,7 +133,7 @@ class Target:
         )
 
     def seat(self, moves: Array) -> Seat:
-        """Return the target seen from a place whose d components move the gap by (N, m, d) a unit."""
+        """Precomputed sums for laws at a place whose d components displace the target by (N, m, d) a unit."""
         own = moves * self.root[:, :, None]
         basis = self.basis.reshape(*self.root.shape, -1)
         return Seat(
@@ -141,10 +145,13 @@ class Target:
         )
 
 
-def _weighed(gap: Array, design: Array, left: Array, first: bool = False) -> Target:
+def _weighed(
+    gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
+) -> Target:
     """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
-    noise = np.repeat(robust_noise(left), 3)
-    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * left.shape[1])
+    noise = np.repeat(robust_noise(left, seen=seen), 3)
+    figures = left.shape[1] if seen is None else np.maximum(seen.sum(axis=1), 1)
+    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * figures)
     return _projected(gap, design, 1.0 / np.sqrt(1.0 + np.broadcast_to(far2, len(gap)))[:, None] / noise)
 
 
@@ -154,15 +161,15 @@ def _projected(gap: Array, design: Array, root: Array) -> Target:
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
-    """C laws of K functions each (C, N, K) with their products (C, N, K, K), computed once for all targets."""
+class LawStack:
+    """Batch of C laws of K functions each (C, N, K) with their products (C, N, K, K)."""
 
     laws: int
     stacks: tuple[tuple[list[int], Array, Array], ...]
 
     @classmethod
-    def of(cls, laws: Sequence[Array]) -> Alike:
-        """Put together laws, each with its (N, K) functions."""
+    def of(cls, laws: Sequence[Array]) -> LawStack:
+        """Stack laws, each given by its (N, K) functions, by their number of functions."""
         stacks = []
         for width in {law.shape[1] for law in laws}:
             which = [i for i, law in enumerate(laws) if law.shape[1] == width]
@@ -173,7 +180,7 @@ class Alike:
 
 @dataclass(frozen=True, eq=False)
 class Seat:
-    """A target seen from one place: what many laws there need, summed over the components of a row once.
+    """Sufficient statistics of a residual for all laws at one place, summed over the components of each row.
 
     A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
     without the design is then Σ_n φ_k φ_l W_n less that of their part in the design. In units of the noise: ``weight``
@@ -187,16 +194,16 @@ class Seat:
     total: float
     freedom: int
 
-    def gains(self, laws: Sequence[Array] | Alike) -> Array:
-        """Return the log evidence that laws gain (:attr:`Worth.gain`), each with its (N, K) functions."""
-        alike = laws if isinstance(laws, Alike) else Alike.of(laws)
+    def gains(self, laws: Sequence[Array] | LawStack) -> Array:
+        """Gain of log evidence of each law (:attr:`Worth.gain`), from its (N, K) functions."""
+        alike = laws if isinstance(laws, LawStack) else LawStack.of(laws)
         found = np.full(alike.laws, -np.inf)
         for which, functions, products in alike.stacks:
             found[which] = self._alike(functions, products)
         return found
 
     def _alike(self, functions: Array, products: Array) -> Array:
-        """(C,) the same of C laws of K functions each, (C, N, K), and these functions' products (C, N, K, K)."""
+        """Gain (C,) of C laws of K functions each, (C, N, K), with the products (C, N, K, K)."""
         laws, rows, k = functions.shape
         r, d, _ = self.design.shape
         summed = products.reshape(laws, rows, k * k).transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
@@ -210,7 +217,7 @@ class Seat:
 
 
 def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
-    """(C,) sums of squares that columns explain, and their ranks, from (C, K, K), (C, K) and squared lengths (C, K)."""
+    """Explained sums of squares (C,) and ranks, from Gram matrices (C, K, K), (C, K) and squared lengths (C, K)."""
     own = np.einsum("cii->ci", gram)
     # what is left of an exact alias of the design is rounding, no column
     kept = own > settings.ALIAS**2 * whole
@@ -237,7 +244,7 @@ __all__ = [
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
     """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
-    turns = observations.campaign.measures == "pose"
+    turns = components(observations.campaign) == 6
     robot = observations.robot
     places = {
         "joint": robot.joint_names,
@@ -267,7 +274,7 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 
 
 def law_of(observations: Observations, plain: Discovered, name: str, values: Array) -> Discovered:
-    """Return a law as a smooth one of a quantity (N,), or one of its levels."""
+    """Smooth law of a quantity (N,), or one of its levels where it has few values."""
     own = None if name in observations.covariates else observations.campaign.labels.get(name)
     labels = () if own is None else tuple(np.unique(own).tolist())
     law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=labels)
@@ -275,18 +282,18 @@ def law_of(observations: Observations, plain: Discovered, name: str, values: Arr
 
 
 def straight(law: Discovered) -> Discovered:
-    """Return a law as a straight line; one of labels as it is, since nothing lies between these."""
+    """Straight-line version of a law; one of labels stays as it is."""
     return law if law.labels else replace(law, shape="ramp", marks=())
 
 
 def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
-    """Return the harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
+    """Harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
 
 
 def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
-    """Return the law with knots at the quantity's quantiles, or with its levels where it has few values."""
+    """Law with knots at the quantity's quantiles, or with its levels where it has few values."""
     levels = np.unique(values)
     low, high = float(values.min()), float(values.max())
     if len(levels) <= settings.FEW_LEVELS:
@@ -301,12 +308,11 @@ def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> 
 def shapes(
     law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
 ) -> list[Discovered]:
-    """Return a law in its own shape, as a smooth one, and in all simpler shapes that may suffice, each once.
+    """All shapes of a law that may suffice: its own, smooth, and simpler ones, each once.
 
-    Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
-    positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
-    position also harmonics of the given orders. Of labels also one that is apart from the others. Of two quantities
-    their product alone. Of what a joint remembers elements that slip.
+    Always straight, quadratic, and hinges at quantiles of the quantity; with ``jumps`` (positions, gravity, clock) also
+    steps and bumps; of a velocity its sign; of a joint's own position harmonics of the given orders; of labels one that
+    differs from the others; of two quantities their product alone; of a joint's memory stop operators.
     """
     if law.shape == "constant":
         return [law]
@@ -343,9 +349,10 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
 
 
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
-    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
+    """Laws of stop operators (hysteresis) of a joint: coarse over the whole range, or neighbours of one.
 
-    Which show, ``values`` (N,) tell, rad or m from the last turning point; one between two is nearly their sum.
+    ``values`` (N,), rad or m from the last turning point, decide which are observable; an element between two is nearly
+    their sum.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)
@@ -355,7 +362,7 @@ def hystereses(law: Discovered, values: Array) -> list[Discovered]:
 
 
 def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
-    """Return a law of the clock as one that relaxes after each start: of one size, and of one each.
+    """Laws of time that relax exponentially after each start: with one amplitude, and one for each start.
 
     A session begins with its first row; where there are none, the campaign does.
     """
@@ -372,7 +379,7 @@ def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
 
 
 def smooth_columns(values: Array) -> Array:
-    """Return an (N, k) basis of the smooth laws of a quantity: centred, uncorrelated, of mean square one.
+    """Basis (N, k) of the smooth laws of a quantity: centred, uncorrelated, of mean square one.
 
     It spans the laws of :func:`of_quantity` without their constant: levels of a quantity with few values, a natural
     cubic spline otherwise. It is empty (N, 0) where the quantity does not vary.
@@ -386,11 +393,10 @@ def smooth_columns(values: Array) -> Array:
 
 
 def orders(q: Array, slides: bool = False) -> Array:
-    """Return the (K,) orders that are looked at in a joint, rad per rad, or rad/m where it slides.
+    """Grid (K,) of wave orders of a joint, rad per rad, or rad/m for a prismatic joint.
 
-    They stand a quarter of a peak's width apart, and end where the positions (N,) could no longer tell an order from
-    its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
-    looked at up to :data:`settings.MOST_ORDERS` of them.
+    The spacing is a quarter of a peak's width, the upper end the Nyquist order of the positions (N,): π/d on a lattice
+    of spacing d (Shannon). At most :data:`settings.MOST_ORDERS` of them.
     """
     if not moves(q):
         return np.zeros(0)
@@ -402,12 +408,12 @@ def orders(q: Array, slides: bool = False) -> Array:
 
 
 def independent(grid: Array) -> float:
-    """Return how many of the orders of :func:`orders` are independent: one for each width of a peak (Baluev 2008)."""
+    """Return number of independent orders in a grid of :func:`orders`: one for each width of a peak (Baluev 2008)."""
     return max(len(grid) * settings.ORDER_STEP, 1.0) if len(grid) else 0.0
 
 
 def periodogram(seat: Seat, q: Array, at: Array) -> Array:
-    """(K,) log evidence that a wave of each order gains: 1, sin kq and cos kq by least squares.
+    """Least-squares periodogram (K,): log evidence of 1, sin kq and cos kq at each order k.
 
     The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
     periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
@@ -419,7 +425,7 @@ def periodogram(seat: Seat, q: Array, at: Array) -> Array:
 
 
 def peak(seat: Seat, q: Array, grid: Array) -> float:
-    """Return the order that gains most, refined from the grid (K,) of at least one order to its peak."""
+    """Order of the largest gain, refined between grid points (K,)."""
     best = float(grid[np.argmax(periodogram(seat, q, grid))])
     step = settings.ORDER_STEP * 2.0 * np.pi / float(np.ptp(q))
     for _ in range(settings.ORDER_ZOOMS):
@@ -459,7 +465,7 @@ def _chunk(seat: Seat, q: Array, at: Array) -> Array:
 
 
 def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
-    """(N, K) e^(i k q) of orders in equal steps: a table of roots, multiplied."""
+    """Complex waves (N, K) e^(i k q) of equidistant orders, by recurrence."""
     fine = int(np.ceil(np.sqrt(len(at))))
     step = at[1] - at[0] if len(at) > 1 else 0.0
     small = np.exp(1j * np.outer(q, step * np.arange(fine)))
@@ -468,7 +474,7 @@ def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
 
 
 def _nyquist(q: Array) -> float:
-    """Return the order above which positions on a lattice repeat themselves; infinite where they lie on none."""
+    """Nyquist order of positions on a lattice; infinite where they lie on none."""
     levels = np.unique(q)
     gaps = np.diff(levels)
     gaps = gaps[gaps > STILL]
@@ -481,7 +487,7 @@ def _nyquist(q: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Thin:
-    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
+    """Rows of a fit for a scan: all of them, or a random sample where there are very many.
 
     ``changed`` (M,): rows that were set aside and follow each other in time.
     """
@@ -492,7 +498,7 @@ class Thin:
 
     @classmethod
     def of(cls, fit: Fit) -> Thin:
-        """Return the rows of a fit."""
+        """Sample the rows of a fit."""
         e = fit.explanation
         if fit.campaign.samples <= settings.ENOUGH_ROWS:
             return cls(fit.corrected, e.linear, in_a_row(fit.campaign, e.outliers))
@@ -511,26 +517,26 @@ class Thin:
         )
 
     def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
-        """Return the residual once the frames and some blocks are projected out.
+        """Residual with the frames and some blocks projected out.
 
-        Rows far from the rest weigh little, unless they follow each other, or all but the farthest few are taken for
-        ``sound``: what is large in few rows looks like gross errors until its law is known.
+        Far rows have Cauchy weights, unless they are consecutive, or all but the farthest few are ``sound``: a law that
+        is large in few rows looks like gross errors.
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
-        relative = self.observations.campaign.relative_noise
-        first = Target.of(self.linear.gap, design, self.changed, relative)
+        relative, seen = self.observations.campaign.relative_noise, seen_components(self.observations.campaign)
+        first = Target.of(self.linear.gap, design, self.changed, relative, seen=seen)
         if not sound:
             return first
         distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
         near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
-        return Target.of(self.linear.gap, design, near | self.changed, relative)
+        return Target.of(self.linear.gap, design, near | self.changed, relative, seen=seen)
 
 
 def conditions(observations: Observations, joint: str = "") -> list[str]:
-    """Return the quantities of the campaign that may act on a place: recorded ones, the clock and the session.
+    """Quantities of the campaign that may act on a place: recorded ones, the clock and the session.
 
-    Of those recorded for each joint, a joint's own; what another joint does is no condition of this one.
+    Of quantities recorded for each joint, only this joint's.
     """
     robot = observations.robot
     others = tuple(f".{name}" for name in robot.joint_names if name != joint)
@@ -539,11 +545,10 @@ def conditions(observations: Observations, joint: str = "") -> list[str]:
 
 
 def modulated(observations: Observations, effects: Iterable[Effect] | None = None) -> list[Discovered]:
-    """Laws of known effects (by default the library) whose size in one joint changes with a condition or position.
+    """Laws of known effects whose size in one joint is modulated by a condition or position.
 
-    Left out: effects whose response is the same in all rows, as times a law they are a plain law of that joint; what
-    drives the effect itself, as lost motion times the direction of approach is a zero that is off; an effect that is
-    not installed, as a saved law could not be read.
+    Left out are effects with a constant response, which modulated are plain laws of that joint; the driver of the
+    effect itself, as backlash times the direction of approach is a zero error; and effects that are not installed.
     """
     installed = library()
     offered = installed.values() if effects is None else effects
@@ -566,27 +571,27 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
 
 
 def _changing(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Return the joints in which an effect's response differs between rows."""
+    """Joints in which an effect's response differs between rows."""
     own = [p for p in gate.checked(effect, observations) if p.kind == "joint"]
     return gate.places_of([p for p in own if any(np.ptp(r.values, axis=0).any() for r in _rows(p))])
 
 
 def _driver(effect: Effect, observations: Observations, joint: str) -> str:
-    """Return the name of the quantity that drives an effect in a joint; empty where nothing that is recorded does."""
+    """Quantity that drives an effect in a joint; empty if none is recorded."""
     own = [p for p in gate.checked(effect, observations) if p.kind == "joint" and p.place == joint]
     driver = gate.driver(effect, observations, own, np.zeros(observations.campaign.samples))
     return driver[0] if driver else ""
 
 
 def _rows(parameter: Parameter) -> Iterator[Response]:
-    """Yield the responses of a parameter that have a value for each row."""
+    """Yield the responses of a parameter that vary by row."""
     yield from (r for r in parameter.responses if r.values.ndim == (1 if r.channel == "joint" else 2))
 
 
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
     """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
-    turns = observations.campaign.measures == "pose"
+    turns = components(observations.campaign) == 6
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
     follow = {
         name: Discovered(
@@ -612,7 +617,7 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Return laws of what each joint remembers: its last turning point (smooth, or elements that slip), its start."""
+    """Laws of joint memory: last turning point (smooth, or stop operators), and start."""
     found, past, known = [], observations.campaign.since_turn, quantities(observations)
     clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:
@@ -630,7 +635,7 @@ Site = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate among many and the log evidence that it gains over noise (Bayes information criterion).
+    """Candidate law, its gain of log evidence, and the number of candidates tried.
 
     One over ``tried``, the kinds of law times the laws of its kind, is its share of the prior; all sum to one.
     """
@@ -641,12 +646,12 @@ class Scanned:
 
     @property
     def worth(self) -> float:
-        """Log evidence that is left once the choice is paid for."""
+        """Gain of log evidence less the logarithm of the number tried."""
         return self.gain - float(np.log(self.tried))
 
 
 class Seats:
-    """What laws do to some targets, the columns of each place and the functions of each quantity computed once."""
+    """Cache of the columns of each place and the functions of each quantity, for scans of some targets."""
 
     def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
         self.observations, self.targets = observations, targets
@@ -654,7 +659,7 @@ class Seats:
         self._functions: dict[tuple[object, ...], Array] = {}
 
     def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
-        """Return the targets as they are seen from a law's place, or from the known effect in it."""
+        """Sufficient statistics of each target at a law's place, or for the known effect that it modulates."""
         place = (law.kind, law.place, law.turns, law.of, law.of_arguments)
         if place not in self._seats:
             moves = block(self.observations, _steady(law)).columns
@@ -662,7 +667,7 @@ class Seats:
         return self._seats[place]
 
     def functions(self, law: Discovered) -> Array:
-        """Return a law's (N, K) functions of what it follows, wherever it enters."""
+        """Functions (N, K) of a law of what it follows, wherever it enters."""
         # all that the functions hang on
         followed = (
             *(law.quantity, law.shape, law.marks, law.origin, law.span, law.labels, law.runs, law.starts),
@@ -674,13 +679,13 @@ class Seats:
         return self._functions[followed]
 
     def gains(self, candidates: Sequence[Discovered]) -> Array:
-        """Return (targets, C) the log evidence that each law gains."""
+        """Gain (targets, C) of log evidence of each law."""
         found = np.zeros((len(self.targets), len(candidates)))
         together: dict[tuple[Seat, ...], list[int]] = {}
         for i, law in enumerate(candidates):
             together.setdefault(self.seen_from(law), []).append(i)
         for seats, which in together.items():
-            functions = Alike.of([self.functions(candidates[i]) for i in which])
+            functions = LawStack.of([self.functions(candidates[i]) for i in which])
             for t, seat in enumerate(seats):
                 found[t, which] = seat.gains(functions)
         return found
@@ -689,13 +694,12 @@ class Seats:
 def scan(
     observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
 ) -> tuple[list[list[Scanned]], int]:
-    """Candidates of every target, best first by :attr:`Scanned.worth`, and how many laws were tried.
+    """Scan of all candidate laws: for every target sorted by :attr:`Scanned.worth`, and the number tried.
 
-    Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
-    joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
-    quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
-    there. Left out are laws that are no better than what they contain: an effect that changes than the effect itself in
-    that joint, a product than one of its quantities.
+    Candidates are a smooth and a straight law of each quantity at each place; waves of any order and memory of each
+    joint; known effects modulated in one joint; products of two quantities. At segments, whose laws have six
+    components, only the best quantities are tried. Dropped are laws no better than what they contain: a modulated
+    effect than the effect itself, a product than one of its quantities.
     """
     seats = Seats(observations, targets)
     kinds = _candidates(seats, effects)
@@ -718,7 +722,7 @@ def scan(
 
 
 def _candidates(seats: Seats, effects: Iterable[Effect] | None) -> dict[str, list[Discovered]]:
-    """Return the laws that are tried, by kind, but for waves of any order."""
+    """Candidate laws by kind, without waves of arbitrary order."""
     observations = seats.observations
     first = laws(observations, ("joint", "base", "tool"))
     plain = [law for law in first if law.shape != "harmonic"]
@@ -735,7 +739,7 @@ def _candidates(seats: Seats, effects: Iterable[Effect] | None) -> dict[str, lis
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Return a law in the shape that is worth most: in gain of log evidence, less what the choice of a shape costs.
+    """Law in the shape of the largest gain less the cost of choosing it.
 
     Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
     """
@@ -751,7 +755,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
 
 
 def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
-    """Return a law in every shape that it may have."""
+    """Gains of a law in every shape that it may have."""
     observations = seats.observations
     whole = replace(law, shape="product") if law.by else law
     values = None if law.quantity == "none" else whole.values(observations)
@@ -769,7 +773,7 @@ def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
 
 
 def _refined(best: Scanned, seats: Seats) -> Scanned:
-    """Move marks and widths in ever smaller steps while that gains."""
+    """Pattern search over marks and widths."""
     step = settings.MARK_STEP
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
@@ -788,10 +792,10 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
 
 
 def _timed(best: Scanned, seats: Seats) -> Scanned:
-    """Move a sudden mark to the best of the gaps between values near it.
+    """Move a step to the best of the gaps between neighbouring values.
 
-    A mark may lie anywhere in the range, so that each gap has its share of the prior: a break between two sessions has
-    more than the seconds between two rows.
+    The prior of the mark is uniform over the range, so that a long break between sessions has a larger share than a gap
+    between two rows.
     """
     law, followed = best.law, best.law.values(seats.observations)
     values = np.unique(followed if followed is not None else np.zeros(1))
@@ -807,7 +811,7 @@ def _timed(best: Scanned, seats: Seats) -> Scanned:
 
 
 def _between_runs(law: Discovered, observations: Observations) -> Discovered:
-    """Return a step in time with the sessions between which it lies, if all rows before it belong to others."""
+    """Step in time, labelled with the two sessions that it separates, if it separates sessions."""
     clock, runs = law.values(observations), observations.campaign.labels.get("session")
     if law.quantity not in CLOCK or clock is None or runs is None:
         return law
@@ -819,7 +823,7 @@ def _between_runs(law: Discovered, observations: Observations) -> Discovered:
 
 
 def _steady(law: Discovered) -> Discovered:
-    """Return the known effect in a law, or its place, without what it follows."""
+    """Constant law at the place, or of the known effect, of a law."""
     return Discovered(
         kind=law.kind,
         place=law.place,
@@ -832,7 +836,7 @@ def _steady(law: Discovered) -> Discovered:
 
 
 def _telling(candidates: Sequence[Discovered], gains: Array) -> dict[str, float]:
-    """Return by quantity the most that it gains in any target, at any place."""
+    """Largest gain of each quantity over all targets and places."""
     found: dict[str, float] = {}
     for law, own in zip(candidates, gains.T, strict=True):
         found[law.quantity] = max(found.get(law.quantity, -np.inf), float(own.max()))
@@ -840,7 +844,7 @@ def _telling(candidates: Sequence[Discovered], gains: Array) -> dict[str, float]
 
 
 def _grids(observations: Observations) -> dict[str, Array]:
-    """Return by joint the orders of its waves that are tried; joints that do not move are left out."""
+    """Wave orders tried in each joint that moves."""
     robot = observations.robot
     every = {
         joint: orders(observations.q[:, j], robot.joint_types[j] == "prismatic")
@@ -850,7 +854,7 @@ def _grids(observations: Observations) -> dict[str, Array]:
 
 
 def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
-    """Return the best wave of each joint."""
+    """Best wave of each joint."""
     observations, found = seats.observations, []
     for joint, grid in grids.items():
         q = observations.q[:, observations.robot.joint_names.index(joint)]
@@ -863,7 +867,7 @@ def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) ->
 
 
 def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
-    """Return the best step in time between two sessions that follow each other, at the place of a law of sessions."""
+    """Best step between consecutive sessions at the place of a law of sessions."""
     observations = seats.observations
     known = quantities(observations)
     clock = next((name for name in CLOCK if name in known), None)
@@ -880,7 +884,7 @@ def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
 
 
 def _clock_gives_way(single: dict[Site, Scanned], session: Site, seats: Seats, t: int) -> None:
-    """Leave out the law of the clock where that of the sessions at its place says nearly as much: it is coarser."""
+    """Drop a law of time where one of sessions at its place explains nearly as much with less resolution."""
     own = _best_shape(seats, t, single[session].law)
     for clock in [(*session[:2], name) for name in CLOCK]:
         if clock in single and _best_shape(seats, t, single[clock].law) < own + settings.COARSER:
@@ -888,12 +892,12 @@ def _clock_gives_way(single: dict[Site, Scanned], session: Site, seats: Seats, t
 
 
 def _best_shape(seats: Seats, t: int, law: Discovered) -> float:
-    """Return the log evidence that a law gains in its best shape, once the choice among its shapes is paid for."""
+    """Gain of a law in its best shape, less the cost of choosing it."""
     return max(item.worth for item in _measured(seats, t, law))
 
 
 def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
-    """Return all that is better than what it contains, sorted; of a smooth and a straight law the better one."""
+    """Candidates that beat what they contain, sorted; of a smooth and a straight law the better one."""
     single: dict[Site, Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)

@@ -1,18 +1,17 @@
-"""The search for the best combination of blocks: neighbours weighed to first order, the near ones exactly.
+"""Hill climbing over combinations of blocks: neighbours are screened to first order, near ones evaluated exactly.
 
-A search climbs from a combination by adding, dropping and exchanging blocks. What a climb by single steps misses is
-looked for on purpose: two exchanges of which each alone brings nothing, one block that contains several smaller ones,
-and another setting of one block in place of two blocks.
+A search climbs from a combination by adding, dropping and exchanging blocks. Larger moves find what single steps miss:
+two exchanges of which neither gains alone, one block that contains several smaller ones, and another setting of one
+block in place of two blocks.
 
-What one block more would bring a combination is told for all blocks at once and to first order: the others stay. In
-the eigenvectors of a block's own information beside the others, w, with the vector c there, and with the noise s'² that
-it leaves,
+The gain of one more block is found for all blocks at once, to first order: the parameters of the others stay. In the
+eigenvectors of a block's information given the others, with eigenvalues w, the vector c, and the remaining noise s'²,
 
     (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
     gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
 
-Q = y'y − b'θ, and s₀ the same without the block. A column that cannot be negative has half a normal prior. Where it
-would be negative it stays at zero and explains nothing; then, and where it would not, it counts by itself for
+Q = y'y − b'θ, and s₀ the same without the block. A non-negative column has a half-normal prior. Where it would be
+negative it stays at zero; in both cases its own factor is
 
     log 2 Φ(z) ,  and at zero beside that  ½ z² − ½ log(1 + λ² w/s'²) ,    z = c λ/(s' (s'² + λ² w)^½) .
 
@@ -40,7 +39,7 @@ _LOG_2, _ROOT_2 = np.log(2.0), np.sqrt(2.0)
 
 @dataclass(frozen=True, eq=False)
 class _Alike:
-    """Blocks of as many columns: their numbers, w and c² (K, D) of the columns not held at zero, and the sided ones.
+    """Blocks of equal width: their numbers, w and c² (K, D) of the columns not held at zero, and the constrained ones.
 
     ``sides`` (J,): place in ``blocks``, w and c of each column that cannot be negative.
     """
@@ -52,7 +51,7 @@ class _Alike:
 
 
 def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
-    """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale."""
+    """First-order gain of log evidence by adding each block, its scale integrated out, and its best scale."""
     used = gram.columns_of(base.blocks)
     # a column that is held at zero takes nothing up
     kept = np.flatnonzero((base.values != 0.0) | ~gram.positive[used])
@@ -91,7 +90,7 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
 def _beside(
     gram: Gram, base: Combination, blocks: list[int], used: NDArray[np.int64], left: Array, covariance: Array
 ) -> _Alike:
-    """Return what blocks of as many columns tell beside the columns in use, of which a covariance is known."""
+    """Projected statistics of blocks of equal width, given the columns in use and their covariance."""
     own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks])
     cross = gram.matrix[own[:, :, None], used]
     inside = gram.matrix[own[:, :, None], own[:, None, :]] - cross @ covariance @ cross.transpose(0, 2, 1)
@@ -105,10 +104,10 @@ def _beside(
 
 
 def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) -> tuple[NDArray[np.bool_], _Sides]:
-    """Return which columns are not held at zero at their expected sizes, and what each sided one tells by itself.
+    """Mask of the columns not held at zero at their expected sizes, and single-column statistics of constrained ones.
 
-    A free one with its mean and variance beside all the others that are free, one that is held at zero with the pull
-    and the information that these leave it.
+    Of a free column its mean and variance given the other free ones; of one held at zero its gradient and information
+    given these.
     """
     free = ~sided | (pull > 0.0)
     for last in [*(False,) * settings.NOISE_ROUNDS, True]:
@@ -130,7 +129,7 @@ def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) 
 
 
 def _on_their_sides(alike: _Alike, square: Array, noise: Array) -> Array:
-    """(K, S) what the columns that cannot be negative count for by themselves, at each scale."""
+    """Log integrals (K, S) over the half lines of non-negative columns alone, at each scale."""
     found = np.zeros_like(noise)
     block, value, pull = alike.sides
     if not len(block):
@@ -145,7 +144,7 @@ def _on_their_sides(alike: _Alike, square: Array, noise: Array) -> Array:
 
 
 def _padded(parts: Sequence[_Alike]) -> Iterator[_Alike]:
-    """Yield narrow blocks together, with zeros that bring nothing, and wide ones as they are: it is done at once."""
+    """Yield narrow blocks together, padded with zeros, and wide ones as they are."""
     narrow = [part for part in parts if part.value.shape[1] <= settings.NARROW]
     yield from (part for part in parts if part.value.shape[1] > settings.NARROW)
     if narrow:
@@ -169,7 +168,7 @@ def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
 
 @dataclass(eq=False)
 class Search:
-    """Evaluates combinations, each once, and keeps them all.
+    """Memoised evaluation of combinations of blocks.
 
     ``exclusive`` pairs of blocks must not be together; ``containers`` can do all that a block of another effect can;
     those that are ``out`` are in no combination.
@@ -183,7 +182,7 @@ class Search:
     out: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
-        """List what each block excludes."""
+        """List the blocks that each block excludes."""
         self._apart: dict[int, set[int]] = {}
         self._expanded: set[tuple[int, ...]] = set()
         self._left_at: dict[tuple[int, ...], float] = {}
@@ -193,17 +192,17 @@ class Search:
             self._apart.setdefault(b, set()).add(a)
 
     def without(self, out: frozenset[int]) -> Search:
-        """Return the search without some blocks, with all that was evaluated without them."""
+        """Search without some blocks, with the memo of the others."""
         seen = {key: found for key, found in self.seen.items() if not out & set(key)}
         return replace(self, seen=seen, out=self.out | out)
 
     def allowed(self, blocks: Sequence[int]) -> bool:
-        """Tell whether no two of the blocks exclude each other."""
+        """Whether no two of the blocks exclude each other."""
         whole = set(blocks)
         return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None, wanted: float = -np.inf) -> Combination:
-        """Evidence of a combination, computed once; not to its end where clearly below ``wanted`` or the best."""
+        """Log evidence of a combination, memoised; stopped early where clearly below ``wanted`` or the best."""
         key = tuple(sorted(blocks))
         known, floor = self.seen.get(key), max(wanted, self._most - settings.DETOUR_FROM)
         if known is None or not (known.exact or self._left_at.get(key, np.inf) <= floor):
@@ -214,7 +213,7 @@ class Search:
         return self.seen[key]
 
     def _at_least(self, blocks: Sequence[int], start: Combination) -> Combination:
-        """Return the evidence of what is of interest only where it comes near that of another combination."""
+        """Evaluate a combination fully only where it comes near another one."""
         return self.evaluate(blocks, start, start.log_evidence - settings.NEARLY)
 
     def _computed(self, key: tuple[int, ...], start: Combination | None, floor: float) -> Combination:
@@ -232,9 +231,9 @@ class Search:
             )
 
     def run(self, start: Sequence[int] = ()) -> Combination:
-        """Climb from a combination, and look on purpose for what single steps miss, until nothing is better.
+        """Hill climbing with larger moves, until no move improves.
 
-        Every neighbour of the best combination is weighed, so that its probability is against all of them.
+        All neighbours of the best combination are evaluated, so that its probability is relative to all of them.
         """
         best = self.climb(start)
         detours = (self._simpler, self._smaller, self._two_at_once, self._missed)
@@ -243,14 +242,14 @@ class Search:
         return best
 
     def climb(self, start: Sequence[int] = ()) -> Combination:
-        """Add, drop and exchange blocks until nothing is better, neighbours of near ties included."""
+        """Hill climbing by adding, dropping and exchanging blocks, neighbours of near ties included."""
         best = self._climb(start, frozenset())
         while (better := self._missed(best) or self._beside_a_tie(best)) is not None:
             best = self._climb(better.blocks, frozenset())
         return best
 
     def _smaller(self, best: Combination) -> Combination | None:
-        """Climb without one that contains others, which may suffice where it came first; return what is better."""
+        """Climb without a block that contains others; return an improvement, if any."""
         for large in self.containers & set(best.blocks):
             barred = frozenset(b for b in self._apart[large] | {large} if self._width(b) >= self._width(large))
             found = self._climb([b for b in best.blocks if b != large], barred)
@@ -259,9 +258,9 @@ class Search:
         return None
 
     def _two_at_once(self, best: Combination) -> Combination | None:
-        """Add two blocks, or put two in place of one; return what is better, if any is.
+        """Add two blocks, or exchange one for two; return an improvement, if any.
 
-        Of blocks that resemble each other one alone may bring nothing, and with a second one all.
+        Of similar blocks one alone may gain nothing, and two a lot.
         """
         for base in self._bases(best):
             first = sorted(self._with_one_more(base, best), key=lambda c: -c.log_evidence)[: settings.LOOKED_BEYOND]
@@ -275,9 +274,9 @@ class Search:
         return None
 
     def _beside_a_tie(self, best: Combination) -> Combination | None:
-        """Weigh the neighbours of what is nearly as probable as the best, too; return what is better, if any is.
+        """Evaluate the neighbours of near ties; return an improvement, if any.
 
-        Two effects that stand in for two others are told only so: with one of them exchanged there is little to choose.
+        This finds two effects that replace two others: with only one exchanged the evidence is nearly the same.
         """
         for tie in self.ties(best)[1:]:
             if tie.blocks in self._expanded:
@@ -289,21 +288,21 @@ class Search:
         return None
 
     def ties(self, best: Combination) -> list[Combination]:
-        """Return the best combination, and those of as many blocks that are nearly as probable, the nearest first."""
+        """Best combination, then others of the same size that are nearly as probable."""
         near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
         near = [c for c in near if len(c.blocks) == len(best.blocks)]
         return [best, *sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]]
 
     def weigh(self, blocks: Sequence[int]) -> Combination:
-        """Weigh every neighbour of a combination; return the best of them and it."""
+        """Evaluate all neighbours of a combination; return the best of them and it."""
         own = self.evaluate(blocks)
         near = [self._at_least(c.blocks, own) for c in self._promising(own)]
         return max((own, *near), key=lambda c: c.log_evidence)
 
     def _simpler(self, best: Combination) -> Combination | None:
-        """Let another setting of one block stand in for further blocks; return what is better, if any is.
+        """Replace one block by another setting that makes further blocks needless; return an improvement, if any.
 
-        A setting that does more, such as in one joint more, is worth its price only once what it replaces is gone.
+        A more general setting, such as one more joint, pays only once the blocks that it replaces are removed.
         """
         for b in best.blocks:
             for setting in self._apart.get(b, set()) - self.out:
@@ -321,7 +320,7 @@ class Search:
         return None
 
     def _fewer(self, found: Combination, kept: int) -> Combination:
-        """Drop blocks as long as that is better, all but one of them."""
+        """Backward elimination of all blocks but one."""
         while True:
             without = [self.evaluate([c for c in found.blocks if c != b], found) for b in found.blocks if b != kept]
             best = max(without, key=lambda c: c.log_evidence, default=found)
@@ -330,7 +329,7 @@ class Search:
             found = best
 
     def _missed(self, best: Combination) -> Combination | None:
-        """Compute exactly what was weighed on the way and comes near the best; return one that is better, if any is."""
+        """Evaluate exactly what was screened and comes near the best; return an improvement, if any."""
         near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
         found = max((self._at_least(blocks, best) for blocks in near), key=lambda c: c.log_evidence, default=best)
         return found if found.log_evidence > best.log_evidence + settings.BETTER else None
@@ -357,10 +356,10 @@ class Search:
             best = better
 
     def _promising(self, best: Combination, barred: frozenset[int] = frozenset()) -> list[Combination]:
-        """Return the combinations with one block more, less or another that may be better, the best first.
+        """Neighbours with one block more, less or exchanged that may improve the evidence, best first.
 
-        Those with a new block are known to first order, which tells too little where the others are stretched to do
-        what the new one would do: the best one in place of each block is among them, however little it promises.
+        Additions are scored to first order, which underestimates a block whose effect the others imitate: so the best
+        exchange for each block is always included.
         """
         bases = self._bases(best)
         found = {c.blocks: c for c in bases[1:] if self._near(c, best)}
@@ -371,7 +370,7 @@ class Search:
         return sorted(found.values(), key=lambda c: -c.log_evidence)
 
     def _bases(self, best: Combination) -> list[Combination]:
-        """Return the combination, and what it is without each of its blocks: to these others are added."""
+        """Return the combination, and it without each of its blocks: the starting points of additions."""
         return [best, *(self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks)]
 
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
@@ -396,7 +395,7 @@ class Search:
         return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
 
     def set_best(self, blocks: Sequence[int], families: Sequence[str]) -> Combination:
-        """Return the best settings of the same effects, changed one after another."""
+        """Best settings of the same effects, by coordinate search."""
         best = self.evaluate(blocks)
         while True:
             names = {families[b]: b for b in best.blocks}
@@ -411,7 +410,7 @@ class Search:
             best = found
 
     def probabilities(self) -> tuple[list[Combination], Array]:
-        """Return the combinations seen, most probable first, with their posterior probabilities."""
+        """Return the combinations evaluated, with their posterior probabilities, most probable first."""
         order = sorted(self.seen.values(), key=lambda c: -c.log_evidence)
         log = np.array([c.log_evidence for c in order])
         weight = np.exp(log - log[0])

@@ -1,6 +1,6 @@
-"""Every number that was chosen in the inference and for findings: its value, its unit, and why that one.
+"""Chosen numbers of inference and findings, each with its unit and reason.
 
-What is known of one effect stands in that effect's file.
+Numbers of a single effect are in its own file.
 """
 
 import numpy as np
@@ -80,6 +80,13 @@ LARGEST_CLUSTER = 0.1
 """Of all rows: a larger cluster is a path, not a repeated pose."""
 FOLDS = 5
 """Regions of joint space that are held out in turn; of temperature, reach and joints' ranges the outermost fifth is."""
+WRITTEN_TO = 1e-5
+"""m and rad to which poses of a controller are compared where no noise is stated: screens show a tenth of a millimetre,
+topics all digits, and no difference of a model that matters is smaller."""
+TURNS_TRIED = 4
+"""Turns of the target on the tool from which a fit begins: the next of a cube may be the neighbour of the best."""
+FEWEST_STANDS = 3
+"""Stands from which on one at a time is held out: of fewer, what is left is another campaign."""
 BLOCKS = 20
 """Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""
 GROSS_LEVEL = 0.01

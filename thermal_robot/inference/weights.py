@@ -1,8 +1,9 @@
-"""Robust noise and weights: one sigma of a residual by its median, gross errors, Huber's weights."""
+"""Robust estimation: noise from the median of a residual, outliers, Huber weights."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,49 +13,72 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference import settings
 from thermal_robot.inference.problem import Linear, Whitening
+from thermal_robot.observables import of_model, seen_components
+
+Figures = int | NDArray[np.int64]
+"""How many figures a row has, or (N,) each row."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given.
+    """Standard deviation per axis of the instrument, m and rad; ``None`` where it is not stated.
 
-    ``relative`` (N, m) is that of each figure of a row over it; ``None`` where all rows are alike.
+    ``relative`` (N, m) is that of each figure of a row over it; ``None`` where all rows are alike. ``seen`` (N, m/3) is
+    how many components of place and turn a row sees; ``None`` for all in all rows.
     """
 
     position: float | None = None
     orientation: float | None = None
     relative: Array | None = None
+    seen: NDArray[np.int64] | None = None
 
     @classmethod
     def of(cls, campaign: Campaign) -> Noise:
         """Return what a campaign states."""
-        return cls(campaign.noise_position, campaign.noise_orientation, campaign.relative_noise)
+        seen, place, turn = seen_components(campaign), campaign.noise_position, campaign.noise_orientation
+        if of_model(campaign):  # what is computed has no noise: it is written to some digits
+            place, turn = place or settings.WRITTEN_TO, turn or settings.WRITTEN_TO
+        return cls(place, turn, campaign.relative_noise, seen)
+
+    def figures(self, measures: int) -> NDArray[np.int64] | int:
+        """Return how many figures a row has: (N,) where rows differ."""
+        return measures if self.seen is None else np.maximum(self.seen.sum(axis=1), 1)
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
-        """Return the noise of positions, and with six components that of orientations; none is less than rounding."""
+        """Noise of positions, and with six components of orientations; at least rounding."""
         stated = (self.position, self.orientation)[: measures // 3]
         return tuple(None if sigma is None else max(sigma, settings.ROUNDING) for sigma in stated)
 
 
-def distance_limit(measures: int, rows: int) -> float:
+def distance_limit(measures: Figures, rows: int) -> Any:
     """χ² quantile: the squared distance, in units of the noise, beyond which one of so many rows is a gross error."""
-    return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
+    return settings.GROSS_FACTOR * chdtri(measures, settings.GROSS_LEVEL / max(rows, 1))
 
 
-def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None = None) -> Array:
+def robust_noise(
+    remainder: Array,
+    leverage: float = 0.0,
+    relative: Array | None = None,
+    seen: NDArray[np.int64] | None = None,
+) -> Array:
     """One sigma per axis of positions and of orientations, from the median squared length of a residual.
 
     The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
-    of the figures differs, ``relative`` (N, m) says how.
+    of the figures differs, ``relative`` (N, m) says how; where rows see fewer components, ``seen`` (N, m/3).
     """
     remainder = remainder if relative is None else remainder / relative
     parts = remainder.reshape(len(remainder), -1, 3)
-    middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
+    squares = (parts**2).sum(axis=2)
+    if seen is None:
+        middle = np.median(squares, axis=0) / float(chdtri(3, 0.5))
+    else:
+        shares = squares / chdtri(np.maximum(seen, 1), 0.5)
+        middle = np.array([np.median(own[some > 0]) for own, some in zip(shares.T, seen.T, strict=True)])
     return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
 
 
 def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Noise of each component, as stated or else as measured of the residual; degrees of freedom of its prior."""
+    """Noise of each component, stated or else estimated from the residual, and the degrees of freedom of its prior."""
     stated = noise.parts(measures)
     sigma = np.array([m if g is None else g for g, m in zip(stated, measured, strict=True)])
     return np.repeat(sigma, 3), 0.0 if None in stated else settings.GIVEN_NOISE_DOF
@@ -63,32 +87,36 @@ def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, 
 def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
     """Equal weights of all rows in use, and the noise from the median of the gap."""
     own = None if noise.relative is None else noise.relative[use]
-    sigma, held = settled_noise(robust_noise(linear.gap[use], relative=own), noise, linear.measures)
-    return Whitening(use.astype(float), sigma, held, relative=noise.relative)
+    seen = None if noise.seen is None else noise.seen[use]
+    sigma, held = settled_noise(robust_noise(linear.gap[use], relative=own, seen=seen), noise, linear.measures)
+    return Whitening(use.astype(float), sigma, held, relative=noise.relative, seen=noise.seen)
 
 
 def reweigh(
     remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
 ) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Huber's weights at the residual's noise, and (N,) the rows set aside as gross errors, at most a quarter.
+    """Huber weights at the residual's noise, and outliers (N,), at most a quarter of the rows.
 
     ``leverage`` is the share of the equations that was fitted.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
-    sigma, held, distance2 = judged(remainder, robust_noise(remainder[use], leverage), noise, leverage, measures)
-    aside = use & (distance2 > distance_limit(measures, int(use.sum())))
+    seen, figures = None if noise.seen is None else noise.seen[use], noise.figures(measures)
+    measured = robust_noise(remainder[use], leverage, seen=seen)
+    sigma, held, distance2 = judged(remainder, measured, noise, leverage, measures)
+    aside = use & (distance2 > distance_limit(figures, int(use.sum())))
     worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
     aside &= np.isin(np.arange(len(use)), worst)
-    weights = np.where(use & ~aside, tail_weight(distance2, measures), 0.0)
-    return Whitening(weights, sigma, held, relative=noise.relative), aside
+    weights = np.where(use & ~aside, tail_weight(distance2, figures), 0.0)
+    return Whitening(weights, sigma, held, relative=noise.relative, seen=noise.seen), aside
 
 
 def judged(
     remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
 ) -> tuple[Array, float, Array]:
-    """Noise and degrees of freedom as :func:`settled_noise`, and (N,) squared distances of rows in its units.
+    """Noise and degrees of freedom as :func:`settled_noise`, and squared distances (N,) of rows in its units.
 
-    ``remainder`` (N, m) is that of rows alike; what a median says of its noise is ``measured``, one sigma a part.
+    ``remainder`` (N, m) is scaled to equal noise; ``measured`` is its robust noise, one sigma for positions and one for
+    orientations.
     """
     sigma, held = settled_noise(measured, noise, measures)
     distance2 = ((remainder / far_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
@@ -96,11 +124,11 @@ def judged(
 
 
 def far_scale(measured: Array, sigma: Array) -> Array:
-    """(m,) one sigma by which distances count: where more is left than noise, a row is far only if far from others."""
+    """Scale (m,) of outlier distances: the noise, or the residual's median where that is larger."""
     return np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
 
 
-def tail_weight(distance2: Array, measures: int) -> Array:
+def tail_weight(distance2: Array, measures: Figures) -> Array:
     """Huber's weight (1964) of rows at a squared distance in units of the noise: less in the tail."""
-    bend = float(chdtri(measures, settings.BEND_LEVEL))
+    bend = chdtri(measures, settings.BEND_LEVEL)
     return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))

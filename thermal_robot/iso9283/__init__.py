@@ -1,4 +1,4 @@
-"""Performance criteria of ISO 9283:1998 from repeats: AP, RP, vAP, drift, AT, RT."""
+"""ISO 9283:1998 performance criteria from repeated poses: AP, RP, vAP, drift, AT, RT."""
 
 from thermal_robot.iso9283.criteria import (
     Accuracy,

@@ -1,4 +1,4 @@
-"""Criteria of ISO 9283:1998 from attained poses: where a robot really was, cycle after cycle.
+"""ISO 9283:1998 criteria from attained poses.
 
 Clauses: AP 7.2.1, RP 7.2.2, vAP 7.2.3, drift 7.6, AT and RT 8.2 and 8.3. The standard cuts the attained paths with
 planes across the commanded one. Here a point of the path is a command with what was measured for it in each cycle, so
@@ -30,7 +30,7 @@ _LEVEL = (0.025, 0.975)
 
 @dataclass(frozen=True, eq=False)
 class Attained:
-    """Poses of one target in n cycles, all in the same frame: that of the base where the standard is to be met.
+    """Attained poses of one target in n cycles, in one frame: that of the base to meet the standard.
 
     Attributes
     ----------
@@ -55,11 +55,11 @@ class Attained:
 
     @property
     def mean_rotation(self) -> Array | None:
-        """(3, 3) the rotation nearest to all; ``None`` where only positions are known."""
+        """Chordal mean rotation (3, 3); ``None`` where only positions are known."""
         return None if self.rotation is None else mean_rotation(self.rotation)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Attained:
-        """Return some of the cycles."""
+        """Subset of the cycles."""
         return Attained(self.position[rows], None if self.rotation is None else self.rotation[rows])
 
 
@@ -81,14 +81,14 @@ def angles(rotations: Array, reference: Array) -> Array:
 
 
 def three(values: ArrayLike) -> Three:
-    """Return three numbers as plain values."""
+    """Three numbers as plain values."""
     a, b, c = (float(v) for v in np.asarray(values))
     return a, b, c
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """From the commanded pose to the barycentre of the attained ones.
+    """Pose accuracy AP: from the commanded pose to the barycentre of the attained ones.
 
     Attributes
     ----------
@@ -106,14 +106,14 @@ class Accuracy:
 
 
 def accuracy(attained: Attained, commanded: Attained) -> Accuracy:
-    """Compute the accuracy of one pose.
+    """Pose accuracy AP of one pose.
 
     Parameters
     ----------
     attained
-        Of n cycles.
+        Attained poses of n cycles.
     commanded
-        Of one row; or of n, where a model predicts every cycle by itself, as one does that knows of temperature.
+        Commanded pose, one row; or n rows, where a model predicts every cycle separately, as one with temperature does.
     """
     away = attained.barycentre - commanded.barycentre
     is_, should = attained.mean_rotation, commanded.mean_rotation
@@ -123,7 +123,7 @@ def accuracy(attained: Attained, commanded: Attained) -> Accuracy:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Of the attained poses about their barycentre.
+    """Pose repeatability RP: scatter of the attained poses about their barycentre.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Repeatability:
 
 
 def repeatability(attained: Attained) -> Repeatability:
-    """Compute the repeatability of one pose from n ≥ 2 cycles."""
+    """Pose repeatability RP of one pose from n ≥ 2 cycles."""
     deviations, turned = attained.position - attained.barycentre, None
     value = float(_of(np.linalg.norm(deviations, axis=1)))
     if attained.rotation is not None:
@@ -152,15 +152,15 @@ def repeatability(attained: Attained) -> Repeatability:
 
 
 def _of(distances: Array) -> Array:
-    """RP_l of distances from the barycentre, the last axis being cycles."""
+    """Positional repeatability RP_l from distances to the barycentre, the last axis being cycles."""
     return np.asarray(distances.mean(axis=-1) + SPREADS * distances.std(axis=-1, ddof=1))
 
 
 def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
-    """95 % interval of RP_l by parametric bootstrap, from normal scatter with the sample's principal axes.
+    """Bootstrap interval (95 %, parametric) of RP_l, from normal scatter with the sample's principal axes.
 
-    What n cycles show, over what endlessly many would, depends on the shape of the scatter, not on its size. The draws
-    are the same in each call.
+    The ratio of RP_l from n cycles to its limit depends on the shape of the scatter, not on its size. The draws are the
+    same in each call.
     """
     cycles = len(deviations)
     if cycles < FEWEST_FOR_INTERVAL or value == 0.0:
@@ -174,7 +174,7 @@ def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
 
 
 def of_noise(sigma: float) -> float:
-    """Return RP_l that an instrument with a standard deviation of ``sigma`` per axis (m) shows where nothing moves.
+    """Repeatability RP_l of an instrument's noise alone, ``sigma`` per axis, m.
 
     The distances have Maxwell's law: mean 2 √(2/π) σ, standard deviation √(3 − 8/π) σ.
     """
@@ -183,7 +183,7 @@ def of_noise(sigma: float) -> float:
 
 @dataclass(frozen=True)
 class Variation:
-    """Largest differences between barycentres of one pose that is reached from several directions.
+    """Multi-directional pose accuracy variation vAP: largest differences between barycentres.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Variation:
 
 
 def variation(attained: Sequence[Attained]) -> Variation:
-    """Compute the variation from the attained poses of two directions or more."""
+    """Multi-directional pose accuracy variation vAP, from the attained poses of two directions or more."""
     pairs = list(combinations(attained, 2))
     away = max(float(np.linalg.norm(one.barycentre - other.barycentre)) for one, other in pairs)
     means = [(one.mean_rotation, other.mean_rotation) for one, other in pairs]
@@ -208,7 +208,7 @@ def variation(attained: Sequence[Attained]) -> Variation:
 
 @dataclass(frozen=True)
 class Drift:
-    """Largest changes against the first measuring time.
+    """Drift of pose characteristics: largest changes against the first measuring time.
 
     Attributes
     ----------
@@ -229,12 +229,12 @@ class Drift:
 
 
 def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None = None) -> Drift:
-    """Compute the drift of one pose.
+    """Drift of pose accuracy and repeatability of one pose.
 
     Parameters
     ----------
     attained
-        Of each measuring time, first to last: two times or more, each of two cycles or more.
+        Attained poses of each measuring time, first to last: two times or more, each of two cycles or more.
     commanded
         Of each measuring time, as for :func:`~thermal_robot.iso9283.accuracy`; ``None`` where AP cannot be
         told.
@@ -250,7 +250,7 @@ def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None 
 
 
 def _change(values: Sequence[Any]) -> Any:
-    """Return the largest change against the first of numbers or threes; ``None`` where one of them is unknown."""
+    """Largest change against the first of numbers or triples; ``None`` where one of them is unknown."""
     if any(value is None for value in values):
         return None
     largest = np.abs(np.subtract(values, values[0])).max(axis=0)
@@ -259,7 +259,7 @@ def _change(values: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True)
 class AlongPath:
-    """The worst of a path's points.
+    """Path criteria AT or RT: worst of a path's points.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ class AlongPath:
 
 
 def along_path(points: Sequence[Accuracy] | Sequence[Repeatability]) -> AlongPath:
-    """Return the path accuracy of the accuracies of its points; the path repeatability of their repeatabilities."""
+    """Path accuracy AT from the accuracies of its points; path repeatability RT from their repeatabilities."""
     turns = [np.abs(point.angles) for point in points if point.angles is not None]
     return AlongPath(max(point.position for point in points), three(np.max(turns, axis=0)) if turns else None)
 
@@ -328,11 +328,11 @@ class PathCriteria:
     points
         How many of its points were repeated.
     cycles
-        How often each was, the least of all.
+        Smallest number of repeats of any point.
     repeatability
-        RT.
+        Path repeatability RT.
     accuracy, corrected
-        AT, and AT against the prediction of a corrected model; ``None`` as for a pose.
+        Path accuracy AT, and AT against the prediction of a corrected model; ``None`` as for a pose.
     """
 
     path: str

@@ -1,4 +1,4 @@
-"""Which rows of a campaign make up a test: repeats of a pose, points of a path, directions of approach, times."""
+"""Grouping of a campaign's rows for ISO 9283: repeats, paths, directions of approach, measuring times."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Repeats:
 
 
 def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
-    """Find the poses that were measured more than once, as they were met, and the number of rows that repeat nothing.
+    """Poses that were measured repeatedly, in order of occurrence, and the number of single rows.
 
     Rows with the same ``pose`` label belong together; without that column, rows with the same commands. Points of
     different paths, and poses at rest, never do.
@@ -63,7 +63,7 @@ def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
 
 
 def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
-    """Group repeats of one pose by the direction of approach, the same sign in every joint.
+    """Repeats of one pose grouped by the direction of approach, the same sign in every joint.
 
     Rows in which a joint's direction is unknown belong to none. ``None`` where half of them do: nobody recorded
     it, and the pose was repeated in a row.
@@ -84,7 +84,7 @@ def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
 
 
 def _follow(campaign: Campaign, columns: list[str]) -> bool:
-    """Tell whether directions follow from the order of the rows: so told, or written and read again."""
+    """Whether directions are derived from the order of the rows."""
     names, sessions = campaign.robot.joint_names, campaign.labels.get("session")
     ordered = arrivals(campaign.q, names, campaign.covariates, sessions)
     same = (name in ordered and np.array_equal(campaign.covariates[name], ordered[name]) for name in columns)
@@ -92,14 +92,14 @@ def _follow(campaign: Campaign, columns: list[str]) -> bool:
 
 
 def _came(campaign: Campaign) -> NDArray[np.bool_]:
-    """(N,) whether the row before was of other commands, so that the order tells from where the robot came."""
+    """Mask (N,) of rows that follow another command, so that the order gives the direction."""
     order, came = in_order(campaign), np.ones(campaign.samples, dtype=bool)
     came[order[1:]] = np.abs(np.diff(campaign.q[order], axis=0)).max(axis=1) > SAME_COMMAND
     return came
 
 
 def times(campaign: Campaign, rows: Rows) -> list[Rows]:
-    """Group repeats of one pose by measuring time, first to last.
+    """Repeats of one pose grouped by measuring time, first to last.
 
     The times are sessions, where the pose was repeated in several. Otherwise the span of ``time`` or ``order`` over
     these rows is divided into equal parts, of :data:`PER_TIME` cycles in the mean, :data:`MOST_TIMES` at most. Nothing

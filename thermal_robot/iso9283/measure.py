@@ -1,4 +1,4 @@
-"""From a campaign with repeats to the criteria of ISO 9283, and what a reader must know beside the figures.
+"""ISO 9283 criteria of a campaign with repeats, and remarks on their validity.
 
 The standard looks at attained and commanded poses in the axes of the base.
 """
@@ -39,7 +39,7 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A campaign in the axes of the base.
+    """Campaign transformed to the axes of the base.
 
     ``attained`` was measured, ``commanded`` are the nominal robot's poses (``None`` where the frames take up all
     figures, so that AP would be zero by itself), ``corrected`` what a model predicts. ``fitted`` are the frames that
@@ -55,11 +55,11 @@ class Seen:
     figures: int
 
     def near(self, rows: Rows) -> Accuracy | None:
-        """Return AP of some rows."""
+        """Pose accuracy AP of some rows."""
         return None if self.commanded is None else accuracy(self.attained.take(rows), self.commanded.take(rows))
 
     def after(self, rows: Rows) -> Accuracy | None:
-        """Return AP of some rows against the corrected model, where that predicts them."""
+        """Pose accuracy AP of some rows against the corrected model, where it predicts them."""
         if self.corrected is None:
             return None
         rows = rows[np.isfinite(self.corrected.position[rows]).all(axis=1)]
@@ -67,7 +67,7 @@ class Seen:
 
 
 def _seen(campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Array | None] | None) -> Seen:
-    """See a campaign; arguments as of :func:`performance`."""
+    """Transform a campaign to the base; arguments as of :func:`performance`."""
     each = 3 if campaign.orientation is None else 6
     held = campaign.tool_known or campaign.simulated_position is not None
     unknown = {"base": 0 if campaign.base_known else 6, "tool": 0 if held else each}
@@ -84,14 +84,14 @@ def _seen(campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Arr
 
 
 def _in_base(base: Array, position: Array, orientation: Array | None) -> Attained:
-    """Turn what stands in the measurement frame into the axes of the base."""
+    """Rotate from the measurement frame into the axes of the base."""
     turn, origin = base[:3, :3], base[:3, 3]
     rotation = None if orientation is None else turn.T @ quaternion_to_rotation(orientation)
     return Attained((position - origin) @ turn, rotation)
 
 
 def _checked(campaign: Campaign, predicted: tuple[Array, Array | None]) -> tuple[Array, Array | None]:
-    """Refuse predictions of other rows."""
+    """Return the validated predictions of the same rows."""
     kind = "positions (N, 3) and orientations (N, 4) or None, as predict() returns them"
     require("performance(), predicted", predicted, (tuple, list), kind)
     position, orientation = (None if part is None else np.asarray(part, dtype=float) for part in predicted)
@@ -109,7 +109,7 @@ _NAMED = 5
 def _notes(
     seen: Seen, groups: Sequence[Repeats], poses: Sequence[PoseCriteria], paths: Sequence[PathCriteria], alone: int
 ) -> Iterator[str]:
-    """Yield what a reader must know beside the figures; ``alone`` rows repeat nothing."""
+    """Yield remarks on the criteria; ``alone`` rows repeat nothing."""
     campaign, many = seen.campaign, len(seen.fitted) > 1
     frames = f"{' and '.join(seen.fitted)} frame{'s' if many else ''}"
     if seen.commanded is None:
@@ -146,7 +146,7 @@ def _notes(
 def performance(
     campaign: Campaign, *, frames: Frames | None = None, predicted: tuple[Array, Array | None] | None = None
 ) -> Performance:
-    """Compute the criteria of ISO 9283 that the repeats of a campaign tell.
+    """ISO 9283 criteria from the repeats of a campaign.
 
     Parameters
     ----------

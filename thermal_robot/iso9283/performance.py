@@ -1,4 +1,4 @@
-"""The result: criteria of every pose and path that was repeated; a dict, a data frame, a table for the reader.
+"""ISO 9283 criteria of all repeated poses and paths: dict, data frame, table.
 
 Tables are in mm and mrad, the poses below each other; their cells are texts, for a terminal or a page.
 """
@@ -72,7 +72,7 @@ _WHERE_KNOWN = ("corrected", "vAP_a", "vAP_b", "vAP_c")
 
 
 def _figures(one: Criteria) -> dict[str, float]:
-    """Return every figure of a pose or path by its criterion, m and rad."""
+    """Figures of a pose or path by criterion, m and rad."""
     found: dict[str, float] = {}
     for name, place in _FIGURES.items():
         if isinstance(one, PathCriteria):
@@ -90,7 +90,7 @@ def _figures(one: Criteria) -> dict[str, float]:
 
 
 def _cycles(one: Criteria, name: str) -> int:
-    """Cycles of the direction, time or point with the fewest that a criterion is made of."""
+    """Smallest number of cycles in any direction, time or point of a criterion."""
     if isinstance(one, PoseCriteria) and name[0] in "vds":
         return min(one.variation_cycles if name[0] == "v" else one.drift_cycles)
     return one.cycles
@@ -98,7 +98,7 @@ def _cycles(one: Criteria, name: str) -> int:
 
 @dataclass(frozen=True)
 class Table:
-    """Criteria of poses or paths, one below the other.
+    """Table of criteria of poses or paths.
 
     ``head`` names the columns, the label's first; ``more`` poses or paths are not shown.
     """
@@ -110,7 +110,7 @@ class Table:
 
     @property
     def rest(self) -> str:
-        """What is not shown, and where that is; empty where all is."""
+        """Remark on what is not shown; empty where all is."""
         return f"and {self.more} more, in the JSON and the CSV" if self.more else ""
 
     @classmethod
@@ -134,7 +134,7 @@ class Table:
 
 
 def _cells(one: Criteria, figures: dict[str, float], needs: str) -> dict[str, str | int | float | None]:
-    """Return what a row of a table may show, by its column."""
+    """Cells of a table row by column."""
     corrected = figures.get("AP_p corrected", figures.get("AT_p corrected"))
     angles = {f"±{name}": value for name, value in figures.items()}
     cells = {**figures, **angles, "corrected": corrected, "n": _cycles(one, needs)}
@@ -158,7 +158,7 @@ def _text(cell: str | int | float | None, decimals: int) -> str:
 
 
 def _decimals(values: Sequence[float]) -> int:
-    """Decimals that leave two digits of the median, no fewer than a micrometre needs."""
+    """Return the number of decimals: two digits of the median, at least a micrometre."""
     sizes = sorted(MILLI * abs(value) for value in values if isfinite(value))
     sizes = [size for size in sizes if size > NOTHING]
     if not sizes:
@@ -167,7 +167,7 @@ def _decimals(values: Sequence[float]) -> int:
 
 
 def _counted(name: str, counts: Sequence[int], standard: int) -> str:
-    """Say how many there are, and how often they were repeated, beside what the standard asks for."""
+    """Return the number of poses or paths and of their repeats, beside the standard's number."""
     if not counts:
         return ""
     often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
@@ -175,7 +175,7 @@ def _counted(name: str, counts: Sequence[int], standard: int) -> str:
 
 
 def _wrapped(sentence: str, indent: str) -> str:
-    """Break a sentence into lines."""
+    """Wrap a sentence."""
     return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent), break_on_hyphens=False)
 
 
@@ -185,12 +185,12 @@ def _worst(found: Sequence[Criteria], part: str) -> float | None:
 
 @dataclass(frozen=True)
 class Performance:
-    """Criteria of ISO 9283:1998 that a campaign with repeats tells; SI, in the axes of the robot's base.
+    """ISO 9283:1998 criteria of a campaign with repeats; SI, in the axes of the robot's base.
 
     Attributes
     ----------
     campaign, robot, tool_frame
-        What was measured.
+        Names of campaign, robot and tool frame.
     poses
         Poses at rest, in the sequence in which they were met.
     paths
@@ -202,7 +202,7 @@ class Performance:
     instrument
         RP_l that the instrument alone would show, m; ``None`` where its noise is not given.
     notes
-        What a reader must know, a sentence each.
+        Remarks, a sentence each.
 
     Examples
     --------
@@ -267,13 +267,13 @@ class Performance:
 
     @property
     def extent(self) -> str:
-        """How many poses and paths there are, and how often each was repeated."""
+        """Number of poses and paths, and of repeats of each."""
         at_rest = _counted("pose", [p.cycles for p in self.poses], CYCLES)
         along = _counted("path", [p.cycles for p in self.paths], PATH_CYCLES)
         return ", and ".join(part for part in (at_rest, along) if part)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values for JSON, SI.
+        """Plain values for JSON, SI.
 
         Examples
         --------
@@ -285,7 +285,7 @@ class Performance:
         return {"schema": SCHEMA, **asdict(self)}
 
     def to_frame(self) -> pd.DataFrame:
-        """Return a data frame, one row a figure.
+        """Return the data frame, one row a figure.
 
         Returns
         -------
@@ -321,7 +321,7 @@ class Performance:
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        """The criteria as tables of texts, in mm and mrad: those of poses, then those of paths, none that is empty."""
+        """Tables of texts, in mm and mrad: of poses, then of paths; empty ones are left out."""
         made = (Table.of(self._all, needs) for needs in _COLUMNS)
         return tuple(table for table in made if table)
 

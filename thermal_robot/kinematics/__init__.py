@@ -1,4 +1,4 @@
-"""Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
+"""Batch kinematics: poses, Jacobians, placement sensitivities, gravity torques; the one room with Pinocchio."""
 
 from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model
 from thermal_robot.kinematics.frames import (

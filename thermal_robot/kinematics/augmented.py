@@ -28,7 +28,7 @@ ELONGATION = "elongation of "
 
 @dataclass(frozen=True, eq=False)
 class AugmentedModel:
-    """A Pinocchio model of the chain with M movable joints and S virtual prismatic ones; the world is the root frame.
+    """Pinocchio model of the chain with M movable joints and S virtual prismatic ones; its world is the root frame.
 
     It knows positions only: it carries no masses, for which ``robot.model`` is there. A joint that mimics another has
     a coordinate in the model, which this class fills in: M = n unless there are such joints.
@@ -63,7 +63,7 @@ class AugmentedModel:
     offset: Array
 
     def configurations(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Write joint positions and elongations as the model does.
+        """Return the configurations of the model from joint positions and elongations.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class AugmentedModel:
         return out @ self.coupling.T + self.offset
 
     def tool_poses(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Pose (N, 4, 4) of the tool frame in the root frame, m; arguments as for :meth:`configurations`."""
+        """Forward kinematics: pose (N, 4, 4) of the tool frame in the root frame, m."""
         data, poses = self.model.createData(), []
         for row in self.configurations(q, elongations):
             pin.forwardKinematics(self.model, data, row)
@@ -102,7 +102,7 @@ class AugmentedModel:
         return np.array(poses).reshape(-1, 4, 4)
 
     def jacobians(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Twist (N, 6, M + S) of the tool, linear rows first, in root axes, for a unit speed of each coordinate.
+        """Geometric Jacobian (N, 6, M + S) of the tool, linear rows first, in root axes.
 
         The column of a joint that others mimic holds what they do with it; their own are zero.
         """
@@ -175,7 +175,7 @@ def _columns(model: pin.Model, names: Sequence[str]) -> NDArray[np.int64]:
 
 
 def _coupled(model: pin.Model, robot: Robot, joints: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Write the robot's coupling for the coordinates of the model, virtual joints included."""
+    """Coupling matrix of the robot extended by the virtual joints."""
     movable = _columns(model, [robot.chain.names[k] for k in robot.chain.movable])
     matrix, offset = np.eye(model.nq), np.zeros(model.nq)
     matrix[movable] = 0.0

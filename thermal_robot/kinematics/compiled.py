@@ -1,4 +1,4 @@
-"""The engine for very many configurations, with the extra ``fast``: kernels compiled by numba, on all processors."""
+"""Numba engine for large batches (the extra ``fast``), on all processors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from thermal_robot.kinematics.lanes import Chained, arm_of, rows_last, scratch
 
 
 def installed() -> bool:
-    """Whether numba is there and can be loaded; the first call loads it."""
+    """Whether numba can be loaded; the first call loads it."""
     return loads("thermal_robot.kinematics.kernels")
 
 
 def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = None, mass: Array | None = None) -> None:
-    """Let a kernel write the rows of ``out``; the point (3,) and the mass of a payload are one for all rows."""
+    """Run a kernel over all rows of ``out``; the point (3,) and the mass of a payload are common to all rows."""
     from thermal_robot.kinematics import kernels
 
     arm = arm_of(robot.chain)
@@ -31,7 +31,7 @@ def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = N
 
 
 def _write(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out: Array) -> None:
-    """Let the kernel write, in pieces, in threads."""
+    """Run the kernel over slices of rows in threads."""
     rows = rows_last(out)
     if np.may_share_memory(q, out):
         q = q.copy()

@@ -1,4 +1,4 @@
-"""Frames of the chain, nominal or displaced, and their Jacobians, for a batch of configurations; by which engine."""
+"""Batch forward kinematics and Jacobians of a chain, nominal or displaced, by the fastest engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from thermal_robot.kinematics.lie import exp6
 
 @dataclass(frozen=True, eq=False)
 class Displacement:
-    """Small errors in the four places where error enters a chain; ``None`` means none there.
+    """Small errors in the four channels of a chain; ``None`` means none there.
 
     The displaced tool pose is ``exp(base) · Π_k [P_k · exp(segment_k) · motion_k(q_k + joint_k)] ·
     exp(tool)``; every array may have a row for each configuration or be one row for all. Twists are ordered
@@ -50,7 +50,7 @@ def compute(
     mass: Array | None = None,
     frames: ChainFrames | None = None,
 ) -> Array:
-    """Let the engine that is fastest for so many configurations ``q``, (N, n), write into ``out``, and return that.
+    """Dispatch a batch of configurations ``q``, (N, n), to the fastest engine, which writes into ``out``.
 
     ``what`` is ``poses``, ``jacobians``, ``placements`` or ``gravity``. A point of the tool is (3,) or (N, 3) m in its
     frame, ``None`` for its origin; the mass of a payload there () or (N,) kg. With ``frames`` ``q`` is not read.
@@ -72,7 +72,7 @@ def _one_for_all(point: Array | None, mass: Array | None) -> bool:
 
 
 def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Moved:
-    """Make a displacement ready for that many rows; what is displaced by nothing is left out."""
+    """Displacement as arrays for that many rows, without zero ones."""
     if displacement is None:
         return lanes.NOWHERE
     shapes = {"joint": (robot.n,), "segment": (len(robot.segments), 6), "base": (6,), "tool": (6,)}
@@ -95,7 +95,7 @@ def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Move
 
 
 def _motions(twists: dict[int, Array]) -> dict[int, Array]:
-    """(4, 4, N) of each of (N, 6) twists, (4, 4, 1) where all rows are the same, as most errors of an arm are."""
+    """Rigid motions (4, 4, N) of (N, 6) twists; (4, 4, 1) where all rows are the same."""
     same = [k for k, own in twists.items() if (own == own[:1]).all()]
     alike = exp6(np.array([twists[k][0] for k in same]).reshape(-1, 6))
     motions = {k: motion[:, :, None] for k, motion in zip(same, alike, strict=True)}
@@ -252,7 +252,7 @@ def placement_sensitivities(
 
 
 def _point(point: ArrayLike | None, rows: int) -> Array | None:
-    """Return the point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
+    """Point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
     if point is None:
         return None
     offset = np.asarray(point, dtype=float)

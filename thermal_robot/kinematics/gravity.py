@@ -1,4 +1,4 @@
-"""What gravity asks of an arm: torques that hold it, wrenches on its segments; for a batch of configurations."""
+"""Gravity torques of the joints and gravity wrenches on the segments, in batches."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def segment_loads(
 
 
 def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None) -> Array:
-    """Regressor of statics: what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
+    """Regressor of statics: joint torques per unit mass and first moment of each body.
 
     Holding torques are linear in the masses and first moments of the bodies (Pinocchio's ``computeStaticRegressor``):
     τ_j = Σ_b Y_jb · (m_b, m_b c_b).
@@ -151,7 +151,7 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
 
 
 def _with_tool(frames: ChainFrames) -> tuple[list[Array], list[Array]]:
-    """Return rotations (3, 3, N) and positions (3, N) of the K elements and behind them of the tool."""
+    """Rotations (3, 3, N) and positions (3, N) of the K elements, followed by the tool's."""
     places = frames.rows_last()
     return [*places.rotations, places.tool_rotation], [*places.positions, places.tool_position]
 

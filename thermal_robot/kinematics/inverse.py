@@ -53,7 +53,7 @@ _SMALLEST = 1e-6
 
 
 class Reached(NamedTuple):
-    """Where a chain was brought.
+    """Result of inverse kinematics.
 
     Attributes
     ----------
@@ -71,12 +71,12 @@ class Reached(NamedTuple):
 
     @property
     def miss(self) -> Array:
-        """(N,) m by which the point is missed."""
+        """Position error (N,), m."""
         return np.asarray(np.linalg.norm(self.position, axis=1))
 
     @property
     def turned(self) -> Array:
-        """(N,) rad by which the direction is missed."""
+        """Angle error (N,), rad."""
         return np.asarray(np.linalg.norm(self.direction, axis=1))
 
 
@@ -89,7 +89,7 @@ def inverse_kinematics(
     displaced: Callable[[Array], Displacement | None] | None = None,
     within: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> Reached:
-    """Find joint positions that bring the tool to poses, as near to a start as that is possible.
+    """Inverse kinematics by damped least squares: joint positions for tool poses, as near as possible to a start.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def inverse_kinematics(
     Returns
     -------
     Reached
-        Of every row the nearest that was found. Whether that is near enough is the caller's to say.
+        Nearest solution of each row; the caller decides whether its error is acceptable.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def inverse_kinematics(
 def nearest_postures(
     robot: Robot, poses: ArrayLike, *, tool: ArrayLike | None = None, near: ArrayLike | None = None
 ) -> Reached:
-    """Multi-start inverse kinematics: of the postures found that bring the tool to poses the nearest.
+    """Multi-start inverse kinematics: the nearest of the postures that reach each pose.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def nearest_postures(
 
 
 def _better(one: Reached, other: Reached, near: Array) -> Reached:
-    """Return row by row the one that misses less, or where both miss as much the nearer one."""
+    """Row by row the solution with the smaller error, or at equal errors the nearer one."""
     cost = [np.maximum(each.miss, EXACT) + ARM * np.maximum(each.turned, _SAME) for each in (one, other)]
     far = [np.linalg.norm(each.q - near, axis=1) for each in (one, other)]
     alike = np.abs(cost[1] - cost[0]) <= ARM * _SAME
@@ -175,7 +175,7 @@ def _better(one: Reached, other: Reached, near: Array) -> Reached:
 
 @dataclass(frozen=True, eq=False)
 class _Driven:
-    """A chain, where it shall go, and what it may do."""
+    """Inverse kinematics problem: a chain, its targets, and its limits."""
 
     robot: Robot
     wanted: Array
@@ -188,23 +188,23 @@ class _Driven:
         return chain_frames(self.robot, q, None if self.displaced is None else self.displaced(q))
 
     def error(self, frames: ChainFrames) -> Array:
-        """(N, 6) wanted − reached: m, and a rotation vector in rad; root frame."""
+        """Pose error (N, 6), wanted − reached: m, and a rotation vector in rad; root frame."""
         place = frames.tool_position + frames.tool_rotation @ self.tool[:3, 3]
         rotation = frames.tool_rotation @ self.tool[:3, :3]
         turn = log3(self.wanted[:, :3, :3] @ rotation.transpose(0, 2, 1))
         return np.concatenate([self.wanted[:, :3, 3] - place, turn], axis=1)
 
     def jacobian(self, frames: ChainFrames) -> Array:
-        """(N, 6, n) of the displaced chain; what the displacement itself changes with q is left to the next step."""
+        """Jacobian (N, 6, n) of the displaced chain, without the derivative of the displacement."""
         return frame_jacobians(self.robot, np.empty(0), frames=frames, point=self.tool[:3, 3])
 
     def free(self, q: Array, downhill: Array) -> NDArray[np.bool_]:
-        """(N, n) which joints may go the way (N, n) that lowers the cost: not those at the end that it leads out of."""
+        """Mask (N, n) of the joints that can follow the descent direction without leaving their limits."""
         return ~(((q <= self.low) & (downhill < 0.0)) | ((q >= self.high) & (downhill > 0.0)))
 
 
 def _to_the_pose(chain: _Driven, q: Array) -> Array:
-    """Levenberg-Marquardt within the box, all rows at once, each with a damping of its own."""
+    """Levenberg-Marquardt with box constraints, all rows at once, each with its own damping."""
     weights = np.array([1.0, 1.0, 1.0, ARM, ARM, ARM])
     damping, going = np.full(len(q), _DAMPING), np.ones(len(q), dtype=bool)
     frames = chain.frames(q)
@@ -235,7 +235,7 @@ def _to_the_pose(chain: _Driven, q: Array) -> Array:
 
 
 def _to_the_point(chain: _Driven, q: Array) -> Array:
-    """Newton steps of least length on the point; a joint that would leave the box is held."""
+    """Minimum-norm Newton steps on the position; joints at their limits are held."""
     nearest, miss = q, np.full(len(q), np.inf)
     for _ in range(POINT_STEPS):
         frames = chain.frames(q)

@@ -1,4 +1,4 @@
-"""Compiled loops of the batch functions: a block of configurations side by side, one lane each, in the inner loop.
+"""Compiled kernels of batch kinematics: blocks of configurations, one vector lane each.
 
 Imported only where numba is installed. Every loop over lanes has the same fixed length and no branch, so that the
 compiler makes vector instructions of it and each lane is computed alike, wherever it stands in a block and whichever
@@ -31,13 +31,13 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 
 @compiled
 def at(row: int) -> np.uint64:
-    """Where a row begins: a number without a sign, as one that may be negative counts from the end."""
+    """Offset of a row, unsigned, since a negative index counts from the end."""
     return np.uint64(row * LANES)
 
 
 @compiled
 def sincos(room: Array, x: int) -> None:
-    """Write sines and cosines of the angles of a row, below ``LARGEST_REDUCED``, to the next two rows."""
+    """Write sines and cosines of a row of angles below ``LARGEST_REDUCED`` into the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
     angles, sines, cosines = at(x), at(x + 1), at(x + 2)
     for i in range(WIDE):
@@ -56,7 +56,7 @@ def sincos(room: Array, x: int) -> None:
 
 @compiled
 def turn(room: Array, x: int, large: bool) -> None:
-    """Write sines and cosines of angles of any size: the large ones, if there are any, one by one."""
+    """Write sines and cosines of angles of any size: large ones one by one."""
     sincos(room, x)
     if large:
         angles, sines, cosines = at(x), at(x + 1), at(x + 2)
@@ -68,7 +68,7 @@ def turn(room: Array, x: int, large: bool) -> None:
 
 @compiled
 def follow(room: Array, place: Array, x: int, to: int) -> None:
-    """Follow the frame in twelve rows by a constant placement, whose first three rows are read."""
+    """Multiply the frame in twelve rows by a constant placement (3 × 4)."""
     a0, a1, a2, a3 = place[0]
     b0, b1, b2, b3 = place[1]
     c0, c1, c2, c3 = place[2]
@@ -85,7 +85,7 @@ def follow(room: Array, place: Array, x: int, to: int) -> None:
 
 @compiled
 def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: int, to: int) -> None:
-    """Turn column a of the frame in twelve rows towards column b, and follow it by a constant placement.
+    """Rotate column a of the frame towards column b, then multiply by a constant placement.
 
     Sine and cosine are the second and third row from ``joint``.
     """
@@ -110,7 +110,7 @@ def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: in
 
 @compiled
 def slide(room: Array, axis: Array, joint: int, x: int, to: int) -> None:
-    """Move the frame in twelve rows along an axis of its own by the position in a row."""
+    """Translate the frame in twelve rows along its own axis by the position in a row."""
     (ax, ay, az), moved = axis, at(joint)
     for row in range(0, 12, 4):
         u, v, w, p = at(x + row), at(x + row + 1), at(x + row + 2), at(x + row + 3)
@@ -123,7 +123,7 @@ def slide(room: Array, axis: Array, joint: int, x: int, to: int) -> None:
 
 @compiled
 def load(room: Array, arm: Arm, j: int, q: Array, start: np.uint64, to: int) -> bool:
-    """Write the positions of a movable joint; return whether one is too large for the short reduction."""
+    """Load the positions of a movable joint; whether one is too large for :func:`sincos`."""
     lead, factor, offset, large, here = arm.lead[j], arm.factor[j], arm.offset[j], False, at(to)
     for i in range(WIDE):
         position = offset
@@ -136,13 +136,13 @@ def load(room: Array, arm: Arm, j: int, q: Array, start: np.uint64, to: int) -> 
 
 @compiled
 def frame_of(k: int, kept: int) -> int:
-    """Where the frame of an element is, before its motion; where few are kept it takes the place of an older one."""
+    """Offset of the frame of an element, before its motion; where few are kept, older ones are overwritten."""
     return 12 * (k if k < kept else kept - 2 + (k - kept) % 2)
 
 
 @compiled
 def still(arm: Arm) -> int:
-    """Return how many elements come before the first joint that moves."""
+    """Return the number of elements before the first joint that moves."""
     k = 0
     while k < len(arm.kinds) - 1 and arm.joint[k] < 0:
         k += 1
@@ -151,7 +151,7 @@ def still(arm: Arm) -> int:
 
 @compiled
 def new_room(arm: Arm, kept: int, more: int) -> Array:
-    """Return memory for the frames of a block, for the walk, and behind them for some more rows.
+    """Allocate the work array of a block: frames, then temporaries, then ``more`` rows.
 
     The frames of the first elements, which do not move, are in it.
     """
@@ -165,7 +165,7 @@ def new_room(arm: Arm, kept: int, more: int) -> Array:
 
 @compiled
 def walk(room: Array, arm: Arm, kept: int, q: Array, start: np.uint64) -> int:
-    """Write the frames of a block, twelve rows each, before their elements move; return where the tool's is."""
+    """Forward kinematics of a block: the frame of each element, twelve rows each; return the tool's offset."""
     elements, joint = len(arm.kinds), 12 * kept
     aligned, slid = joint + 3, joint + 15
     for k in range(still(arm), elements):
@@ -192,13 +192,13 @@ def walk(room: Array, arm: Arm, kept: int, q: Array, start: np.uint64) -> int:
 
 @compiled
 def begin(start: int, stop: int, number: int) -> np.uint64:
-    """Where a block begins: the last one ends with the rows, and works on some of them once more."""
+    """First row of a block; the last block ends with the rows, and so overlaps the one before."""
     return np.uint64(max(min(start + number * LANES, stop - LANES), 0))
 
 
 @compiled
 def give(room: Array, x: int, out: Array, row: int, start: np.uint64) -> None:
-    """Hand a row over to the results."""
+    """Copy a row to the results."""
     given = at(x)
     for i in range(WIDE):
         out[row, start + i] = room[given + i]
@@ -213,7 +213,7 @@ def give_zeros(out: Array, row: int, start: np.uint64) -> None:
 
 @compiled
 def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: np.uint64) -> None:
-    """Hand one component of a cross product over to the results."""
+    """Write one component of a cross product to the results."""
     u, v, w, p = at(a), at(b), at(c), at(d)
     for i in range(WIDE):
         out[row, start + i] = room[u + i] * room[v + i] - room[w + i] * room[p + i]
@@ -229,7 +229,7 @@ def add(room: Array, x: int, factor: float, out: Array, row: int, start: np.uint
 
 @compiled
 def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
+    """Write the tool poses (16, N) of the rows from ``start`` to ``stop``, at least ``LANES`` of them."""
     kept = still(arm) + 3  # no frame is looked at again but those that stay, and the last
     room = new_room(arm, kept, 0)
     for number in range((stop - start + LANES - 1) // LANES):
@@ -245,7 +245,7 @@ def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def target(room: Array, arm: Arm, tool: int, to: int) -> None:
-    """Write where the point of the tool is."""
+    """Write the position of the point of the tool."""
     x, y, z = arm.point
     for m in range(3):
         row, here = tool + 4 * m, at(to + m)
@@ -256,7 +256,7 @@ def target(room: Array, arm: Arm, tool: int, to: int) -> None:
 
 @compiled
 def axis_of(room: Array, arm: Arm, k: int, to: int) -> tuple[int, int, float]:
-    """Return where the axis of a joint is in root axes, how far its components are apart, and what each is times.
+    """Offset of a joint's axis in root axes, stride of its components, and their factor.
 
     Where a joint turns about an axis of its frame it is a column of that; else it is written.
     """
@@ -276,7 +276,7 @@ def axis_of(room: Array, arm: Arm, k: int, to: int) -> tuple[int, int, float]:
 def add_twist(
     room: Array, m: int, axis: int, step: int, factor: float, k: int, point: int, out: Array, row: int, start: np.uint64
 ) -> None:
-    """Add to the results how a turn about the axis at the origin of an element moves a point, one component of it."""
+    """Add one component of the velocity of a point by a unit rotation about the axis of an element."""
     a, b = (m + 1) % 3, (m + 2) % 3
     u, v, x, y = at(axis + step * a), at(axis + step * b), at(point + a), at(point + b)
     p, q = at(12 * k + 4 * a + 3), at(12 * k + 4 * b + 3)
@@ -287,7 +287,7 @@ def add_twist(
 
 @compiled
 def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the Jacobians at the point, (6 n, N): the first joint that follows a driving one clears what was there."""
+    """Write Jacobians (6 n, N) at the point; the first follower of a driving joint overwrites, the others add."""
     n, kept = q.shape[1], len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point = 12 * kept + 27
@@ -313,7 +313,7 @@ def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def lever_of(room: Array, k: int, point: int, to: int) -> None:
-    """Write a point seen from the origin of an element."""
+    """Write the lever arm of a point from the origin of an element."""
     for m in range(3):
         origin, end, here = at(12 * k + 4 * m + 3), at(point + m), at(to + m)
         for i in range(WIDE):
@@ -322,7 +322,7 @@ def lever_of(room: Array, k: int, point: int, to: int) -> None:
 
 @compiled
 def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the sensitivities of the point to every placement, (36 S, N)."""
+    """Write placement sensitivities (36 S, N) at the point."""
     segments, kept = len(arm.placed), len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point, lever = 12 * kept + 27, 12 * kept + 30
@@ -358,7 +358,7 @@ def add_torque(
     room: Array, axis: int, step: int, factor: float, pull: Array, moment: int, mass: float, k: int,
     out: Array, row: int, start: np.uint64,
 ) -> None:  # fmt: skip
-    """Add to the results a factor times axis · (pull × lever), with the lever from the origin of an element."""
+    """Add a multiple of axis · (force × lever), with the lever from the origin of an element."""
     x, y, z = pull[0] * factor, pull[1] * factor, pull[2] * factor
     u, v, w = at(axis), at(axis + step), at(axis + 2 * step)
     along, across, up = at(moment), at(moment + 1), at(moment + 2)
@@ -372,7 +372,7 @@ def add_torque(
 
 @compiled
 def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the torques, (n, N), that hold the arm and a payload at the point."""
+    """Write holding torques (n, N) of the arm and of a payload at the point."""
     kept = len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     moment = 12 * kept + 27

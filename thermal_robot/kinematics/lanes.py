@@ -1,4 +1,4 @@
-"""Forward kinematics of a chunk of configurations at once by NumPy: the engine of batches, nominal or displaced.
+"""NumPy engine: batch kinematics of a chunk of configurations at once, nominal or displaced.
 
 A frame of C configurations is an array (3, 4, C): rotation and position side by side, as in the first three rows of a
 homogeneous matrix, and the configurations last, so that every NumPy call works on long contiguous rows. Chunks stay in
@@ -30,7 +30,7 @@ _kept = threading.local()
 
 
 def scratch(name: str, *shape: int) -> Array:
-    """Return an array of that shape with anything in it, the same memory each time; until the next call it is yours.
+    """Reusable uninitialised array of a shape; valid until the next call.
 
     Two arrays that are in use together have two names.
     """
@@ -43,19 +43,19 @@ def scratch(name: str, *shape: int) -> Array:
 
 
 def chunks(rows: int, frames: int) -> Iterator[slice]:
-    """Consecutive slices that cover all rows, each short enough for that many frames a row to stay in the cache."""
+    """Consecutive slices of rows, short enough for that many frames a row to stay in the cache."""
     fits = settings.CACHE // (_FRAME * max(frames, 1))
     step = max(min(settings.CHUNK, fits), min(settings.SHORTEST_CHUNK, settings.CHUNK))
     return (slice(start, min(start + step, rows)) for start in range(0, rows, step))
 
 
 def rows_last(array: Array) -> Array:
-    """Return an array (N, ...) as (..., N), the same memory."""
+    """View of an array (N, ...) as (..., N)."""
     return array.transpose(*range(1, array.ndim), 0)
 
 
 def result(out: Array | None, rows: int, *shape: int) -> Array:
-    """Return the array for the results of N configurations: a new one with N last in memory, or the caller's.
+    """Output array for N configurations: a new one with N last in memory, or the caller's.
 
     The caller's ``out`` is of shape (N, ...), in any layout; refused unless it is such an array of floats that may be
     written to.
@@ -75,7 +75,7 @@ def result(out: Array | None, rows: int, *shape: int) -> Array:
 
 
 class Chained(Protocol):
-    """What the engines ask of a robot: the attributes of these names of :class:`~thermal_robot.Robot`."""
+    """Protocol of a robot for the engines, a subset of :class:`~thermal_robot.Robot`."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -107,12 +107,12 @@ class ChainFrames(NamedTuple):
     tool_position: Array
 
     def rows_last(self) -> ChainFrames:
-        """Return the same with the N last, as the engines want them."""
+        """Copy with the N last, as the engines need them."""
         return ChainFrames(*map(rows_last, self))
 
 
 class Moved(NamedTuple):
-    """A displacement made ready: joint offsets (1 or N, n), and rigid motions (4, 4, 1 or N) by element."""
+    """Displacement as arrays: joint offsets (1 or N, n), and rigid motions (4, 4, 1 or N) by element."""
 
     joint: Array | None = None
     motions: dict[int, Array] = {}  # noqa: RUF012 - nobody writes to it
@@ -127,7 +127,7 @@ TURNS, TURNS_ALIGNED, SLIDES = 1, 2, 3
 
 
 class Arm(NamedTuple):
-    """Constant arrays of a chain of K elements, M movable joints, n driving ones and S segments, as engines want them.
+    """Constant arrays of a chain of K elements, M movable joints, n driving ones and S segments, for the engines.
 
     The walk along it goes from element to element by the constant ``place`` (K, 4, 4), then turns or slides. Where a
     joint turns about no axis of its frame, ``aligned`` (K, 4, 4) puts the third axis there first, and the next
@@ -161,7 +161,7 @@ _arms: WeakKeyDictionary[Chain, Arm] = WeakKeyDictionary()
 
 
 def arm_of(chain: Chain) -> Arm:
-    """Return the constants of a chain, made once; the point is the tool's origin."""
+    """Constant arrays of a chain, cached; the point is the tool's origin."""
     found = _arms.get(chain)
     if found is None:
         found = _arms[chain] = _made(chain)
@@ -206,7 +206,7 @@ def _made(chain: Chain) -> Arm:
 
 
 def _about(axis: Array) -> tuple[int, tuple[int, int], Array]:
-    """Return the kind of a turn, which columns of a rotation it turns, and after which constant (3, 3) rotation."""
+    """Rotation type of an axis, the columns that it rotates, and a constant rotation (3, 3) before it."""
     w = int(np.argmax(np.abs(axis)))
     a, b = (w + 1) % 3, (w + 2) % 3
     if np.abs(axis[w]) == 1.0 and np.count_nonzero(axis) == 1:
@@ -217,7 +217,7 @@ def _about(axis: Array) -> tuple[int, tuple[int, int], Array]:
 
 
 def walk(chain: Chain, q: Array, moved: Moved, part: slice, frames: Array | Sequence[Array], tool: Array) -> None:
-    """Forward kinematics of a chunk of configurations: write the frames of all elements and of the tool.
+    """Forward kinematics of a chunk of configurations: frames of all elements and of the tool.
 
     Of the N rows of ``q`` the chunk ``part`` has C. ``frames`` are K arrays (3, 4, C) to write to: the frame after the
     placement of each element, before its motion; consecutive ones must not be the same. ``tool`` is (3, 4, C).
@@ -253,7 +253,7 @@ def walk(chain: Chain, q: Array, moved: Moved, part: slice, frames: Array | Sequ
 
 
 def _joints(arm: Arm, chain: Chain, q: Array, more: Array | None, part: slice) -> Array:
-    """Return the (M, C) positions of the movable joints."""
+    """Positions (M, C) of the movable joints."""
     driving = scratch("driving", q.shape[1], part.stop - part.start)
     driving[...] = q[part].T
     if more is not None:
@@ -267,7 +267,7 @@ def _joints(arm: Arm, chain: Chain, q: Array, more: Array | None, part: slice) -
 
 
 def _turn(frame: Array, a: int, b: int, sine: Array, cosine: Array, out: Array) -> None:
-    """Turn column a of every frame towards column b."""
+    """Rotate column a of every frame towards column b."""
     one, other, term, rest = frame[:, a], frame[:, b], scratch("term", 3, len(sine)), 3 - a - b
     first, second = np.multiply(one, cosine, out=out[:, a]), np.multiply(other, cosine, out=out[:, b])
     first += np.multiply(other, sine, out=term)
@@ -276,7 +276,7 @@ def _turn(frame: Array, a: int, b: int, sine: Array, cosine: Array, out: Array) 
 
 
 def _slide(frame: Array, axis: Array, distance: Array, out: Array) -> None:
-    """Move every frame along its own constant axis."""
+    """Translate every frame along its own constant axis."""
     out[...] = frame
     term = np.matmul(axis, frame[:, :3], out=scratch("term", 3, len(distance)))
     term *= distance
@@ -288,7 +288,7 @@ def _rows_of(motions: Array, part: slice) -> Array:
 
 
 def _followed(frame: Array, motions: Array) -> Array:
-    """Follow every frame by a motion of its own, (4, 4, C) or one for all, (4, 4, 1)."""
+    """Multiply every frame by its own motion, (4, 4, C), or by a common one, (4, 4, 1)."""
     product = frame[:, 0, None] * motions[0]
     for m in (1, 2):
         product += frame[:, m, None] * motions[m]
@@ -298,7 +298,7 @@ def _followed(frame: Array, motions: Array) -> Array:
 
 @contextmanager
 def written(out: Array, part: slice) -> Iterator[Array]:
-    """Yield where the results (..., C) of a chunk are written: in place, where N is last in memory too."""
+    """Yield a buffer for the results (..., C) of a chunk: the output itself where N is last in memory."""
     rows = rows_last(out)[..., part]
     if rows.strides[-1] == rows.itemsize:
         yield rows
@@ -311,7 +311,7 @@ def written(out: Array, part: slice) -> Iterator[Array]:
 def visit(
     robot: Chained, q: Array, out: Array, given: ChainFrames | None, do: Callable[[ChainFrames, slice, Array], None]
 ) -> None:
-    """Call a function with the frames of one chunk of configurations after another, and where to write its results.
+    """Call a function with the frames of one chunk of configurations after another, and its output buffer.
 
     The frames are overwritten when ``do`` returns; ``q`` is not read where those of all N are ``given``.
     """
@@ -328,7 +328,7 @@ def visit(
 
 
 def target(frames: ChainFrames, point: Array | None, part: slice) -> Array:
-    """Where a point of the tool, (3,) or (N, 3) m in its frame, is in root axes: (3, C)."""
+    """Position (3, C) in root axes of a point of the tool, (3,) or (N, 3) m in its frame."""
     if point is None:
         return frames.tool_position
     if point.ndim == 2:
@@ -339,7 +339,7 @@ def target(frames: ChainFrames, point: Array | None, part: slice) -> Array:
 
 
 def cross(a: Array, b: Array, out: Array, term: Array) -> None:
-    """Cross product of vectors, or of one with many, components first; here several times faster than ``np.cross``."""
+    """Write the cross product of vectors, or of one with many, components first; faster here than ``np.cross``."""
     for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
         np.multiply(a[j], b[k], out=out[i])
         np.multiply(a[k], b[j], out=term)

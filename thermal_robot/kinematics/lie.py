@@ -1,4 +1,4 @@
-"""Rotations and rigid motions in batches: exponentials, logarithms, quaternions.
+"""Rotations and rigid motions in batches (Lie groups SO(3), SE(3)): exponentials, logarithms, quaternions.
 
 Every function takes any number of leading dimensions and is accurate to rounding at both ends, near the
 identity and near a half turn. Twists are ordered (linear, angular), quaternions (w, x, y, z).
@@ -27,7 +27,7 @@ def skew(vectors: ArrayLike) -> Array:
 
 
 def exp3(vectors: ArrayLike) -> Array:
-    """Rotation about each vector by its length (Rodrigues' formula).
+    """Exponential map of SO(3): rotation matrix of each rotation vector (Rodrigues' formula).
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def exp3(vectors: ArrayLike) -> Array:
 
 
 def exp6(twists: ArrayLike) -> Array:
-    """Rigid motion reached by following each twist for a unit of time.
+    """Exponential map of SE(3): rigid motion of each twist.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def exp6(twists: ArrayLike) -> Array:
 
 
 def log3(rotations: ArrayLike) -> Array:
-    """Rotation vector of each rotation, of length at most π.
+    """Logarithm of SO(3): rotation vector of each rotation, of length at most π.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def log3(rotations: ArrayLike) -> Array:
 
 
 def quaternion_to_rotation(quaternions: ArrayLike) -> Array:
-    """Rotation matrix of each quaternion; a quaternion is normalised first.
+    """Rotation matrix of each quaternion, normalised first.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def quaternion_to_rotation(quaternions: ArrayLike) -> Array:
 
 
 def rotation_to_quaternion(rotations: ArrayLike) -> Array:
-    """Find the unit quaternion of each rotation, with w ≥ 0 (Shepperd's method).
+    """Return the unit quaternion of each rotation, with w ≥ 0 (Shepperd's method).
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def rotation_to_quaternion(rotations: ArrayLike) -> Array:
 
 
 def rotation_to_rpy(rotation: ArrayLike) -> Array:
-    """Find roll, pitch and yaw of a rotation, R = Rz(yaw) Ry(pitch) Rx(roll), as a URDF wants them.
+    """Roll, pitch and yaw of a rotation, R = Rz(yaw) Ry(pitch) Rx(roll), the URDF convention.
 
     At a pitch of ±90° roll and yaw are not unique, and near it neither is well determined; roll is then found of what
     the yaw leaves, so that the three together give the rotation to rounding.
@@ -184,7 +184,7 @@ def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
 
 
 def align(source: Array, target: Array, weights: Array) -> Array:
-    """Return the (..., 4, 4) rigid motion that brings points (..., N, 3) onto others, least squares, weights (..., N).
+    """Weighted rigid alignment (Kabsch): motion (..., 4, 4) from points (..., N, 3) to others, weights (..., N).
 
     Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
     """
@@ -201,7 +201,7 @@ def align(source: Array, target: Array, weights: Array) -> Array:
 
 
 def sines_and_cosines(angles: Array, sines: Array, cosines: Array) -> None:
-    """Write the sines and cosines of angles (rad) to arrays of their shape, from the tangent of half of each.
+    """Write sines and cosines of angles (rad) into arrays, from the tangent of the half angle.
 
     NumPy has a vectorised tangent for doubles where the processor has AVX-512, and no such sine: with it both cost a
     sixth. They are right to 4e-16, at any angle: where the tangent h is large, near π, sin = 2h / (1 + h²) and cos = 2

@@ -1,4 +1,4 @@
-"""How segments grow (Kluz et al. 2018, Eqs 6–11: virtual prismatic joints), and the poses of all links."""
+"""Forward kinematics of all links, and elongation of segments (Kluz et al. 2018, Eqs 6–11)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 def growing(robot: Robot) -> tuple[int, ...]:
-    """Return which of the robot's segments have a length along which they can grow; S of them, from the root on."""
+    """Return the indices of the S segments that have a length along which they can grow, from the root on."""
     return tuple(s for s, segment in enumerate(robot.segments) if np.any(segment.direction))
 
 
 def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: ChainFrames | None = None) -> Array:
-    """Jacobian of the tool's place, in root axes, by the elongation of each segment with a length (Eqs 6–11).
+    """Jacobian of the tool's position, in root axes, by the elongation of each segment with a length (Eqs 6–11).
 
     The columns are unit vectors: the directions of the segments. They are the same for every point of the tool, and
     an elongation turns nothing, so that the displacement is linear in the elongations, not only to first order.
@@ -87,7 +87,7 @@ def link_poses(robot: Robot, q: ArrayLike) -> Array:
 
 
 def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
-    """Write (N, n) configurations as Pinocchio does, (N, nq): mimicking ones too, continuous as cosine and sine."""
+    """Pinocchio configurations (N, nq) from (N, n): mimicking joints added, continuous ones as cosine and sine."""
     rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
     columns = []
     for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):

@@ -1,4 +1,4 @@
-"""From URDF text to a Pinocchio model and to the constant arrays of one kinematic chain.
+"""Pinocchio model and constant arrays of one kinematic chain, from URDF text.
 
 The linear coupling of joints that mimic another is applied outside Pinocchio. Its own (``JointModelMimic``, as of 4.1)
 has Jacobians and gravity torques, but no regressors, wants the driving joint to be nearer to the root, and cannot hold
@@ -22,7 +22,7 @@ from thermal_robot.kinematics.urdf import nearest, parse_urdf, read
 
 @dataclass(frozen=True)
 class Mimic:
-    """What a mimicking joint follows: a position, rad or m, ``multiplier`` times that of ``joint`` + ``offset``."""
+    """Mimic relation of a joint: ``multiplier`` times the position, rad or m, of ``joint`` + ``offset``."""
 
     joint: str
     multiplier: float = 1.0
@@ -31,7 +31,7 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Positions of the M movable joints of a chain, from those of the n that drive them: ``matrix @ q + offset``.
+    """Affine map from the n driving joints to the M movable joints of a chain: ``matrix @ q + offset``.
 
     A driving joint's row of ``matrix`` (M, n) is a unit vector, that of a joint which stands still is zero. ``driving``
     (n,) numbers, among the movable joints, those that stand for the driving ones ``names``: the joint itself, or, of
@@ -47,17 +47,17 @@ class Coupling:
         _freeze(self.driving, self.matrix, self.offset)
 
     def positions(self, q: Array) -> Array:
-        """Return the (N, M) positions of the movable joints at (N, n) positions of the driving ones."""
+        """Positions (N, M) of the movable joints at (N, n) positions of the driving ones."""
         return q @ self.matrix.T + self.offset
 
     def leader(self, joint: int) -> int | None:
-        """Return which driving joint moves a movable one; ``None`` where it stands still."""
+        """Driving joint of a movable one; ``None`` where it stands still."""
         found = np.flatnonzero(self.matrix[joint])
         return int(found[0]) if len(found) else None
 
 
 def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]:
-    """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
+    """Mimic relations of all joints, which Pinocchio's default parsing drops."""
     found = {}
     for joint in read(urdf, source).iterfind("joint[@name]"):
         for said in joint.iterfind("mimic"):
@@ -67,10 +67,10 @@ def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]
 
 
 def followed(found: Mapping[str, Mimic], joints: Collection[str], chain: Collection[str]) -> dict[str, Mimic]:
-    """Follow each mimicking joint, over others that mimic, to one that does not.
+    """Resolve chains of mimicking joints to relations with a driving joint.
 
-    Outside the chain a joint that follows nothing, or in the end itself, is left out: as many a hand in use is written,
-    and it moves nothing that was measured. Within the chain it is refused, by name.
+    A joint that follows a missing joint or itself is an error in the chain; outside it, as in many published hands, it
+    is left out.
     """
     ends = {}
     for name in found:
@@ -104,7 +104,7 @@ def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimi
 
 
 def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[str] = ()) -> Coupling:
-    """Couple the movable joints of a chain, from the root on, to what they follow in the end (:func:`followed`).
+    """Coupling of the movable joints of a chain to their driving joints (:func:`followed`).
 
     What mimics another one of the movable joints ``beside`` the chain is at the offset, as one that mimics a fixed
     joint is.
@@ -149,7 +149,7 @@ def common_limits(
 
 
 def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
-    """(nq,) configuration of the whole model: joints at 0 or the limit nearest to 0, mimicking ones as they follow."""
+    """Neutral configuration (nq,) of the whole model: joints at 0 or the limit nearest to it, mimics following."""
     q = np.asarray(pin.neutral(model), dtype=float)
     for joint in list(model.joints)[1:]:
         if joint.nq == 1:
@@ -167,7 +167,7 @@ def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
 
 
 def held_position(model: pin.Model, q: Array, name: str) -> float:
-    """Position of one joint in a configuration of the whole model, rad or m; 0 for a fixed one; refused if several."""
+    """Position of one joint in a configuration of the whole model, rad or m; 0 for a fixed one."""
     if not model.existJointName(name):
         return 0.0
     joint = model.joints[model.getJointId(name)]
@@ -183,7 +183,7 @@ _NO_MASS = 1e-12
 
 
 def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tuple[Array, Array]:
-    """(K,) kg that each fixed element of a chain carries, up to its next movable joint, and (K, 3) m their centres.
+    """Mass (K,) kg and its centre (K, 3) m fixed to each element of a chain, up to its next movable joint.
 
     Pinocchio lumps the links between two joints into one body; a frame in its midst carries those behind it only.
     """
@@ -204,7 +204,7 @@ def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tup
 
 
 def _links(full: pin.Model, data: pin.Data) -> list[tuple[int, float, Array]]:
-    """Frame to which each link's mass is fixed, the mass (kg) and its centre in the world (m)."""
+    """Frame of each link's mass, the mass (kg) and its centre in the world (m)."""
     found = []
     joined = np.zeros(full.njoints)
     moment = np.zeros((full.njoints, 3))
@@ -295,7 +295,7 @@ def build_chain_model(
     gravity: Array | None,
     source: str = "the robot description",
 ) -> dict[str, Any]:
-    """Read a URDF and keep the chain from the root frame to the tool frame; return those fields of a robot by name.
+    """Read a URDF and reduce it to the chain from root frame to tool frame; returns those fields of a robot.
 
     A joint that is not in the chain is held at 0, or at the limit nearest to 0; one that mimics another, where that one
     takes it. One outside that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its
@@ -349,7 +349,7 @@ _JOINTS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
-    """Links at the ends of the tree: what a tool frame is usually chosen from."""
+    """Leaf links of the tree, the usual tool frames."""
     model = parse_urdf(urdf, source)
     parents = {frame.parentFrame for frame in model.frames}
     ends = [f for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY and i not in parents]
@@ -431,7 +431,7 @@ def unit_motion(model: pin.Model, joint: pin.JointModel) -> Array:
 
 
 def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
-    """Frames of the URDF joints on the way from one link down to another."""
+    """Frames of the URDF joints between a link and one of its descendants."""
     elements: list[int] = []
     frame = tool
     while frame != root:
@@ -462,7 +462,7 @@ def _joint_type(model: pin.Model, name: str) -> str:
 
 
 def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
-    """Limits of some joints, which a continuous one has none of."""
+    """Position limits of some joints; infinite for continuous ones."""
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, name in enumerate(names):
         joint = model.joints[model.getJointId(name)]

@@ -1,4 +1,4 @@
-"""Every number that was chosen for the engines of the batch functions."""
+"""Chosen numbers of the batch engines, each with its unit and reason."""
 
 CHUNK = 2048
 """Configurations worked on at a time: few enough for the frames of an arm to stay in a core's own cache (100 kB an

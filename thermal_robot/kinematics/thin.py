@@ -1,4 +1,4 @@
-"""The engine for few configurations: Pinocchio itself, one call for each, on a model that is made once."""
+"""Pinocchio engine for small batches: one call for each configuration, on a cached model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _UPRIGHT = 1e-14
 
 
 class _Own:
-    """A model of a chain whose world is its root frame, every joint with one coordinate, and memory to work in.
+    """Pinocchio model of a chain with its work data; its world is the root frame, every joint has one coordinate.
 
     Where it is ``placed`` every segment is a joint, fixed ones too, which stay at zero: Pinocchio's kinematic regressor
     knows the placements of joints only.
@@ -59,7 +59,7 @@ class _Own:
         self.idle = False
 
     def joints(self, q: Array) -> Array:
-        """Return positions of all joints of the model."""
+        """Positions of all joints of the model."""
         if not self.plain:
             q = self.coupling.positions(q)
         if self.model.nq == q.shape[1]:
@@ -69,7 +69,7 @@ class _Own:
         return rows
 
     def frames_at(self, point: Array | None, rows: int) -> Iterable[int]:
-        """Return for each row the frame of the tool, or one that is put at a point of it, (3,) or (N, 3)."""
+        """Operational frame for each row: the tool, or a frame at a point of it, (3,) or (N, 3)."""
         if point is None:
             return [self.tool] * rows
         if point.ndim == 2:
@@ -83,7 +83,7 @@ class _Own:
 
 
 class _Kept(threading.local):
-    """Models of each thread, of joints alone and of all placements: what Pinocchio works in must not be shared."""
+    """Per-thread cache of models, with and without all placements, as Pinocchio's data are not thread-safe."""
 
     def __init__(self) -> None:
         self.models: tuple[WeakKeyDictionary[Chain, _Own], ...] = (WeakKeyDictionary(), WeakKeyDictionary())
@@ -159,7 +159,7 @@ def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> No
 
 
 def _turning_about(own: _Own, robot: Chained) -> bool:
-    """Whether the first joint turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
+    """Whether the first joint rotates about gravity, so that its torque is exactly zero."""
     chain = robot.chain
     first = int(chain.movable[0])
     if not own.plain or chain.kinds[first] != REVOLUTE:

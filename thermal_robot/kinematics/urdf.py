@@ -1,4 +1,4 @@
-"""URDF by libxml2 (lxml): read, checked, changed in place, and parsed to a Pinocchio model.
+"""URDF parser (lxml): validation, edits in place, and the Pinocchio model.
 
 Comments, the order of attributes and the digits of numbers stay where nothing is changed. Of a URDF that nobody has
 read it refuses what urdfdom takes without a word, or needs hours or all memory for: a text that is no XML, deep or
@@ -45,7 +45,7 @@ _FOREIGN = {"sdf": "is an SDF file", "mujoco": "is an MJCF file (MuJoCo)", "COLL
 
 
 def tree(text: str) -> Element:
-    """Parse XML; ``--`` in comments, prefixes that nobody declared and a default namespace, as in use, do no harm."""
+    """Parse XML leniently: ``--`` in comments, undeclared prefixes and a default namespace are accepted."""
     # a text in Python has left its encoding behind, whatever it declares; a smaller tree would be cut at 10 MB of text
     parser = etree.XMLParser(encoding="utf-8", recover=True, resolve_entities=False, huge_tree=True)
     root = etree.fromstring(text.encode(errors="replace"), parser)
@@ -55,7 +55,7 @@ def tree(text: str) -> Element:
 
 
 def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
-    """Write XML, with notes as a comment before its root; declared, as UTF-8, where the text ``before`` was."""
+    """Serialise XML, with notes as a comment before its root, and the declaration of the text ``before``."""
     parts = [*reversed(list(root.itersiblings(preceding=True))), root, *root.itersiblings()]
     if notes:  # a comment may hold no two hyphens in succession
         lines = "\n".join(re.sub(r"-(?=-)", "- ", line) for line in notes).rstrip("-")
@@ -66,7 +66,7 @@ def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
 
 
 def unsound(text: str) -> str:
-    """Say what is not XML in a text, in expat's words, but for what :func:`tree` lets pass; else nothing."""
+    """XML syntax error of a text in expat's words, but for what :func:`tree` accepts; empty if valid."""
     try:
         expat.ParserCreate("utf-8").Parse(_seen(text).encode(errors="replace"), True)
     except expat.ExpatError as error:
@@ -75,13 +75,13 @@ def unsound(text: str) -> str:
 
 
 def _seen(text: str) -> str:
-    """Blank comments, with all else in its place: urdfdom takes ``--`` in a comment, XML does not."""
+    """Text with comments blanked, positions kept: urdfdom accepts ``--`` in a comment, XML does not."""
     return _HIDDEN.sub(lambda span: re.sub(r"[^\n]", " ", span[0]), text)
 
 
 @lru_cache(maxsize=1)  # a robot is read, checked and cut out of the same text
 def read(urdf: str, source: str) -> Element:
-    """Parse a URDF that nobody has read, without its comments; the tree is shared and must not be changed.
+    """Parse and validate a URDF, without comments; the tree is cached and must not be changed.
 
     Refused, by the name ``source``, is what is empty, no XML, another kind of file, or deeper or wider than any robot.
     """
@@ -103,7 +103,7 @@ def read(urdf: str, source: str) -> Element:
 
 
 def _foreign(root: Element) -> str:
-    """Say what no URDF has: another root, tags of xacro, more of anything than a robot."""
+    """Reason why a document is no URDF: another root, xacro tags, excessive size; empty if it is one."""
     if root.tag != "robot":
         return f"{_FOREIGN.get(root.tag, 'is XML')} but not a URDF: its root element is <{root.tag}>, expected <robot>"
     # a tag of xacro whose prefix is not declared is left over from an expanded file
@@ -124,7 +124,7 @@ _STREAMS = threading.Lock()
 
 @lru_cache(maxsize=1)
 def parse_urdf(urdf: str, source: str) -> pin.Model:
-    """Build the Pinocchio model of a whole URDF, or say why ``source`` is none; meshes are not read."""
+    """Pinocchio model of a whole URDF, or an error with the reason; meshes are not read."""
     said: list[str] = []
     root = copy.deepcopy(read(urdf, source))
     for joint in root.iterfind("joint"):
@@ -154,7 +154,7 @@ def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def _quiet(said: list[str]) -> Iterator[None]:
-    """Keep what urdfdom and Pinocchio print from C++ off the terminal, and hand it back."""
+    """Capture what urdfdom and Pinocchio print from C++."""
     with _STREAMS, tempfile.TemporaryFile() as sink:
         try:
             with contextlib.ExitStack() as restore:
@@ -197,7 +197,7 @@ _ELEMENTS = {
 
 
 class _Figures(NamedTuple):
-    """What stands in an attribute: its name to a user, what is expected there, how many figures, none larger."""
+    """Validity of a numeric attribute: name, expectation, count, and largest value."""
 
     what: str
     expected: str
@@ -236,7 +236,7 @@ _ONCE = {"link/inertial", "link/inertial/mass", *(f"joint/{name}" for name in _E
 
 @lru_cache(maxsize=1)
 def require_numbers(urdf: str, source: str) -> None:
-    """Refuse a URDF with a word it does not know that places or moves something, a figure that is none, and too much.
+    """Refuse a URDF with unknown elements that place something, or invalid numbers.
 
     The error names the link or joint, what stands there, and what is meant or expected; or says why it is no URDF.
     """
@@ -253,14 +253,14 @@ def require_numbers(urdf: str, source: str) -> None:
 
 
 def _walk(element: Element, place: str) -> Iterator[tuple[str, Element]]:
-    """Yield an element and all in it, each with the path of what it stands in below the robot."""
+    """Yield an element and its descendants with their paths below the robot."""
     yield place, element
     for child in element.iterchildren("*"):
         yield from _walk(child, f"{place}/{element.tag}".lstrip("/"))
 
 
 def _problems(owner: Element) -> Iterator[str]:
-    """Say what is wrong with a link or a joint, one thing after the other."""
+    """Yield what is wrong with a link or a joint."""
     seen, name = set(), owner.get("name", "")
     if owner.tag == "joint" and (not name or name != name.strip()):
         yield ": expected a name without blanks around it"  # a table's column has none
@@ -278,7 +278,7 @@ def _problems(owner: Element) -> Iterator[str]:
 
 
 def _unknown(place: str, element: Element) -> Iterator[str]:
-    """Say which element is meant by one that URDF does not know, where it would place or move something."""
+    """Error for an unknown element, with the one that was meant, where it would place or move something."""
     name, known = element.tag, _ELEMENTS.get(place)
     if known is None or ":" in name or element.prefix or name in (*known, *_HARMLESS):
         return
@@ -291,7 +291,7 @@ def _unknown(place: str, element: Element) -> Iterator[str]:
 
 
 def _unread(element: Element) -> Iterator[str]:
-    """Say what is written in an element that URDF does not read there."""
+    """Error for content that URDF ignores in an element."""
     name, known = element.tag, list(_ATTRIBUTES[element.tag])
     for key, value in element.attrib.items():
         if key in known or ":" in key or key.startswith("{"):
@@ -313,7 +313,7 @@ def _alike(name: str, known: Iterable[str]) -> str:
 
 
 def _wrong(element: Element, kind: str) -> Iterator[str]:
-    """Say which figures of an element are none, or impossible; ``kind`` is that of its joint."""
+    """Error for invalid numbers of an element; ``kind`` is that of its joint."""
     name, found = element.tag, {}
     if name == "mass" and "value" not in element.attrib:
         yield "its <mass> has no value, expected a number of kg"
@@ -350,7 +350,7 @@ def rewritten(
     links: Mapping[str, tuple[str, Array]] | None = None,
     notes: Sequence[str] = (),
 ) -> str:
-    """Return a URDF with the (4, 4) placements, m, of some joints written anew, with all digits, below notes.
+    """Edit a URDF: replace the placements (4, 4), m, of some joints, with all digits, below notes.
 
     ``links`` are added: by their name the link that carries each by a fixed joint, and its (4, 4) placement there. The
     joint has the link's name and ``_joint``. A link that is carried so already is placed anew; it must have no other's
@@ -385,14 +385,14 @@ def rewritten(
 
 
 def _carries(joint: Element | None, link: str, parent: str) -> bool:
-    """Tell whether this is a fixed joint by which the parent carries the link already."""
+    """Whether this fixed joint attaches the link to the parent already."""
     if joint is None or joint.get("type") != "fixed":
         return False
     return [end.get("link") for name in ("parent", "child") for end in joint.iterfind(name)] == [parent, link]
 
 
 def xyz_rpy(pose: Array) -> tuple[str, str]:
-    """Return the translation (m) and the roll, pitch and yaw (rad) of a (4, 4) pose with all digits, as URDFs do."""
+    """Return the translation (m) and roll, pitch, yaw (rad) of a pose (4, 4), as text with all digits."""
     xyz, rpy = (
         " ".join(repr(float(value)) for value in values) for values in (pose[:3, 3], rotation_to_rpy(pose[:3, :3]))
     )

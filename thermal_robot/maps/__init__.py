@@ -1,4 +1,4 @@
-"""Maps of the workspace: what a robot is good for, place by place, in every posture.
+"""Workspace maps: scatter, thermal shift and joining probability of a robot, place by place, in every posture.
 
 The room knows robots and the assembly's probabilities, no campaign.
 """

@@ -1,4 +1,4 @@
-"""Pictures of a map: contours of a plane, a cloud of places in space."""
+"""Figures of a workspace map: contours of a plane, a cloud of places in space."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LEVELS = 12
 
 
 def larger_is_better(by: str) -> bool:
-    """Return whether the largest value of a column is the best one."""
+    """Whether large values of a column are good."""
     return by in _BETTER_LARGE
 
 
@@ -101,7 +101,7 @@ def _plane(
 
 
 def _space(figure: Figure, places: Array, values: Array, label: str) -> None:
-    """Draw the places as points, at most as many as a picture can show."""
+    """Draw the places as points, a limited number of them."""
     step = max(len(places) // 20_000, 1)
     own = figure.add_subplot(projection="3d")
     drawn = own.scatter(*places[::step].T, c=values[::step], s=3.0, cmap="viridis", depthshade=False)

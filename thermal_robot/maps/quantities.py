@@ -1,6 +1,6 @@
-"""The columns of a map: what each configuration is good for, in all postures of an arm at many places.
+"""Columns of a workspace map: all postures of an arm at many places, and their quality.
 
-At a few places they are searched from everywhere; from there each leads to those of the neighbours. Where the task
+Postures are searched from many starts at a few places, and from there continued to the neighbours. Where the task
 leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest to home is taken
 among those that hang together:
 
@@ -56,7 +56,7 @@ MOST_LINKS = 12
 
 
 class Task:
-    """A tip (3,) m that is to stand at places, its tool's ``axis`` along ``approach`` in the root frame; see `solve`.
+    """Inverse kinematics task: tip (3,) m at a place, tool ``axis`` along ``approach`` in the root frame.
 
     Free directions are drawn to ``home``, (n,) rad or m.
     """
@@ -68,18 +68,18 @@ class Task:
             self.whole = self.turns & (robot.upper - robot.lower > 2.0 * np.pi - 1e-9)
 
     def nearest_turn(self, q: Array) -> Array:
-        """(N, n) the same postures, each joint that can turn once round within half a turn of home, if limits allow."""
+        """Equivalent configurations (N, n), each joint of a full turn within half a turn of home, if limits allow."""
         turns = np.where(self.whole, np.round((q - self.home) / (2.0 * np.pi)), 0.0)
         turned = q - 2.0 * np.pi * turns
         return np.where((turned >= self.robot.lower) & (turned <= self.robot.upper), turned, q)
 
     def way(self, start: Array, q: Array) -> Array:
-        """(N, n) how far joints have gone; a whole turn is none."""
+        """Joint displacement (N, n), modulo whole turns."""
         gone = q - start
         return np.where(self.whole, gone - 2.0 * np.pi * np.round(gone / (2.0 * np.pi)), gone)
 
     def solve(self, targets: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """(N, n) configurations near others at which the tip is at (N, 3) places, and whether it is."""
+        """Damped least squares: configurations (N, n) with the tip at (N, 3) places, and whether they converged."""
         q, found, robot = start.copy(), np.zeros(len(start), dtype=bool), self.robot
         eye = np.eye(6)
         for step_number in range(STEPS):
@@ -112,14 +112,14 @@ class Task:
 
 
 class _Known:
-    """The postures that are known of M places, so many at most."""
+    """Postures found so far at M places, up to a maximum."""
 
     def __init__(self, task: Task, places: int) -> None:
         self.task, self.q = task, np.full((places, MOST, task.robot.n), np.nan)
         self.count = np.zeros(places, dtype=np.intp)
 
     def fresh(self, places: Rows, q: Array) -> NDArray[np.bool_]:
-        """Add configurations (K, n) of places (K,); return which were not known."""
+        """Add configurations (K, n) of places (K,); mask of those that are new."""
         new = np.zeros(len(places), dtype=bool)
         left = np.arange(len(places))
         while len(left):
@@ -137,7 +137,7 @@ class _Known:
 
 
 def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
-    """Every posture at each of M places (M, 3) m: the place's row (K,), ascending; (K, n) rad or m, near home first.
+    """Multi-start search of all postures at M places (M, 3) m: place number (K,), ascending; (K, n), near home first.
 
     Neighbours should lie no farther apart than about 0.2 m.
     """
@@ -148,7 +148,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
     starts, random, idle = _everywhere(task), np.random.default_rng(0), 0
 
     def searched(places: Rows, start: Array) -> tuple[Rows, Array]:
-        """Return the postures that are new."""
+        """Return the new postures."""
         q, found = task.solve(targets[places], start)
         new = found.copy()
         new[found] = known.fresh(places[found], q[found])
@@ -175,7 +175,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
 
 
 def _everywhere(task: Task) -> Array:
-    """(S, n) configurations that fill the limits evenly, a turn about home at most; home first."""
+    """Sobol configurations (S, n) within the limits, a turn about home at most; home first."""
     from scipy.stats import qmc
 
     robot = task.robot
@@ -186,17 +186,17 @@ def _everywhere(task: Task) -> Array:
 
 
 def _wanting(count: NDArray[np.intp], random: np.random.Generator) -> Rows:
-    """Return places without a posture, and such that have fewer than others: half of the seeds each."""
+    """Places without a posture, and some with fewer than others: half of the seeds each."""
     some = (count > 0) & (count < count.max())
     halves = (np.flatnonzero(chosen) for chosen in (count == 0, some if some.any() else count > 0))
     return np.concatenate([random.permutation(half)[: SEEDS // 2] for half in halves])
 
 
 def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
-    """Return starts from which the others may be found.
+    """Start configurations of the search for other postures.
 
-    One joint mirrored about home, or half a turn on; or mirrored as an elbow is, whose neighbours make up for it: two
-    equal links that bend the other way stand where they stood.
+    One joint mirrored about home, or turned by half a turn; or an elbow flipped, with its neighbours compensating as
+    for two equal links.
     """
     n, elbows = task.robot.n, np.arange(1, task.robot.n - 1)
     starts = np.repeat(q[:, None], 2 * n + 2 * len(elbows), axis=1)
@@ -225,7 +225,7 @@ UNITS = {
 
 
 def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
-    """Return a chunk of the map: all postures of the numbered places, or the numbered configurations."""
+    """Columns of a chunk of the map: all postures of the numbered places, or the numbered configurations."""
     robot, asked = spec.robot, spec.question
     if isinstance(spec.over, Joints):
         q = spec.over.drawn(rows, robot)
@@ -274,7 +274,7 @@ def _told(spec: Spec, q: Array) -> Columns:
 
 
 def polygon(edges: Array) -> tuple[Array, Array]:
-    """(N,) area, m², and width, m, of the polygons in which a tip may be when each segment is between cold and warm.
+    """Area (N,), m², and width, m, of the polygons of the tip for each segment between cold and warm.
 
     A polygon of edges ``g`` (N, 2, S), what the whole rise of each segment does across the tool (Eqs 14-15), has the
     area ``sum |g_i x g_j|`` over all pairs; its width, the largest distance of two corners, is the longest ``sum ±

@@ -1,4 +1,4 @@
-"""What a map asks of each configuration, and where it asks: positions of the tip, or joint positions."""
+"""Specification of a workspace map: the quantities, and the places or joint positions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Span = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class Question:
-    """What is known of the robot, and what its joints are to be good for.
+    """Errors, temperature and joining task for which each configuration is evaluated.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Positions:
         return self.x[2] * self.y[2] * self.z[2]
 
     def place(self, rows: NDArray[np.int64]) -> Array:
-        """(K, 3) m, places by their number; x runs fastest."""
+        """Positions (K, 3) m, of places by number; x runs fastest."""
         x, y, z = (np.linspace(low, high, many) for low, high, many in (self.x, self.y, self.z))
         along, rest = rows % len(x), rows // len(x)
         return np.stack([x[along], y[rest % len(y)], z[rest // len(y)]], axis=1)
@@ -83,7 +83,7 @@ class Positions:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint positions that fill the limits evenly: points of Halton's sequence.
+    """Halton points within the joint limits.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class Joints:
     upper: tuple[float, ...] | None = None
 
     def drawn(self, rows: NDArray[np.int64], robot: Robot) -> Array:
-        """(K, n) rad or m, configurations by their number; rows follow each other."""
+        """Return the configurations (K, n) rad or m, by number; chunks continue the sequence."""
         from scipy.stats import qmc
 
         low, high = within(robot, self.lower, self.upper)
@@ -113,7 +113,7 @@ Over = Positions | Joints
 def within(
     robot: Robot, lower: tuple[float, ...] | None = None, upper: tuple[float, ...] | None = None
 ) -> tuple[Array, Array]:
-    """Return finite limits (n,) of the joints: those given, else the robot's, at most half a turn either side of zero.
+    """Finite joint limits (n,): those given, else the robot's, at most half a turn either side of zero.
 
     Refused: a prismatic joint without limits, limits of another number of joints.
     """
@@ -129,24 +129,24 @@ def within(
 
 @dataclass(frozen=True)
 class Spec:
-    """A map: a robot, where, and what is asked, as for :func:`~thermal_robot.maps.workspace_map`."""
+    """Specification of a map: robot, places, question; arguments as for :func:`~thermal_robot.maps.workspace_map`."""
 
     robot: Robot
     over: Over
     question: Question = field(default_factory=Question)
 
     def chunks(self) -> Iterator[NDArray[np.int64]]:
-        """Yield the numbers of places or configurations that are worked on at once."""
+        """Yield the numbers of places or configurations in chunks."""
         for start in range(0, self.over.count, CHUNK):
             yield np.arange(start, min(start + CHUNK, self.over.count))
 
     @property
     def parts(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return -(-self.over.count // CHUNK)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all that decides the map, as JSON would hold it."""
+        """Plain values of everything that decides the map."""
         return {
             "schema": "thermal-robot/map/1",
             "robot": self.robot.name,
@@ -160,7 +160,7 @@ class Spec:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of that."""
+        """SHA-256 of :meth:`to_dict`."""
         return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True).encode()).hexdigest()
 
 

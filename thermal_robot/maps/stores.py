@@ -1,4 +1,4 @@
-"""A map of the workspace in chunks, Zarr or Parquet, each whole or not there: a stopped run is gone on with."""
+"""Chunked storage of a workspace map in Zarr or Parquet; an interrupted run is resumed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LISTED = 10
 
 
 class _Parquet:
-    """A folder of parts, one a chunk, and its notes."""
+    """Folder of Parquet files, one for each chunk, with notes."""
 
     library, extra = "pyarrow", "parquet"
 
@@ -46,24 +46,24 @@ class _Parquet:
 
     @property
     def notes(self) -> dict[str, Any]:
-        """What decides the map; empty where there is none yet."""
+        """Specification of the map; empty where there is none yet."""
         file = self.folder / NOTES
         return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
 
     @property
     def done(self) -> int:
-        """How many chunks are there, from the first on."""
+        """Number of finished chunks."""
         return next(k for k in count() if not self._part(k).is_file())
 
     def begin(self, notes: dict[str, Any]) -> None:
-        """Make an empty map."""
+        """Create an empty map."""
         self.folder.mkdir(parents=True, exist_ok=True)
         for part in self.folder.glob("part-*.parquet"):
             part.unlink()
         (self.folder / NOTES).write_text(json.dumps(notes, indent=2, ensure_ascii=False), encoding="utf-8")
 
     def add(self, columns: Columns) -> None:
-        """Add the next chunk, whole: under another name until it is."""
+        """Add the next chunk by an atomic rename."""
         import pyarrow
         import pyarrow.parquet
 
@@ -73,7 +73,7 @@ class _Parquet:
         os.replace(unfinished, part)
 
     def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
-        """Yield the columns, some of them by name, chunk by chunk."""
+        """Yield the columns, or some of them, chunk by chunk."""
         import pyarrow.parquet
 
         for k in range(self.done):
@@ -82,7 +82,7 @@ class _Parquet:
 
 
 class _Zarr(_Parquet):
-    """A group of one array a column; rows beyond those that are counted are an unfinished chunk."""
+    """Zarr group with one array for each column; rows beyond the counted ones are unfinished."""
 
     library, extra = "zarr", "maps"
 
@@ -124,7 +124,7 @@ class _Zarr(_Parquet):
 
 
 def store(path: str | Path) -> _Parquet:
-    """Return the store of a path, by how its name ends; refused for another one, or a library not installed."""
+    """Store of a path by its ending; an unknown ending or a missing library is an error."""
     folder = Path(path)
     kinds = {".zarr": _Zarr, ".parquet": _Parquet}
     if folder.suffix not in kinds:
@@ -138,17 +138,17 @@ Limits = Mapping[str, tuple[float | None, float | None]]
 
 
 class Map:
-    """What a robot is good for, place by place or configuration by configuration.
+    """Stored workspace map of a robot, by place and posture or by configuration.
 
     Parameters
     ----------
     path
-        Of the map.
+        Path of the map.
 
     Attributes
     ----------
     notes
-        What decided it: robot, grid, settings.
+        Specification: robot, grid, settings.
 
     Raises
     ------
@@ -168,7 +168,7 @@ class Map:
 
     @property
     def complete(self) -> bool:
-        """Whether all chunks are there."""
+        """Whether all chunks are finished."""
         return bool(self._store.done == self.notes["parts"])
 
     @property
@@ -177,7 +177,7 @@ class Map:
         return ("place", "branch", *self.notes["joints"], *list(UNITS)[2:])
 
     def chunks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Yield columns by name, all where left out, chunk by chunk.
+        """Yield the columns by name, by default all, chunk by chunk.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class Map:
         return self._store.chunks(None if names is None else list(dict.fromkeys(names)))
 
     def frame(self, names: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return columns as a data frame, SI; all of the map stands in memory then."""
+        """Return the data frame of the columns, SI, in memory."""
         import pandas as pd
 
         wanted = list(names) if names is not None else list(self.columns)
@@ -203,7 +203,7 @@ class Map:
         within: Limits | None = None,
         count: int = LISTED,
     ) -> pd.DataFrame:
-        """Return the best rows, the best posture of each place, best first.
+        """Best rows, with the best posture of each place, best first.
 
         Parameters
         ----------
@@ -212,9 +212,9 @@ class Map:
         largest
             The largest is.
         within
-            By column: what a row must have, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
+            Required range by column, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
         count
-            How many places.
+            Number of places.
 
         Raises
         ------
@@ -245,7 +245,7 @@ class Map:
                 raise CampaignError(str(self.path), "the map has no such column", column=name, expected=expected)
 
     def values(self, by: str, *, largest: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return (K, 3) places, m, that are reached, and (K,) the best value of a column among their postures."""
+        """Reached places (K, 3), m, and the best value (K,) of a column among their postures."""
         found = self.frame(["place", "x", "y", "z", by])
         best = found.sort_values(by, ascending=not largest, kind="stable").drop_duplicates("place").sort_values("place")
         return best[["x", "y", "z"]].to_numpy(dtype=float), best[by].to_numpy(dtype=float)
@@ -260,7 +260,7 @@ def workspace_map(
     replace: bool = False,
     progress: Callable[[str, int, int], None] = lambda _stage, _done, _all: None,
 ) -> Map:
-    """Map what a robot is good for over its workspace: scatter, thermal displacement, probability, C_p, clearance.
+    """Workspace map of a robot: scatter, thermal displacement, probability, C_p, clearance.
 
     Results are written chunk by chunk. A run that is stopped leaves a map that can be read; the same call goes on with
     it, and gives the same file.
@@ -274,7 +274,7 @@ def workspace_map(
     path
         ``F.zarr`` (extra ``maps``), or ``F.parquet``, a folder of parts (extra ``parquet``).
     question
-        What is asked of each configuration.
+        Quantities to be computed at each configuration.
     replace
         Begin anew where another map stands there.
     progress

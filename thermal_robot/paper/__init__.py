@@ -1,4 +1,4 @@
-"""The paper of Kluz and Trzepieciński (2018), number by number: what it prints beside what follows from it."""
+"""Ledger of Kluz and Trzepieciński (2018): the paper's printed numbers beside recomputed ones."""
 
 from thermal_robot.paper.entry import VERDICTS, Entry
 from thermal_robot.paper.inputs import PaperInputs, rv_m2_with_hand

@@ -1,4 +1,4 @@
-"""One row of the ledger, and how its verdict follows from what is printed and what is computed."""
+"""Rows of the ledger, and the verdict on printed against computed numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _UNITS = {"µm": -6, "mm": -3, "%": -2}
 
 @dataclass(frozen=True)
 class Printed:
-    """Figures as the paper prints them: as text, in SI units, and one unit of the last digit of each."""
+    """Printed numbers: text, SI values, and one unit of each last digit."""
 
     text: str
     values: tuple[float, ...]
@@ -38,7 +38,7 @@ class Printed:
 
     @classmethod
     def of(cls, text: str, digit: float | None = None) -> Printed:
-        """Read the numbers of a text, each part of it in its own unit; one with an exponent is in the unit squared."""
+        """Parse printed numbers, each part in its own unit; with an exponent in the unit squared."""
         values, digits = [], []
         for part in text.replace("−", "-").split(";"):
             exponent = next((power for unit, power in _UNITS.items() if unit in part), 0)
@@ -56,7 +56,7 @@ class Entry:
     Parameters
     ----------
     quantity
-        What is compared.
+        Quantity that is compared.
     where
         Section, table or equation of the paper.
     printed, computed
@@ -66,7 +66,7 @@ class Entry:
     verdict
         One of :data:`VERDICTS`.
     why
-        What lies behind the verdict.
+        Reason of the verdict.
     depends
         Fields of :class:`~thermal_robot.paper.PaperInputs` that were read to compute the row.
     """
@@ -89,7 +89,7 @@ def rounds_to(printed: Printed, low: ArrayLike, high: ArrayLike) -> bool:
 
 
 def truncates_to(printed: Printed, computed: ArrayLike) -> bool:
-    """Whether every printed figure is a computed one with the further digits cut off."""
+    """Whether every printed number is the computed one truncated."""
     exact, values, digits = np.ravel(np.asarray(computed, float)), np.array(printed.values), np.array(printed.digits)
     beyond = np.abs(exact) - np.abs(values)
     return bool(np.all((exact * values >= 0.0) & (beyond >= -_SLACK * digits) & (beyond < digits)))
@@ -103,7 +103,7 @@ def judge(
     low: ArrayLike | None = None,
     high: ArrayLike | None = None,
 ) -> str:
-    """Return the verdict on printed figures, all together, beside as many computed numbers, SI.
+    """Verdict on printed numbers against computed ones, SI.
 
     ``otherwise`` where neither rounding nor truncation leads to them: ``"erratum"`` where the paper's own numbers
     determine the figure, ``"not reproducible"`` where they do not. ``low``, ``high``: range of each computed number
@@ -116,17 +116,17 @@ def judge(
 
 
 def numbers(values: ArrayLike, decimals: int = 1, *, factor: float = 1.0) -> str:
-    """Write numbers side by side, rows (..., n) parted by a stroke; a true minus sign."""
+    """Format rows of numbers (..., n) separated by a stroke, with a true minus sign."""
     rows = np.atleast_2d(np.asarray(values, dtype=float) * factor)
     said = (" ".join(f"{value:.{decimals}f}" for value in row) for row in rows)
     return " / ".join(said).replace("-", "−")
 
 
 class Words(Formatter):
-    """Texts of the table: ``{x:2u}`` writes numbers with two decimals in millionths, ``m`` thousandths, ``c`` %."""
+    """Formatter of the table's texts: ``{x:2u}`` is two decimals in millionths, ``m`` thousandths, ``c`` %."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Write numbers by :func:`numbers`, the rest as ever."""
+        """Format numbers by :func:`numbers`, other values as usual."""
         factor = {"u": 1e6, "m": 1e3, "c": 1e2}.get(format_spec[-1:], 1.0)
         if format_spec[:1].isdigit():
             return numbers(value, int(format_spec[0]), factor=factor)

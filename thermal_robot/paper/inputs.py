@@ -1,4 +1,4 @@
-"""What goes into the ledger: the robot's unknown length, the paper's measurements, and the simulations."""
+"""Inputs of the ledger: the robot's unknown length, the paper's measurements, simulation settings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHORTEST, _LONGEST = 1e-3, 1e3
 
 @dataclass(frozen=True)
 class PaperInputs:
-    """Everything that the computed column rests on; nothing in it is fitted to a printed result but ``sigma_q``.
+    """Inputs of the computed column; only ``sigma_q`` is fitted to a printed result.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class PaperInputs:
     repetitions
         Simulated samples behind a rate of rejection; ten times as many behind the law of the skewness.
     seed
-        Of all simulations.
+        Seed of all simulations.
 
     Raises
     ------
@@ -115,6 +115,6 @@ def rv_m2_with_hand(l5: float | None = None) -> Robot:
 
 
 def joints(*poses: ArrayLike) -> Array:
-    """Joint coordinates (N, 5) from q1 … q4 of N poses; q5 turns the hand about itself and is zero."""
+    """Joint positions (N, 5) from q1 … q4 of N poses; q5, the hand's own rotation, is zero."""
     rows = np.array(poses, dtype=float)
     return np.hstack([rows, np.zeros((len(rows), 1))])

@@ -1,4 +1,4 @@
-"""The ledger: every row computed when it is asked for, with the inputs that it read."""
+"""Computation of the ledger, with the inputs that each row reads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _INDENT = "    "
 
 
 def text(entries: Sequence[Entry], counts: Mapping[str, int]) -> str:
-    """Write a row in aligned columns, and below it, indented, why.
+    """Plain text of rows in aligned columns, with the reason indented below.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def text(entries: Sequence[Entry], counts: Mapping[str, int]) -> str:
 
 
 def markdown(entries: Sequence[Entry], counts: Mapping[str, int]) -> str:
-    """Write one table with a row for each entry, and below it what the verdicts mean; arguments as for :func:`text`."""
+    """Markdown table of rows, with the meaning of the verdicts below; arguments as for :func:`text`."""
     lines = ["| quantity | printed | computed | verdict | why |", "|---|---|---|---|---|"]
     for entry in entries:
         cells = (f"{entry.quantity} ({entry.where})", entry.printed, entry.computed, f"**{entry.verdict}**", entry.why)
@@ -107,7 +107,7 @@ class Ledger:
         return len(self.entries)
 
     def __getitem__(self, quantity: str) -> Entry:
-        """Return the row of a quantity; ``KeyError`` if there is none."""
+        """Row of a quantity; ``KeyError`` if there is none."""
         for entry in self.entries:
             if entry.quantity == quantity:
                 return entry
@@ -118,20 +118,20 @@ class Ledger:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many rows have each verdict; those that occur, in the order of :data:`VERDICTS`."""
+        """Number of rows by verdict, in the order of :data:`VERDICTS`."""
         found = Counter(entry.verdict for entry in self.entries)
         return {verdict: found[verdict] for verdict in VERDICTS if found[verdict]}
 
     def text(self) -> str:
-        """Write the ledger as plain text, at most 120 columns wide."""
+        """Plain text, at most 120 columns wide."""
         return text(self.entries, self.counts)
 
     def markdown(self) -> str:
-        """Write the ledger as a table in Markdown, for docs/paper.md."""
+        """Markdown table, for docs/paper.md."""
         return markdown(self.entries, self.counts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return inputs, entries and counts as plain data, for JSON; a number that is not finite is ``None``."""
+        """Plain data of inputs, entries and counts; a non-finite number is ``None``."""
         return {
             "inputs": {field.name: _plain(getattr(self.inputs, field.name)) for field in fields(self.inputs)},
             "entries": [{f.name: _plain(getattr(entry, f.name)) for f in fields(entry)} for entry in self.entries],
@@ -140,7 +140,7 @@ class Ledger:
 
 
 def ledger(inputs: PaperInputs | None = None) -> Ledger:
-    """Compute every row.
+    """Compute the ledger: every printed number of the paper beside the recomputed one.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def ledger(inputs: PaperInputs | None = None) -> Ledger:
 
 
 class _Reading:
-    """Inputs that note which of their fields are read."""
+    """Inputs that record which fields are read."""
 
     def __init__(self, inputs: PaperInputs) -> None:
         self._inputs, self._read = inputs, set[str]()
@@ -191,7 +191,7 @@ def compute(row: Mapping[str, Any], inputs: PaperInputs) -> Entry:
 
 
 def _floats(values: Any) -> tuple[float, ...]:
-    """Join numbers and arrays, nested in any way, into one tuple."""
+    """Flatten nested numbers and arrays into one tuple."""
     if isinstance(values, tuple | list):
         return tuple(number for value in values for number in _floats(value))
     return tuple(float(number) for number in np.ravel(values))

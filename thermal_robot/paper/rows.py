@@ -1,4 +1,4 @@
-"""Equations behind the rows of the ledger, section by section; each a function of the inputs, the figures, the case.
+"""Equations of the ledger's rows, section by section; functions of inputs, printed numbers and case.
 
 No computation reads its answer from the printed results. Measurements and conditions that the paper prints are inputs
 and stand in :class:`~thermal_robot.paper.PaperInputs`. The one result that serves as data again is the theoretical
@@ -58,14 +58,14 @@ _AXES = [f"{axis} of row {row}" for row in (1, 2) for axis in "xyz"]
 
 @cache
 def table() -> list[dict[str, Any]]:
-    """Rows of ``ledger.toml``, those that share their texts one after the other."""
+    """Rows of ``ledger.toml``, those with common texts one after the other."""
     rows = tomllib.loads(files("thermal_robot.paper").joinpath("ledger.toml").read_text(encoding="utf-8"))["row"]
     return [row | case | {"quantity": row["quantity"].format(**case)} for row in rows for case in row.get("each", [{}])]
 
 
 @cache
 def printed(quantity: str) -> Printed:
-    """Return the printed figures of a row."""
+    """Return the printed numbers of a row."""
     row = next(row for row in table() if row["quantity"] == quantity)
     return Printed.of(row["printed"], row.get("digit"))
 
@@ -74,14 +74,14 @@ def printed(quantity: str) -> Printed:
 
 
 def theoretical_sigma(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Return standard deviations of the tool from those of the joints, Eqs 2–4."""
+    """Return the standard deviations of the tool from those of the joints, Eqs 2–4."""
     covariance = tool_covariance(rv_m2_with_hand(i.l5), joints(*i.poses), (*i.sigma_q, 0.0))
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return {"values": sigma, "sigma": sigma}
 
 
 def sigma_q_behind_table_1(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """σ_q from the theoretical column of Table 1: Eqs 2–4 the other way round."""
+    """Joint standard deviations σ_q from the theoretical column of Table 1, Eqs 2–4 inverted."""
     rows = np.reshape(printed("Table 1, theoretical σ").values, (2, 3))
     found = joint_sigmas(rv_m2_with_hand(i.l5), joints(*i.poses), rows, rounding=_HALF)
     low, high, sigma = (values[:4] for values in (found.lower, found.upper, found.sigma))
@@ -97,7 +97,7 @@ def sigma_q_behind_table_1(i: PaperInputs, figures: Printed, case: Case) -> Foun
 
 
 def experimental_sigma(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Non-negative σ_q that fit the measured standard deviations of Table 1."""
+    """Non-negative least squares for σ_q from the measured standard deviations of Table 1."""
     given = rv_m2_with_hand(i.l5), joints(*i.poses), i.experimental_sigma
     exact = joint_sigmas(*given, rounding=_HALF)
     sampled = joint_sigmas(*given, rounding=_HALF, sample_size=i.n, confidence=1.0 - i.alpha)
@@ -112,7 +112,7 @@ def experimental_sigma(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def sampled(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Hold the extremes and the skewness of n errors against their sampling distributions."""
+    """Compare the extremes and the skewness of n errors with their sampling distributions."""
     skew = case["extreme"] == "skewness"
     below, ends, said = _skewness(i, figures) if skew else _extreme(i, figures, case["extreme"])
     p = 2.0 * np.minimum(below, 1.0 - below)
@@ -135,7 +135,7 @@ def sampled(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def _extreme(i: PaperInputs, figures: Printed, extreme: str) -> tuple[Array, Array, str]:
-    """Probabilities of less (6,) and central intervals (2, 6) of the largest of n normal errors, or the smallest."""
+    """Lower-tail probabilities (6,) and central intervals (2, 6) of the largest or smallest of n normal errors."""
     sign = 1 if extreme == "maximum" else -1
     sigma, tails = np.ravel(i.experimental_sigma), np.array([i.alpha / 2.0, 1.0 - i.alpha / 2.0])
     below = ndtr(sign * np.array(figures.values) / sigma) ** i.n
@@ -144,7 +144,7 @@ def _extreme(i: PaperInputs, figures: Printed, extreme: str) -> tuple[Array, Arr
 
 
 def _skewness(i: PaperInputs, figures: Printed) -> tuple[Array, Array, str]:
-    """Return the same for the skewness of n normal errors, and how its law was simulated."""
+    """Lower-tail probabilities and intervals of the skewness of n normal errors, and the simulation's settings."""
     law, seen = _skewness_law(i.n, 10 * i.repetitions, i.seed), np.array(figures.values)
     # Of a symmetric law both halves are used.
     below = (np.searchsorted(law, seen) + len(law) - np.searchsorted(law, -seen)) / (2.0 * len(law))
@@ -195,7 +195,7 @@ def calculated(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def u_of_eq_13(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Test of the mean after stabilisation, Eq 13."""
+    """Test statistic U of the mean after stabilisation, Eq 13."""
     row = case["n"] - 1
     sigma = i.experimental_sigma[row]
     test = mean_shift_test(i.sample_means[row], i.static_displacements[row], sigma, n=i.n, alpha=i.alpha)
@@ -205,7 +205,7 @@ def u_of_eq_13(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def u_before_stabilisation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Share of the rise of temperature that is missing while Eq 13 still rejects the final mean."""
+    """Missing share of the rise of temperature at which Eq 13 still rejects the final mean."""
     test = mean_shift_test(np.zeros((2, 3)), i.static_displacements, i.experimental_sigma, n=i.n, alpha=i.alpha)
     share = test.critical / np.abs(test.u)
     rejected = share < 1.0
@@ -274,7 +274,7 @@ def median_error(values: Array) -> float:
 
 @lru_cache(maxsize=4)
 def random_systems(sets: int, seed: int) -> tuple[Array, Array, Array]:
-    """Set up Eq 12 at ``sets`` times five random poses; four Δx and one Δz, or all ten.
+    """Design matrices of Eq 12 at ``sets`` times five random poses; four Δx and one Δz, or all ten.
 
     Conditions ``(sets,)``, standard errors ``(sets, 5)`` of the elongations for a noise of 1, and the conditions of all
     ten.
@@ -296,7 +296,7 @@ def _span(lengths: Array, decimals: int = 1) -> str:
 
 
 def area_of_eq_18(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Area under the density of Eq 18, with its factor as printed and mended."""
+    """Area under the density of Eq 18, with its factor as printed and corrected."""
 
     def area(factor: float, r: float) -> float:
         half = np.sqrt(3.0) * r
@@ -357,7 +357,7 @@ def not_rejected(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def normal_enough(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Power against the total error at r = 0.5 and 1: the claim that it is normal enough for r < 1."""
+    """Power of the normality test against the total error at r = 0.5 and 1: the claim of normality for r < 1."""
     half, one = ([_power(r, n, i) for n in (i.n, i.n_simulated)] for r in (0.5, 1.0))
     holds, holds_at_half = all(map(_mostly_passes, one)), all(map(_mostly_passes, half))
     shares = [[power.rejected for power in powers] for powers in (half, one)]
@@ -391,7 +391,7 @@ def _simulate(r: float, n: int, alpha: float, samples: int, seed: int) -> Power:
 
 
 def _mostly_passes(power: Power) -> bool:
-    """Whether it is rejected at most twice as often as a normal sample is."""
+    """Whether it is rejected at most twice as often as a normal sample."""
     return power.low <= 2.0 * power.alpha
 
 
@@ -413,7 +413,7 @@ def capability_at(covariance: Array, clearance: float) -> float:
 
 @lru_cache(maxsize=256)
 def warmed(sigma: tuple[float, float], shift: tuple[float, float], required: float, model: Model) -> tuple[float, ...]:
-    """Return what a thermal error of ±shift does beside standard deviations sigma, both along x and y, m.
+    """Capability with a thermal error of ±shift beside standard deviations sigma, both along x and y, m.
 
     Clearance, m, at which the capability without temperature is the required one; capability there with temperature;
     its loss, and the growth of the clearance that makes up for it, as shares. ``"covariance"``: shift²/3 is added to
@@ -436,7 +436,7 @@ def capability_at_clearance(i: PaperInputs, figures: Printed, case: Case) -> Fou
 
 
 def lower_in_row_2(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Share by which the capability of row 2 is lower than that of row 1, at one clearance."""
+    """Relative difference of the capabilities of rows 2 and 1, at one clearance."""
     first, second = _capabilities(1, i), _capabilities(2, i)
     at, low, high = (1.0 - second[a] / first[b] for a, b in ((0, 0), (2, 1), (1, 2)))
     return {"values": (at, low, high), "compared": at, "at": at, "low": low, "high": high}
@@ -473,7 +473,7 @@ def warmed_capability(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def loss_from_printed(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Compute a printed loss from the printed capabilities: arithmetic alone."""
+    """Loss computed from the printed capabilities."""
     start, (end,), after = 1.33, Printed.of(case["after"]).values, case["after"]
     half = 0.5 * Printed.of(after).digits[0]
     found, low, high = (1.0 - (end + change) / start for change in (0.0, half, -half))
@@ -489,14 +489,14 @@ def loss_from_printed(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def _capabilities(row: int, i: PaperInputs) -> tuple[float, float, float]:
-    """C_p, and its least and largest value over the rounding of σ: it falls with either."""
+    """Capability C_p, and its bounds over the rounding of σ, in which it decreases."""
     sigma = np.array(_plane(i.experimental_sigma[row - 1]))
     at, high, low = (capability_at(np.diag((sigma + change) ** 2), i.clearance) for change in (0.0, -_HALF, _HALF))
     return at, low, high
 
 
 def _range(row: int, model: Model, i: PaperInputs) -> tuple[Array, Array]:
-    """Least and largest C_p, loss and growth over the corners of what the rounding of σ and shift leaves open."""
+    """Bounds of C_p, loss and growth over the rounding of σ and shift."""
     middle = np.array([*_plane(i.experimental_sigma[row - 1]), *_plane(i.sample_means[row - 1])])
     corners = [(middle + change).tolist() for change in product((-_HALF, _HALF), repeat=4)]
     found = [warmed((a, b), (c, d), i.capability, model)[1:] for a, b, c, d in corners]
@@ -523,14 +523,14 @@ def q3_of_row_1(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def law_of_u(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Quantiles of N(0,1), the law of U, where N(1,0) is printed."""
+    """Quantiles of N(0,1), the law of U, printed as N(1,0)."""
     test = mean_shift_test(i.sample_means, i.static_displacements, i.experimental_sigma, n=i.n, alpha=i.alpha)
     beyond = int(np.sum(np.abs(test.u) > 1.0))
     return {"values": (test.critical, beyond, test.u), "right": test.critical, "beyond": beyond}
 
 
 def counts_of_eq_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Equations and unknowns of Eq 12, as it is printed and as the text says."""
+    """Median condition of Eq 12 with five and with ten equations, and its rank as printed."""
     five, _, ten = random_systems(i.pose_sets, i.seed)
     robot = rv_m2_with_hand()
     q = np.random.default_rng(i.seed).uniform(robot.lower, robot.upper, (5, robot.n))
@@ -540,7 +540,7 @@ def counts_of_eq_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def kinematic_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """x–y correlation that the diagonal covariance of Eq 21 drops."""
+    """Correlation of x and y that the diagonal covariance of Eq 21 neglects."""
     covariance = tool_covariance(rv_m2_with_hand(i.l5), joints(*i.poses), (*i.sigma_q, 0.0))
     rho = _correlations(covariance[:, :2, :2])
     change = np.empty(2)
@@ -551,7 +551,7 @@ def kinematic_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found
 
 
 def thermal_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """x–y correlation of a thermal shift: the arm grows in its own vertical plane."""
+    """Correlation of x and y in a thermal shift: the arm grows in its own vertical plane."""
     robot, q = rv_m2_with_hand(), joints(*i.poses)
     flat = elongation_jacobian(robot, q)[:, :2]
     rho = _correlations((flat * np.array(i.delta_l) ** 2) @ np.swapaxes(flat, 1, 2) / 3.0)

@@ -1,4 +1,4 @@
-"""The first campaign, before anything was measured: what to command, and how well each effect will be known."""
+"""Experimental design of a first campaign: commands, and the expected precision of each effect."""
 
 from thermal_robot.planning.plan import Expected, ExpectedParameter, Plan, plan, text, write_plan
 

@@ -1,8 +1,8 @@
-"""Plan a first campaign: poses that tell the effects apart, in an order that brings both approaches.
+"""Optimal experimental design of a first campaign: poses, their order, and expected precision.
 
-Candidates for each place in the order are drawn at random; of these the engine of ``next_samples`` chooses greedily
-what tells most about the parameters of all effects together, with the frames unknown. Collisions and the line of sight
-of the instrument are not checked.
+Candidates are drawn at random; greedy D-optimal design, as in ``next_samples``, chooses those with the most information
+on the parameters of all effects, with the frames unknown. Collisions and the line of sight of the instrument are not
+checked.
 
 How well a campaign will know each effect: posterior standard deviations of the linear Gaussian model.
 
@@ -45,7 +45,7 @@ FRAMES = "unknown frames"
 
 @dataclass(frozen=True)
 class ExpectedParameter:
-    """How well one parameter will be known.
+    """Expected precision of one parameter.
 
     Attributes
     ----------
@@ -54,8 +54,7 @@ class ExpectedParameter:
     size
         Expected size: its standard deviation before anything is measured.
     sigma, beside
-        Its standard deviation afterwards, with the frames unknown: were this effect the only one at work, and were all
-        of them.
+        Expected posterior standard deviation with unknown frames: with this effect alone, and with all effects.
 
     Examples
     --------
@@ -76,17 +75,17 @@ class ExpectedParameter:
 
     @property
     def told(self) -> bool:
-        """Whether it will be known, alone, to less than half its size."""
+        """Whether its expected standard deviation, as the only parameter, is below half its size."""
         return self.sigma < settings.DETERMINED * self.size
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, ready for JSON."""
+        """Plain values, ready for JSON."""
         return {**vars(self), "told": self.told}
 
 
 @dataclass(frozen=True)
 class Expected:
-    """How well one effect will be known.
+    """Expected precision of one effect.
 
     Attributes
     ----------
@@ -95,8 +94,8 @@ class Expected:
     parameters
         Its parameters.
     confounded
-        What takes the knowledge of at least one of its parameters away: other effects by name, each beside it alone,
-        and ``"unknown frames"``.
+        What makes at least one of its parameters undeterminable: names of other effects, each taken alone, and
+        ``"unknown frames"``.
     lacks
         What the campaign would have to record for it to be testable; it then has no parameters.
 
@@ -121,14 +120,14 @@ class Expected:
         return any(parameter.told for parameter in self.parameters)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, ready for JSON."""
+        """Plain values, ready for JSON."""
         parameters = [parameter.to_dict() for parameter in self.parameters]
         return {**vars(self), "confounded": list(self.confounded), "lacks": list(self.lacks), "parameters": parameters}
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What unit errors do to the rows, in units of the noise; a parameter's unit is its expected size.
+    """Whitened design matrix of effects, in units of the noise and of the expected sizes.
 
     Attributes
     ----------
@@ -146,7 +145,7 @@ class Columns:
 
     @classmethod
     def of(cls, seen: Observations, effects: Sequence[Effect]) -> Columns:
-        """Return the columns of effects; the campaign states the noise of each component, m and rad."""
+        """Whitened design matrix of effects; the campaign states the noise, m and rad."""
         items = tuple(block(seen, effect) for effect in effects)
         frames = frame_columns(seen)[0] * design.LOOSE
         rows, measures, flat = frames.shape
@@ -158,20 +157,20 @@ class Columns:
 
     @property
     def precision(self) -> Array:
-        """(f + P, f + P) of the posterior, in units of the expected sizes."""
+        """Posterior precision (f + P, f + P), in units of the expected sizes."""
         rows = equations_of(self.root)
         return np.asarray(rows.T @ rows + np.eye(rows.shape[1]))
 
     @property
     def information(self) -> float:
-        """Of all rows about the effects' parameters, nats."""
+        """Information of all rows on the effects' parameters, nats."""
         precision = self.precision
         whole, frames = (np.linalg.slogdet(part)[1] for part in (precision, precision[: self.flat, : self.flat]))
         return float(0.5 * (whole - frames))
 
 
 def expectations(columns: Columns) -> tuple[Expected, ...]:
-    """Return how well each effect of the columns will be known."""
+    """Return the expected precision of each effect."""
     flat, precision = columns.flat, columns.precision
     ends = np.cumsum([flat, *(len(item.sizes) for item in columns.blocks)])
     own = [np.arange(a, b) for a, b in pairwise(ends)]
@@ -192,8 +191,40 @@ def expectations(columns: Columns) -> tuple[Expected, ...]:
     return tuple(found)
 
 
+def foreseen(campaign: Campaign, effects: str | Iterable[str] | None = None) -> tuple[Expected, ...]:
+    """Return how well effects would be known from the rows of a campaign, whatever these measure (Fisher).
+
+    Parameters
+    ----------
+    campaign
+        Rows of any kind, as :func:`~thermal_robot.simulate` makes them; of its readings only the noise that it states
+        counts.
+    effects
+        Names of those that are asked for; all that can be tested where absent.
+
+    Raises
+    ------
+    CampaignError
+        The campaign states no noise.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning.plan import foreseen
+    >>> rows = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=60, measures="distance", noise=5e-5)
+    >>> [known.name for known in foreseen(rows, "joint_offset")]
+    ['joint_offset']
+    """
+    if campaign.noise_position is None:
+        raise CampaignError(campaign.name, "states no noise", column="noise.position", expected="one sigma per axis")
+    seen = observe(campaign)
+    names = [effects] if isinstance(effects, str) else effects
+    kinds = [kind for kind in choose(tuple(names or ())) if not gate.missing(kind, seen)]
+    return expectations(Columns.of(seen, [gate.variants(kind, seen)[0] for kind in kinds]))
+
+
 def _left(precision: Array, which: NDArray[np.int64]) -> Array:
-    """(k,) standard deviations, as shares of the expected sizes, were no other parameters at work."""
+    """Return the standard deviations (k,) over the expected sizes, without other parameters."""
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision[np.ix_(which, which)]))))
 
 
@@ -210,7 +241,7 @@ ORDERS = 16
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What to command, and how well each effect will be known.
+    """Planned campaign with its expected precision.
 
     Attributes
     ----------
@@ -218,9 +249,9 @@ class Plan:
         The rows in their order, a campaign without measurements: joints, time, temperature, payload, and the approaches
         that follow from the order.
     effects
-        How well each effect will be known.
+        Expected precision of each effect.
     information
-        Of all rows about the parameters of all effects, nats.
+        Information of all rows on the parameters of all effects, nats.
     repeats
         How often each pose is measured.
 
@@ -238,7 +269,7 @@ class Plan:
     repeats: int
 
     def effect(self, name: str) -> Expected:
-        """Return what is expected of one effect.
+        """Return the expected precision of one effect.
 
         Raises
         ------
@@ -255,7 +286,7 @@ class Plan:
         return of_effect({expected.name: expected for expected in self.effects}, name)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, SI, ready for JSON.
+        """Plain values, SI, ready for JSON.
 
         Examples
         --------
@@ -289,16 +320,16 @@ def plan(
     units: Units | None = None,
     seed: int = 0,
 ) -> Plan:
-    """Plan a campaign before anything was measured.
+    """Plan a first campaign by optimal design, before anything was measured.
 
     Parameters
     ----------
     robot
-        Whose n joints are commanded, within their limits and within 2.4 rad where one can turn once round.
+        Robot with n joints, commanded within their limits and within 2.4 rad where one can turn once round.
     rows
-        Of the campaign, repeats included.
+        Number of rows, repeats included.
     effects
-        Names of those that are to be told; all where absent.
+        Names of the effects to be determined; all by default.
     repeats
         How often each pose is measured: rows / repeats poses, all of them once a round.
     noise, noise_orientation
@@ -314,9 +345,9 @@ def plan(
     base_known, tool_known
         Whether the frames will be known; by default they are fitted.
     units
-        In which the plan is written; rad and m by default.
+        Units of the plan; rad and m by default.
     seed
-        Of the candidates; the same seed gives the same plan.
+        Seed of the random candidates; the same seed gives the same plan.
 
     Returns
     -------
@@ -360,7 +391,7 @@ def plan(
 
 
 def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dict[str, Any] | None = None) -> Campaign:
-    """Return rows with these commands and conditions."""
+    """Rows with these commands and conditions."""
     turned = None if empty.noise_orientation is None else np.tile([1.0, 0.0, 0.0, 0.0], (len(q), 1))
     rows = np.arange(2, len(q) + 2)
     return replace(empty, q=q, orientation=turned, covariates=covariates, rows=rows, labels=labels or {})
@@ -369,7 +400,7 @@ def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dic
 def _planned(
     empty: Campaign, given: dict[str, Array], visits: schedule.Rows, kinds: Sequence[Effect], rng: np.random.Generator
 ) -> Plan:
-    """Choose poses, then their order, for (N,) conditions and (P, K) rows of each pose."""
+    """Choose poses and their order, for (N,) conditions and (P, K) rows of each pose."""
     poses, places = visits.shape
     each = max(FEWEST_CHOICES, min(CHOICES, MOST_CANDIDATES // (poses * places)))
     place = np.repeat(np.arange(poses), each)
@@ -397,7 +428,7 @@ def _planned(
 def _in_order(
     empty: Campaign, given: dict[str, Array], visits: schedule.Rows, poses: Array, k: int, rng: np.random.Generator
 ) -> Campaign:
-    """Return the plan of poses (P, n) in the k-th balanced order, with the approaches that follow from it."""
+    """Plan of poses (P, n) in the k-th balanced order, with the approaches that follow from it."""
     mixed = poses if k == 0 else poses[rng.permutation(len(poses))]
     q, labels = schedule.in_turn(mixed[schedule.balanced(mixed, visits, rng)], visits)
     sides = arrivals(q, empty.robot.joint_names, given, None)
@@ -411,7 +442,7 @@ def _number(value: object) -> bool:
 def _check(
     robot: Robot, rows: int, repeats: int, noise: float, turn: float, rise: float, loads: Sequence[float]
 ) -> None:
-    """Refuse numbers that no campaign has."""
+    """Refuse invalid numbers of rows, repeats, noise and so on."""
 
     def refuse(column: str, found: object, expected: str) -> None:
         raise CampaignError("plan", "cannot be planned", column=column, found=repr(found), expected=expected)
@@ -437,7 +468,7 @@ _HEAD = ("effect", "unit", "expected size", "1 sigma", "worst", "beside all", "t
 
 
 def text(plan: Plan) -> str:
-    """Return the plan in words: how many rows, the approaches, and a line for each effect and unit.
+    """Plain text of a plan: rows, approaches, and a line for each effect and unit.
 
     ``1 sigma`` and ``worst`` are the median and the largest over the parameters that are told, else over all, were the
     effect alone at work; ``beside all`` is the median were all of them; ``told`` counts the parameters known to less
@@ -481,7 +512,7 @@ def _lines(expected: Expected) -> Iterator[tuple[str, ...]]:
 
 
 def _why(expected: Expected) -> str:
-    """Say why nothing can be said of an effect."""
+    """Reason why nothing can be expected of an effect."""
     lacks = expected.lacks
     if not lacks:
         return "has no columns before there are data: it is looked for in what is measured"
@@ -497,7 +528,7 @@ COMMENTS = (
 
 
 def write_plan(plan: Plan, path: str | Path) -> Path:
-    """Write a plan: a table where the name ends in ``.csv``, else a folder that is made if need be.
+    """Write a plan: a table where the name ends in ``.csv``, else a campaign folder.
 
     Parameters
     ----------

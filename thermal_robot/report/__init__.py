@@ -1,4 +1,4 @@
-"""Draws a diagnosis, computes none: text, HTML, figures, and the JSON Schema of its data.
+"""Reports of results: text, HTML, figures, and the JSON Schema of their data; nothing is computed here.
 
 Nothing is loaded before it is used; Matplotlib only where something is drawn.
 """
@@ -74,7 +74,7 @@ _HOMES = {
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/2``."""
+    """JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/2``."""
     return dict(json.loads(files(__name__).joinpath("diagnosis.schema.json").read_text(encoding="utf-8")))
 
 
@@ -84,7 +84,7 @@ def motion_schema() -> dict[str, Any]:
 
 
 def comparison_schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/comparison/1``."""
+    """JSON Schema (draft 2020-12) of the format ``thermal-robot/comparison/1``."""
     return dict(json.loads(files(__name__).joinpath("comparison.schema.json").read_text(encoding="utf-8")))
 
 

@@ -1,4 +1,4 @@
-"""What all figures share: colours, axes, and how much of a long campaign is drawn."""
+"""Common style of the figures: colours, axes, thinning of points."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _DRAWN = 6000
 
 
 class Drawing(Figure):
-    """A Matplotlib figure that needs no display, no pyplot, and shows itself in a notebook."""
+    """Matplotlib figure without display or pyplot, with a notebook representation."""
 
     def __init__(self, width: float, height: float) -> None:
         super().__init__(figsize=(width, height), layout="constrained", facecolor=PAPER)
 
     def savefig(self, fname: Any, **options: Any) -> None:
-        """Draw into a file, which appears whole or not at all, or into a stream; options are Matplotlib's."""
+        """Draw into a file by an atomic replace, or into a stream; options are Matplotlib's."""
         if not isinstance(fname, (str, os.PathLike)):
             super().savefig(fname, **options)
             return
@@ -49,12 +49,12 @@ class Drawing(Figure):
 
 
 def plain(text: str) -> str:
-    """Keep a name that holds dollar signs from being read as a formula."""
+    """Escape dollar signs, so that a name is not rendered as a formula."""
     return text.replace("$", r"\$")
 
 
 def tidy(axes: Axes, grid: str = "y") -> None:
-    """Give axes the look that all figures share; ``grid`` is ``x``, ``y``, ``both`` or empty."""
+    """Apply the common style to axes; ``grid`` is ``x``, ``y``, ``both`` or empty."""
     axes.set_facecolor("none")
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
@@ -83,7 +83,7 @@ def note(axes: Axes, text: str) -> None:
 
 
 def log_axis(axes: Axes, low: float, high: float) -> None:
-    """Make the x axis logarithmic, with numbers that are read at sight: 1, 2, 5, 10."""
+    """Make the x axis logarithmic, with plain tick labels: 1, 2, 5, 10."""
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     subs = (1.0, 2.0, 5.0) if high / low < 2000.0 else (1.0,)
@@ -93,7 +93,7 @@ def log_axis(axes: Axes, low: float, high: float) -> None:
 
 
 def thinned(count: int, most: int = _DRAWN) -> NDArray[np.int64]:
-    """Return which of so many points are drawn, in order: all of few, a fixed random choice of many."""
+    """Return the indices of the points to draw, in order: all of few, a fixed random sample of many."""
     if count <= most:
         return np.arange(count)
     return np.sort(np.random.default_rng(0).permutation(count)[:most])

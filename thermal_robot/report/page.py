@@ -1,4 +1,4 @@
-"""HTML pages of results, which need nothing beside themselves: Jinja2 templates, and figures as SVG."""
+"""Self-contained HTML pages of results: Jinja2 templates, figures as SVG."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def render(
     files: Mapping[str, str] | None = None,
     script: str = "",
 ) -> str:
-    """Fill a template of this room; the Content-Security-Policy of a page allows no script but its own.
+    """Render a template of this room with a strict Content-Security-Policy.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def render(
 
 
 def signature(generated: str | None) -> str:
-    """Return which program made a page, on which libraries, and when."""
+    """Footer of a page: program, libraries, time."""
     made_by = []
     for package in ("thermal-robot", "pin", "numpy", "scipy"):
         try:
@@ -88,7 +88,7 @@ _PIXELS = 106.0  # per inch at most, so that letters are equally large in all fi
 
 
 def svg(figure: Figure, label: str) -> Markup:
-    """Return a figure as inline SVG (Scalable Vector Graphics), the same for equal figures.
+    """Inline SVG (Scalable Vector Graphics) of a figure, reproducible.
 
     Its colours are those of the page, and its identifiers clash with no other figure's. ``label`` says what it shows,
     for those who cannot see it.
@@ -113,9 +113,9 @@ def svg(figure: Figure, label: str) -> Markup:
 
 
 def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
-    """Write a diagnosis as an HTML page that needs nothing beside itself and prints on A4.
+    """Self-contained HTML page of a diagnosis, for A4.
 
-    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
+    If robot and table do not match, the page says why and what to do.
 
     Parameters
     ----------
@@ -134,9 +134,9 @@ def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str,
 
 
 def fragment(diagnosis: Diagnosis) -> str:
-    """Write a diagnosis as HTML for a notebook, one ``<div>`` with its own style: verdict, numbers, figure, effects.
+    """HTML of a diagnosis for a notebook, one ``<div>`` with its own style: verdict, numbers, figure, effects.
 
-    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
+    If robot and table do not match, it says why and what to do.
     """
     return render("diagnosis.html", {"d": diagnosis})
 
@@ -148,7 +148,7 @@ _DECIMALS = 4  # of m: a tenth of a millimetre is less than a pixel
 
 
 def arm_drawing(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Return what the page's script draws: links, joints and their shares, and the postures of the rows.
+    """Return data of the page's three-dimensional drawing: links, joints, their shares, and the postures of the rows.
 
     ``None`` where nothing is known of places, or no two places with a gap are left.
     """
@@ -206,7 +206,7 @@ def _short(values: Array) -> list[float]:
 
 
 def comparison_html(comparison: Plain, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
-    """Write a comparison of campaigns as an HTML page that needs nothing beside itself and prints on A4.
+    """Self-contained HTML page of a comparison of campaigns, for A4.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def comparison_html(comparison: Plain, generated: str | None = None, files: Mapp
 
 
 def comparison_fragment(comparison: Plain) -> str:
-    """Write a comparison as HTML for a notebook: one ``<div>`` with its own style."""
+    """HTML of a comparison for a notebook: one ``<div>`` with its own style."""
     headline = text_campaigns.comparison_headline(comparison)
     return render("campaigns.html", {"headline": headline, "sections": _of_comparison(comparison)})
 
@@ -262,7 +262,7 @@ _EXPLAINED = {
 
 
 def fleet_html(summary: Plain, generated: str | None = None) -> str:
-    """Write a summary of a fleet as an HTML page that needs nothing beside itself and prints on A4.
+    """Self-contained HTML page of a fleet's summary, for A4.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def _of_fleet(summary: Plain) -> Iterator[dict[str, Any]]:
 
 
 def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
-    """Write a robot over time as an HTML page that needs nothing beside itself and prints on A4.
+    """Self-contained HTML page of a robot over time, for A4.
 
     Parameters
     ----------

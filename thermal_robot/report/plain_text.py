@@ -1,4 +1,4 @@
-"""A diagnosis and a calibration as plain text: what the command line prints."""
+"""Plain text of a diagnosis and of a calibration, for the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NAME = 26
 
 
 def text(diagnosis: Diagnosis) -> str:
-    """Write a diagnosis for the person who measured.
+    """Plain text of a diagnosis.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: int = 7) -> Iterator[str]:
-    """Draw shares as bars of characters, full at one; nothing for what is not above zero."""
+    """Bar chart of shares in characters, full at one; nothing for what is not above zero."""
     if not shares:
         return
     ordered = sorted(shares.items(), key=lambda item: -item[1]) if ranked else list(shares.items())
@@ -158,7 +158,7 @@ def bar(share: float) -> str:
 
 
 def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
-    """Tell the standard's criteria of the worst pose and path; nothing without repeats."""
+    """Yield the ISO 9283 criteria of the worst pose and path; nothing without repeats."""
     found = diagnosis.performance
     if found is None:
         return
@@ -187,7 +187,7 @@ def _next(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """Write a calibration for the person who measured.
+    """Plain text of a calibration.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The figures of results: how far the gap shrinks, which effects, where they act, what remains, what campaigns share.
+"""Figures of results: histogram of the gap, effects, places, map, residual, comparisons.
 
 Colours, axes and the Matplotlib figure behind them stand in :mod:`thermal_robot.report.drawing`.
 """
@@ -138,7 +138,7 @@ _FURTHEST_BELOW_ZERO, _FURTHEST = -0.25, 1.5
 
 
 def plot_which(diagnosis: Diagnosis) -> Figure:
-    """Draw every candidate's share of the gap on held-out rows with its 95 % interval, and its probability.
+    """Draw the held-out share of every candidate with its 95 % interval, and its probability.
 
     Returns
     -------
@@ -304,14 +304,14 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
 
 
 def _planes(diagnosis: Diagnosis) -> dict[str, tuple[int, int]]:
-    """Return the axes of the root frame across and up in each view."""
+    """Axes of the root frame across and up in each view."""
     position = diagnosis.rows.position
     broad = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0
     return {"Seen from above": (0, 1), "Seen from the side": (broad, 2)}
 
 
 def _arrows(diagnosis: Diagnosis, plane: tuple[int, int]) -> tuple[Array, Array, Array, float]:
-    """Return (N, 2) starts and exaggerated gaps before and after in a plane, m, and how many times they are longer.
+    """Start points and exaggerated gaps (N, 2), before and after, in a plane, m, and the magnification.
 
     There are none where all rows were set aside or are at one place, or no gap is left.
     """
@@ -323,7 +323,7 @@ def _arrows(diagnosis: Diagnosis, plane: tuple[int, int]) -> tuple[Array, Array,
 
 
 def _extent(start: Array, before: Array, after: Array) -> tuple[Array, Array, float]:
-    """Return middle and size, (2,) m each with a small margin, of what arrows fill, and a panel's width to height."""
+    """Centre and size, (2,) m each with a margin, of the arrows, in the aspect ratio of a panel."""
     ends = np.vstack([start, start + before, start + after])
     low, high = ends.min(axis=0), ends.max(axis=0)
     size = 1.06 * np.maximum(high - low, 1e-6)
@@ -366,7 +366,7 @@ def _draw_map(axes: Axes, diagnosis: Diagnosis, plane: tuple[int, int]) -> None:
 
 
 def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
-    """Draw below the legend how long an arrow of a round gap, m, is."""
+    """Draw the scale of the arrows below the legend, as the length of a round gap, m."""
     below = ScaledTranslation(0.09, -0.35, axes.figure.dpi_scale_trans)
     along = blended_transform_factory(axes.transData, axes.transAxes) + below
     start = axes.get_xlim()[0]
@@ -379,13 +379,13 @@ def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
 
 
 def mapped(diagnosis: Diagnosis) -> NDArray[np.int64]:
-    """Return which of the diagnosis' rows can be mapped: those that were not set aside and have a place."""
+    """Mask of the diagnosis' rows that can be mapped: not set aside, and with a position."""
     rows = diagnosis.rows
     return np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
 
 
 def exaggeration(diagnosis: Diagnosis, used: NDArray[np.int64], longest: float) -> float | None:
-    """Return a round number of times that arrows are drawn longer than the gap; ``None`` without places or a gap.
+    """Round magnification of the arrows; ``None`` without positions or a gap.
 
     An arrow of the gap's 95th percentile is then at most the fraction ``longest`` of the workspace's extent, unless it
     is longer as it stands.
@@ -410,7 +410,7 @@ _WITHOUT_UNIT = {"speed": "share of the maximum", "approach": "−1, 0, 1", "ord
 
 
 def plot_remainder(diagnosis: Diagnosis) -> Figure:
-    """Draw the remainder's x, y and z in the root frame.
+    """Draw the residual's x, y and z in the root frame.
 
     Returns
     -------
@@ -444,7 +444,7 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
 
 
 def _followed(diagnosis: Diagnosis) -> list[tuple[str, Array]]:
-    """Return label and values of the quantity that the remainder follows most; none if not recorded."""
+    """Label and values of the quantity that the residual follows most; empty if not recorded."""
     if not diagnosis.unexplained.depends_on:
         return []
     name, rows = diagnosis.unexplained.depends_on[0].covariate, diagnosis.rows
@@ -476,7 +476,7 @@ def _draw_remainder(axes: Axes, along: Array, values: Array, aside: NDArray[np.b
 
 
 def _draw_middles(axes: Axes, along: Array, values: Array) -> None:
-    """Draw medians: a line over equally many rows each, or a dash at each value of a quantity with few of them."""
+    """Draw running medians: a line over equal numbers of rows, or a dash at each value of a discrete quantity."""
     levels = np.unique(along)
     if len(levels) <= _LEVELS:  # between two directions of approach there is nothing that a line could tell
         middle = [np.median(values[along == level]) for level in levels]
@@ -499,7 +499,7 @@ _STEPS = [1, 2, 5, 10]
 
 
 def explain_figure(explained: Explained) -> Figure:
-    """Draw what one effect explains, one panel a place, the largest share first.
+    """Draw partial residuals of one effect, one panel a place, the largest share first.
 
     Returns
     -------
@@ -542,12 +542,12 @@ def explain_figure(explained: Explained) -> Figure:
 
 
 def _seen(place: Place) -> NDArray[np.bool_]:
-    """(n,) True for rows whose noise does not hide the error."""
+    """Mask (n,) of rows whose noise does not hide the error."""
     return np.asarray(place.spread <= _UNSEEN * np.median(place.spread))
 
 
 def _limits(places: Sequence[Place], unit: str) -> tuple[float, float]:
-    """Return where the error's axis ends in all panels of a unit: a few noisy rows must not decide it."""
+    """Return the common axis limits of the error in all panels of a unit, robust to a few noisy rows."""
     reached = [np.zeros(1)]
     for place in (place for place in places if place.unit == unit):
         points = np.concatenate([place.before[_seen(place)], place.after[_seen(place)]])
@@ -589,7 +589,7 @@ def _draw_place(axes: Axes, place: Place, factor: float) -> None:
 
 
 def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
-    """Draw how far, which, where, and the map of the gap, under the sentence of the verdict if ``headline``."""
+    """Draw gap, effects, places and map, under the sentence of the verdict if ``headline``."""
     places = len(diagnosis.joint_names) + len(diagnosis.where.links) + len(diagnosis.where.beyond)
     figure = Drawing(12.5, 5.4 + 0.2 * max(len(diagnosis.effects), places, 12))
     (how_far, which), (where, map_) = figure.subplots(2, 2)
@@ -614,7 +614,7 @@ _LEADING = 12
 
 
 def plot_differences(comparison: Mapping[str, Any]) -> Figure:
-    """Draw the difference of each parameter of a comparison in its standard deviations, the largest first."""
+    """Draw the difference of each parameter of a comparison in standard deviations, the largest first."""
     known = [p for effect in comparison["effects"] for p in effect["parameters"] if p["std"]]
     told = sorted(((p["name"], p["difference"] / p["std"]) for p in known), key=lambda one: -abs(one[1]))
     told = told[:_MOST_DIFFERENCES]
@@ -629,7 +629,7 @@ def plot_differences(comparison: Mapping[str, Any]) -> Figure:
 
 
 def plot_fleet(summary: Mapping[str, Any]) -> Figure:
-    """Draw in how many robots each effect was found, of those in which it could be."""
+    """Draw the number of robots in which each effect was found, of those in which it is testable."""
     counts = [effect for effect in summary["effects"] if effect["found"]][:_LEADING]
     figure = Drawing(7.6, 1.2 + 0.3 * len(counts))
     axes = figure.subplots()
@@ -644,7 +644,7 @@ def plot_fleet(summary: Mapping[str, Any]) -> Figure:
 
 
 def _name_bars(axes: Axes, names: Sequence[str], heading: str) -> None:
-    """Name horizontal bars, the first above."""
+    """Label horizontal bars, the first above."""
     axes.set_yticks(range(len(names)), [plain(name) for name in names])
     axes.invert_yaxis()
     tidy(axes, grid="x")
@@ -655,7 +655,7 @@ _COLUMNS, _MOST = 2, 12
 
 
 def plot_wear(wear: Wear) -> Figure:
-    """Draw the parameters over time, those that ring first: dots as each campaign has them, with one deviation.
+    """Draw the parameters over time, alarms first: each campaign's value with its standard deviation.
 
     Returns
     -------
@@ -680,7 +680,7 @@ def plot_wear(wear: Wear) -> Figure:
 
 
 def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
-    """Draw one parameter about its middle, so that what changes is seen beside what it is."""
+    """Draw one parameter over time about its median."""
     seen = [k for k, value in enumerate(worn.values) if value is not None]
     times = np.array([visit.time for visit in wear.campaigns]) + (0.0 if wear.dated else 1.0)
     values, stds = (np.array([each[k] for k in seen], dtype=float) for each in (worn.values, worn.stds))

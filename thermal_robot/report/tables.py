@@ -1,4 +1,4 @@
-"""The numbers and tables of a diagnosis' page, as text: sizes of the gap, rows set aside, frames, correlations."""
+"""Tables of a diagnosis' page as text: sizes of the gap, outliers, frames, correlations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FRAMES = {"base": "root frame of the robot, as the instrument sees it", "tool":
 
 
 def numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str, list[str]]]:
-    """Return the rms gap before and after and the shrinkage held out: kind, heading, value and what stands below it."""
+    """Rms gap before and after and held-out shrinkage: kind, heading, value and remark."""
     gap, held = diagnosis.gap, diagnosis.gap.held_out
     before, after, floor = units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")
     turned = ["", ""]
@@ -40,7 +40,7 @@ def numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str, list[str]]]:
 
 
 def extremes(diagnosis: Diagnosis) -> Table:
-    """Return rms, 95 % quantile and maximum of the distance, and the rms along each axis, before and after.
+    """Rms, 95 % quantile and maximum of the distance, and rms along each axis, before and after.
 
     Rows set aside are left out. Of rows held out a diagnosis has distances alone.
     """
@@ -64,14 +64,14 @@ def extremes(diagnosis: Diagnosis) -> Table:
 
 
 def _sizes(distance: Array) -> tuple[float, ...]:
-    """Return rms, 95 % quantile and maximum of distances; nothing of none."""
+    """Rms, 95 % quantile and maximum of distances; empty without any."""
     if not len(distance):
         return ()
     return float(np.sqrt(np.mean(distance**2))), float(np.quantile(distance, _MOST_ROWS)), float(distance.max())
 
 
 def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
-    """Return how far off the rows are that were set aside, before and after, and how many more there are."""
+    """Distances of the outliers, before and after, and the number of those not listed."""
     rows = diagnosis.rows
     chosen = np.isin(rows.rows, diagnosis.outliers)
     before, after = (np.linalg.norm(part[chosen, :3], axis=1) for part in (rows.gap, rows.remainder))
@@ -92,7 +92,7 @@ def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
 
 
 def frames(diagnosis: Diagnosis) -> Table:
-    """Return where the robot stands and where the target sits: mm, and roll, pitch and yaw in degrees."""
+    """Poses of base and target: mm, and roll, pitch and yaw in degrees."""
     rows = []
     for name, pose in diagnosis.frames.iterrows():
         turns = pose[["roll", "pitch", "yaw"]]
@@ -104,12 +104,12 @@ def frames(diagnosis: Diagnosis) -> Table:
 
 
 def _fixed(value: float, digits: int) -> str:
-    """Write a figure with so many decimals; what rounds to zero has no sign."""
+    """Format a number with fixed decimals; what rounds to zero has no sign."""
     return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−")
 
 
 def correlations(diagnosis: Diagnosis) -> tuple[Table, str]:
-    """Return the ten strongest correlations between the parameters, and in words how many are not shown."""
+    """Ten strongest correlations between parameters, and the number of those not shown."""
     covariance = diagnosis.covariance
     std = np.sqrt(covariance.to_numpy().diagonal())
     first, second = np.triu_indices(len(std), 1)

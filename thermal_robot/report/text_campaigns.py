@@ -1,4 +1,4 @@
-"""Campaigns compared, fleets, and a robot over time in words: their headlines, their tables, and the text of these."""
+"""Texts of comparisons, fleets and wear: headlines, tables, and plain text."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STATUS = {
 
 
 def comparison_headline(comparison: Plain) -> str:
-    """Return what stayed and what changed in one plain sentence or two."""
+    """Return the result of a comparison in one or two sentences."""
     effects, changes = comparison["effects"], comparison["changes"]
     same = [e["title"] for e in effects if e["status"] == "shared"]
     lost = [e["title"] for e in effects if e["name"] in comparison["verdict"]["lost"]]
@@ -47,13 +47,13 @@ def comparison_headline(comparison: Plain) -> str:
 
 
 def campaign_in_words(campaign: Plain) -> str:
-    """Return what was compared: a campaign with what its diagnosis says, or a model file."""
+    """Campaign with its diagnosis, or a model file, in words."""
     samples = f"{campaign['samples']} samples. " if campaign["samples"] else ""
     return f"{campaign['name']}: {samples}{campaign['diagnosis']}"
 
 
 def changes(comparison: Plain) -> list[str]:
-    """Return each change: where, when, from what to what, and how sure that is."""
+    """Return the changes in words: place, time, values, certainty."""
     names = [c["name"] for c in comparison["campaigns"]]
     return [_change(change, names) for change in comparison["changes"]]
 
@@ -76,7 +76,7 @@ def _in_short(change: Plain) -> str:
 
 
 def _chance(p_value: float | None) -> str:
-    """Write the probability that chance alone does as much."""
+    """Format a p-value."""
     if p_value is None:
         return units.MISSING
     if p_value < 1e-5:
@@ -85,7 +85,7 @@ def _chance(p_value: float | None) -> str:
 
 
 def comparison_tables(comparison: Plain) -> dict[str, list[Line]]:
-    """Return effects, parameters and predictions as tables of text, the names of the columns first.
+    """Tables of effects, parameters and predictions, the names of the columns first.
 
     Effects: what became of each that is named or at work, χ² of equal parameters over its degrees, and the p-value.
     Parameters: each campaign's value ± one standard deviation, and the largest difference. Predictions: of each two
@@ -152,7 +152,7 @@ _MOST_PARAMETERS = 40
 
 
 def comparison_text(comparison: Plain) -> str:
-    """Write a comparison for the person who measured.
+    """Plain text of a comparison.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _comparison_lines(comparison: Plain) -> Iterator[str]:
 
 
 def _table(rows: Sequence[Line], most: int | None = None, elsewhere: str = "") -> Iterator[str]:
-    """Align at most so many rows below their heads, and count the others, which are told elsewhere."""
+    """Align a limited number of rows below their heads, and count the others."""
     shown = rows if most is None else rows[: 1 + most]
     widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
     for row in shown:
@@ -202,7 +202,7 @@ _MOST_PLACES = 4
 
 
 def fleet_headline(summary: Plain) -> str:
-    """Return how many campaigns there were and what became of them."""
+    """Return the number of campaigns and their outcomes in words."""
     campaigns, robots = summary["campaigns"], summary["robots"]
     told = ", ".join(f"{n} {what}" for what, n in summary["outcomes"].items() if n)
     return f"{campaigns} campaign{'s' * (campaigns != 1)} of {robots} robot{'s' * (robots != 1)}: {told}."
@@ -264,7 +264,7 @@ def _named(effect: str) -> str:
 
 
 def failures(summary: Plain) -> list[str]:
-    """Return the campaigns without a diagnosis, and why."""
+    """Campaigns without a diagnosis, with the reason."""
     return [f"{name} ({outcome}): {reason}" for name, outcome, reason in summary["failures"]]
 
 
@@ -279,7 +279,7 @@ _SECTIONS = {
 
 
 def fleet_tables(summary: Plain) -> dict[str, list[Line]]:
-    """Return what is known of a fleet by heading, as tables of text, the names of the columns first; no empty one."""
+    """Tables of a fleet by heading, the names of the columns first; empty ones are left out."""
     told = {heading: list(lines(summary)) for heading, lines in _SECTIONS.items()}
     return {heading: table for heading, table in told.items() if table[1:]}
 
@@ -289,7 +289,7 @@ _REST = "; the page and the table have all"
 
 
 def fleet_text(summary: Plain) -> str:
-    """Write a summary of a fleet: a headline, and tables of a few lines each.
+    """Plain text of a fleet's summary.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ def fleet_text(summary: Plain) -> str:
 
 
 def wear_table(wear: Wear) -> list[Line]:
-    """Return how each parameter moves, how far, how fast, how sure that is, and when it crosses its limit."""
+    """Table of the parameters over time: kind and size of the change, rate, certainty, limit."""
     heads = ("parameter", "it", "change", "a day", "moved", "by chance", "limit")
     return [heads, *((f"{w.title}: {w.parameter}", _does(w), *_figures(w)) for w in wear.parameters)]
 

@@ -1,4 +1,4 @@
-"""How numbers are written: SI in, the unit that a metrologist would choose out. The only place that knows."""
+"""Formatting of quantities: SI to display units, significant digits, uncertainty."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
 
 @dataclass(frozen=True)
 class Scale:
-    """What an SI value is multiplied by, and the unit it then has."""
+    """Factor from SI, and the display unit."""
 
     factor: float
     unit: str
 
 
 def scale(unit: str, size: float) -> Scale:
-    """Choose the unit in which values of about ``size`` (SI) are read most easily."""
+    """Display unit for values of about ``size`` (SI)."""
     if unit in _LADDERS:
         lead, rest = unit, ""
     else:
@@ -53,7 +53,7 @@ def _decimals(value: float, digits: int) -> int:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Write a number with so many significant digits, without an exponent unless it is far from one."""
+    """Format with significant digits, in exponent form only far from one."""
     if not isfinite(value):
         return MISSING
     if value != 0.0 and not 1e-4 <= abs(value) < 1e6:
@@ -62,7 +62,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def quantity(value: float | None, unit: str) -> str:
-    """Write one SI value in its best unit: ``412 µm``."""
+    """Format one SI value in its display unit: ``412 µm``."""
     if value is None or not isfinite(value):
         return MISSING
     best = scale(unit, value)
@@ -70,7 +70,7 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def together(values: Iterable[float | None], unit: str) -> list[str]:
-    """Write values that are to be compared in one unit, with equally many decimals.
+    """Format values for comparison: one unit, equal decimals.
 
     The largest decides the unit; the smallest keeps two significant digits where four decimals suffice.
     """
@@ -87,7 +87,7 @@ def together(values: Iterable[float | None], unit: str) -> list[str]:
 
 
 def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
-    """Write a parameter with its standard deviation, in the unit that suits those it stands beside.
+    """Format a parameter with its standard deviation, in the unit of its neighbours.
 
     What the data do not determine is never written as a number.
     """
@@ -99,7 +99,7 @@ def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
 
 
 def measured(value: float, std: float, unit: str) -> str:
-    """Write an SI value with its standard deviation: ``0.42 ± 0.03 mm``."""
+    """Format an SI value with its standard deviation: ``0.42 ± 0.03 mm``."""
     return _spread(value, std, scale(unit, max(abs(value), std)))
 
 
@@ -116,14 +116,14 @@ def _spread(value: float, std: float, best: Scale) -> str:
 
 
 def interval(bounds: tuple[float, float] | None) -> str:
-    """Write a 95 % interval of shares as ``94.0 to 97.0``, without the per cent sign."""
+    """Format a 95 % interval of shares as ``94.0 to 97.0``, without the per cent sign."""
     if bounds is None:
         return ""
     return " to ".join(percent(b).removesuffix(" %") for b in bounds)
 
 
 def probability(value: float | None) -> str:
-    """Write a probability in per cent; certainty is never claimed."""
+    """Format a probability in per cent; it is never 0 or 100 %."""
     if value is None or not isfinite(value):
         return MISSING
     if value > 0.999:
@@ -132,7 +132,7 @@ def probability(value: float | None) -> str:
 
 
 def p_value(value: float) -> str:
-    """Write ``p = 0.012``, ``p = 3e-7``."""
+    """Format ``p = 0.012``, ``p = 3e-7``."""
     if not isfinite(value):
         return "p unknown"
     if value < 1e-12:
@@ -144,6 +144,6 @@ def p_value(value: float) -> str:
 
 
 def round_down(value: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    """Largest 1, 2 or 5 times a power of ten not above a positive value."""
     power = 10.0 ** floor(log10(value))
     return float(next(s * power for s in (5.0, 2.0, 1.0) if s * power <= value * (1.0 + 1e-9)))

@@ -1,4 +1,4 @@
-"""The sentences that text and page share, and what is shown where there is not room for all."""
+"""Sentences of the reports on a diagnosis, and what is shown where space is short."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict as one sentence of at most 45 words.
+    """Verdict in one sentence of at most 45 words.
 
-    It names at most three causes, the largest shares first, and counts the others. Of what there is to say of them the
-    fullest wording is taken that fits; the rest is left to :mod:`thermal_robot.report.words`.
+    It names at most three causes, the largest shares first, and counts the others. The fullest wording that fits is
+    taken; the rest is left to :mod:`thermal_robot.report.words`.
     """
     text = ""
     for text in _wordings(diagnosis):
@@ -47,7 +47,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the sentence in all its wordings, the fullest first."""
+    """Yield the sentence in all wordings, the fullest first."""
     size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
     if diagnosis.misfit is not None:
@@ -80,33 +80,33 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
-    """Return the causes that a correction can remove, or the random ones, which none can; the largest share first."""
+    """Found effects that a correction removes, else the random ones; the largest share first."""
     return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random is random]
 
 
 def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
-    """Return the causes that a headline names: the fewest that hold most of what is explained, at most so many."""
+    """Causes that a headline names: the fewest that hold most of the explained share."""
     known = sorted(filter(sized, found), key=lambda f: -(f.shrinkage or 0.0)) or list(found)
     held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known] or [0.0])
     return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
 
 
 def sized(finding: Finding) -> bool:
-    """Whether the data determine any parameter of an effect: one without is not named first.
+    """Whether the data determine any parameter of an effect.
 
-    Of a law values before and after may be free while their difference is not.
+    The values of a law may be undetermined while its difference is determined.
     """
     return bool(finding.quantity) or not finding.parameters or any(p.identified for p in finding.parameters)
 
 
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the causes that the headline counts without naming them."""
+    """Causes that the headline counts without naming them."""
     text = headline(diagnosis)
     return [f for f in causes(diagnosis) if _name(diagnosis, f) not in text]
 
 
 def _worse(diagnosis: Diagnosis) -> str:
-    """Begin with where the correction does harm: of another session or region the rest is not to be believed."""
+    """Begin the headline with harm to other sessions or regions."""
     scheme = diagnosis.gap.worse
     if scheme is None:
         return ""
@@ -135,7 +135,7 @@ def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
 
 
 def _another_model(model: AnotherModel) -> str:
-    """Say in what the robot that was measured differs from the URDF, and which one it may be."""
+    """Difference of the measured robot from the URDF, and which robot it may be."""
     factor, known = model.factor, ""
     if model.in_another_unit:
         return f"Robot and table do not describe the same motion: {model.unit}."
@@ -156,7 +156,7 @@ def _sure(diagnosis: Diagnosis) -> str:
 
 
 def _causes(diagnosis: Diagnosis, found: Sequence[Finding], most: int, beside: bool) -> str:
-    """Name the first few, each with what the data cannot tell it from, and count the others."""
+    """Name the first few causes with their confounded alternatives, and count the others."""
     named = weighty(found, most)
     names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
     fewer = len(found) - len(named)
@@ -175,7 +175,7 @@ def _doubt(diagnosis: Diagnosis, finding: Finding, beside: bool) -> str:
 
 
 def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
-    """Yield what correcting does, the fullest wording first; that it leaves more or harms elsewhere is always said."""
+    """Yield the effect of the correction, the fullest wording first; harm is always reported."""
     gap, held = diagnosis.gap, diagnosis.gap.held_out
     it = "them" if several else "it"
     if held.shrinkage < 0.0:
@@ -214,9 +214,9 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_aside: float | None) -> str:
-    """Say how much of a size is not explained; empty where nothing is, or nobody knows how much.
+    """Unexplained share in words; empty where there is none, or it is unknown.
 
-    Where rows set aside are unexplained, too, they count in what remains but not in the size: it is told with them.
+    If the outliers are unexplained, too, they are counted in.
     """
     if not remaining.flagged or remaining.rms == 0.0:
         return ""
@@ -230,7 +230,7 @@ def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_a
 
 
 def length(metres: float) -> str:
-    """Return a length in the unit that a metrologist would use; what no instrument sees is not told in figures."""
+    """Format a length; below an instrument's resolution without a figure."""
     if metres < _NOTHING:
         return "less than 1 nm"
     factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
@@ -238,7 +238,7 @@ def length(metres: float) -> str:
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
-    """Put names one after the other: ``a, b and c``, or with another word before the last."""
+    """Join names: ``a, b and c``, or with another word before the last."""
     return "".join(names) if len(names) < 2 else f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
@@ -279,13 +279,13 @@ _TOGETHER = re.compile(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=]
 
 
 def told_as(finding: Finding) -> str:
-    """Return the status under which a finding is shown: not found, yet more probable than not, it is in question."""
+    """Return the displayed status of a finding: not found, yet more probable than not, is in question."""
     doubtful = finding.status == "not_found" and (finding.probability or 0.0) >= _MORE_LIKELY
     return "in_question" if doubtful else finding.status
 
 
 def by_status(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the findings in the order in which they are shown: what was found first, what is not testable last."""
+    """Return the findings in the order of display: found first, untestable last."""
     return [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
 
 
@@ -293,9 +293,9 @@ Lines = list[tuple[str, int]]
 
 
 def described(finding: Finding, diagnosis: Diagnosis) -> tuple[Lines, list[tuple[str, str]], Lines]:
-    """Return what is said of an effect before its parameters, these as name and value, and what after.
+    """Return the description of an effect: text before its parameters, these as name and value, text after.
 
-    Lines stand with how far they hang. All of a few parameters are shown, in the order of the chain, else the most
+    Lines come with their indentation. A few parameters are all shown, in the order of the chain; of many the most
     significant.
     """
     known = [p for p in finding.parameters if p.identified and p.value is not None]
@@ -317,7 +317,7 @@ def described(finding: Finding, diagnosis: Diagnosis) -> tuple[Lines, list[tuple
 
 
 def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
-    """List names, at most so many, then say how many more there are."""
+    """List a limited number of names, and count the others."""
     more = len(names) - most
     if more <= 0:
         return between.join(names)
@@ -325,18 +325,18 @@ def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
 
 
 def bound(sentence: str) -> str:
-    """Keep numbers and their units on one line."""
+    """Bind numbers to their units by non-breaking spaces."""
     return _TOGETHER.sub(NO_BREAK, sentence)
 
 
 def _rows(rows: Sequence[int]) -> str:
-    """Say which rows of the file: ``rows 17, 80 and 3 more``."""
+    """Row numbers of the file: ``rows 17, 80 and 3 more``."""
     return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows])}"
 
 
 def facts(diagnosis: Diagnosis) -> dict[str, str]:
     """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
-    what = "position and orientation" if diagnosis.measures == "pose" else "position"
+    what = diagnosis.says or ("position and orientation" if diagnosis.measures == "pose" else "position")
     name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
     rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
     campaign = f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
@@ -351,13 +351,13 @@ def facts(diagnosis: Diagnosis) -> dict[str, str]:
 
 
 def rows_used(diagnosis: Diagnosis) -> str:
-    """Say how many rows were set aside, and how many were not: ``116 of 120 rows, 4 set aside``."""
+    """Return the number of rows used and set aside: ``116 of 120 rows, 4 set aside``."""
     aside, samples = len(diagnosis.outliers), diagnosis.samples
     return f"{samples - aside} of {samples} rows, {aside} set aside" if aside else f"all {samples} rows"
 
 
 def hardest(diagnosis: Diagnosis) -> str:
-    """Say how far it shrinks where rows are held out in the hardest way; empty where that is as on average."""
+    """Shrinkage under the least favourable scheme of cross-validation; empty where it is as on average."""
     scheme = diagnosis.gap.hardest
     if scheme is None:
         return ""
@@ -367,7 +367,7 @@ def hardest(diagnosis: Diagnosis) -> str:
 
 
 def _places(finding: Finding, most: int = 4) -> str:
-    """Say where an effect sits, its largest shares first; empty where that is not known."""
+    """Places of an effect in words, the largest shares first; empty where unknown."""
     shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
     said = ", ".join(f"{p.words} {units.percent(p.share)}" for p in shown)
     rest = finding.locations[len(shown) :]
@@ -375,18 +375,18 @@ def _places(finding: Finding, most: int = 4) -> str:
 
 
 def more(count: int, largest: float) -> str:
-    """Count the places that are not listed, and say the largest share of them."""
+    """Return the number of places not listed, with the largest share among them."""
     said = "less than 0.1 %" if largest < _NO_TENTH else f"at most {units.percent(largest)}"
     return f"{count} more, {said}"
 
 
 def turned(diagnosis: Diagnosis) -> list[str]:
-    """Say first which quantities are read with the other sign: all else rests on it."""
+    """Quantities that were read with the opposite sign."""
     return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
 def _verdict(diagnosis: Diagnosis) -> str:
-    """Name the explanation and how probable exactly this one is."""
+    """Explanation and its posterior probability in words."""
     if not diagnosis.usable:
         return "none: robot and table do not belong together"
     names = in_words(diagnosis.verdict) or "no effect"
@@ -395,7 +395,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
 
 
 def noise(diagnosis: Diagnosis, floor: str = "") -> str:
-    """Say what noise alone would leave, where that is known from, and how the gap after compares with it.
+    """Return the expected gap from noise alone, its source, and the comparison with the residual.
 
     The ``floor`` is written in the unit that suits the gap, unless it is given.
     """
@@ -408,7 +408,7 @@ def noise(diagnosis: Diagnosis, floor: str = "") -> str:
 
 
 def with_aside(diagnosis: Diagnosis) -> str:
-    """Say what the rows set aside do to the gap on rows held out; empty where there are none."""
+    """Shrinkage on held-out rows with the outliers included; empty without any."""
     held, count = diagnosis.gap.held_out, len(diagnosis.outliers)
     if not count or held.rms_before_with_aside is None or held.rms_after_with_aside is None:
         return ""
@@ -417,7 +417,7 @@ def with_aside(diagnosis: Diagnosis) -> str:
 
 
 def needs(finding: Finding, joints: Sequence[str]) -> str:
-    """Say what would make an effect testable; one name stands for the columns of all joints or links."""
+    """Columns that would make an effect testable, one name for those of all joints or links."""
     by_quantity: dict[str, list[str]] = {}
     for need in finding.needs:
         quantity, dot, _ = need.partition(".")
@@ -430,7 +430,7 @@ def needs(finding: Finding, joints: Sequence[str]) -> str:
 
 
 def _law(finding: Finding) -> str:
-    """Describe a law that was discovered in the data, its size and what it usually is; empty for a known effect."""
+    """Return the description of a discovered law, its size and usual cause; empty for a known effect."""
     if not finding.quantity:
         return ""
     described = finding.describes or f"it follows {finding.quantity}"
@@ -440,7 +440,7 @@ def _law(finding: Finding) -> str:
 
 
 def _in_joints(finding: Finding) -> str:
-    """Say how much a known effect does in each joint, the largest first; empty where its parameters say it."""
+    """Size of a known effect in each joint, the largest first; empty where its parameters say it."""
     if finding.quantity or not finding.size:
         return ""
     told = [f"{s.place} {units.measured(s.value, s.std, s.unit)}" for s in finding.size]
@@ -448,7 +448,7 @@ def _in_joints(finding: Finding) -> str:
 
 
 def _rivals(finding: Finding, diagnosis: Diagnosis) -> str:
-    """Say of which effect it is a part, or what it cannot be told from and how to see what is not preferred."""
+    """Container or confounded alternatives of an effect, and how to see the others."""
     if not finding.confounded_with:
         return ""
     if finding.status == "contained":
@@ -461,7 +461,7 @@ def _rivals(finding: Finding, diagnosis: Diagnosis) -> str:
 
 
 def _left_out(diagnosis: Diagnosis) -> str:
-    """Say which effects the user left out, and how he asked for that; empty where he did not."""
+    """Effects that the user left out, and by which option; empty without any."""
     out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
     if not out:
         return ""
@@ -477,12 +477,12 @@ def one_sigma(diagnosis: Diagnosis | MotionDiagnosis) -> str:
 
 
 def laws(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the laws that were discovered, as far as they belong to the explanation."""
+    """Discovered laws in the explanation."""
     return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.quantity is not None]
 
 
 def sentences(diagnosis: Diagnosis) -> Iterator[str]:
-    """Say in plain words what the explanation leaves."""
+    """Unexplained residual in plain sentences."""
     left = diagnosis.unexplained
     if not left.flagged:
         chance = units.p_value(left.p_value)
@@ -514,7 +514,7 @@ _TOLD, _MOST_OTHERS = 0.01, 3  # probability from which another effect is told t
 
 
 def details(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield a sentence for each thing that the headline leaves out and no table says."""
+    """Yield a sentence for each fact that neither the headline nor a table says."""
     if not diagnosis.usable:
         return
     found, chance = causes(diagnosis), causes(diagnosis, random=True)
@@ -538,7 +538,7 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _beside(diagnosis: Diagnosis) -> Iterator[str]:
-    """Say what else may be at work, where each effect is surer by itself than that there is no other."""
+    """Effects that are more probable alone than the set without them."""
     joint, own = diagnosis.probability, [diagnosis.finding(name).probability or 0.0 for name in diagnosis.verdict]
     if not own or min(own) - joint < _SURER:
         return
@@ -551,12 +551,12 @@ def _beside(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def capitalised(words: str) -> str:
-    """Begin a sentence with a capital letter."""
+    """Capitalise a sentence."""
     return words[:1].upper() + words[1:]
 
 
 def _elsewhere(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the ways of holding rows out in which the correction does harm."""
+    """Yield the cross-validation schemes in which the correction does harm."""
     for scheme in diagnosis.gap.schemes if diagnosis.verdict else ():
         if scheme.shrinkage < 0.0:
             before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
@@ -567,7 +567,7 @@ _MOST_UNTESTED = 2  # effects that are named with the column that they need
 
 
 def advice(diagnosis: Diagnosis) -> str:
-    """Return what to do or to measure next in one sentence; empty where nothing is needed."""
+    """Next measurement or action in one sentence; empty where none is needed."""
     wanted = diagnosis.wanted
     if diagnosis.misfit is not None:
         fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
@@ -603,7 +603,7 @@ _TO_DO = {
 
 
 def _why(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    """Say where a remainder enters and what it follows, and what a column would show of it."""
+    """Place and quantity of a residual, and what a column would show of it."""
     own = wanted.follows and wanted.place.endswith(wanted.follows)
     enters = f" enters at {wanted.place}" if wanted.place else ""
     follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""

@@ -1,4 +1,4 @@
-"""A campaign whose truth is known: a robot with effects of stated size, measured by an instrument of stated noise."""
+"""Simulated campaigns: a robot with effects of known size, measured with known noise."""
 
 from thermal_robot.simulation.simulate import simulate
 

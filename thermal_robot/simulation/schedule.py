@@ -1,4 +1,4 @@
-"""When each row is measured: time, temperature, payload, repeats, and the order that brings both approaches."""
+"""Schedule of a campaign: time, temperature, payload, repeats, and an order balanced in approaches."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Rows = NDArray[np.int64]
 
 
 def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str, Array]:
-    """Return (N,) time, s, temperature, °C, and, where loads are given, payload, kg, of each row in its turn.
+    """Time (N,), s, temperature, °C, and, with loads, payload, kg, of each row.
 
     The arm warms by nearly ``rise``, K, then cools; payloads, none first, come round in blocks.
     """
@@ -48,9 +48,9 @@ def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str,
 
 
 def visits(rows: int, repeats: int) -> Rows:
-    """(P, K) rows in which each of P poses is measured: once a round, every second round the other way round.
+    """Row numbers (P, K) of each of P poses: once a round, every second round in reverse.
 
-    The last pose stays the last, so that no pose follows itself: a robot that does not leave repeats nothing.
+    The last pose stays the last, so that no pose follows itself: a repeat requires leaving the pose.
     """
     poses = rows // repeats
     place = np.tile(np.arange(poses), (repeats, 1))
@@ -59,7 +59,7 @@ def visits(rows: int, repeats: int) -> Rows:
 
 
 def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
-    """(P,) an order of poses (P, n) in which each joint comes from either side about equally often.
+    """Order (P,) of poses (P, n) in which each joint comes from either side about equally often.
 
     Two poses are exchanged wherever that brings the least balanced joint nearer to half; it stops once all are within
     :data:`~thermal_robot.simulation.schedule.BALANCED`.
@@ -80,20 +80,20 @@ def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
 
 
 def _unbalanced(poses: Array, places: Rows, order: Rows) -> float:
-    """How far the share of rising moves of any joint is from half."""
+    """Deviation of the share of rising moves of any joint from one half."""
     moved = np.diff(poses[order][_pose_of(places)], axis=0)
     return float(np.abs((moved > 0.0).sum(axis=0) / np.maximum((moved != 0.0).sum(axis=0), 1) - 0.5).max())
 
 
 def _pose_of(places: Rows) -> Rows:
-    """(N,) which pose each row measures."""
+    """Pose number (N,) of each row."""
     found = np.empty(places.size, dtype=np.int64)
     found[places] = np.arange(len(places))[:, None]
     return found
 
 
 def in_turn(poses: Array, places: Rows) -> tuple[Array, dict[str, NDArray[np.str_]]]:
-    """Return (N, n) the poses (P, n) in the order of rows, and where they are repeated (N,) labels ``pose`` from 1."""
+    """Poses (N, n) in the order of rows, and with repeats (N,) labels ``pose`` from 1."""
     which = _pose_of(places)
     labels = {"pose": np.array([str(k + 1) for k in which])} if places.shape[1] > 1 else {}
     return np.asarray(poses[which]), labels

@@ -1,4 +1,4 @@
-"""One verb: a robot and its effects go in, the campaign that would be measured of it comes out."""
+"""Simulation of a campaign from a robot and its effects."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.robot import ENDS, Robot, joint_range, load_robot
 from thermal_robot.schema import LARGEST, MisfitError, boolean, fitted, matrix, number, optional, shown, whole, word
 from thermal_robot.simulation import schedule
+from thermal_robot.simulation.brought import TOUCHED, as_kind, touched
 
 if TYPE_CHECKING:
     from thermal_robot.urdf_text import WritesUrdf
@@ -40,7 +41,7 @@ CALL = "simulate()"
 def _commanded(
     robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
 ) -> Campaign:
-    """Return the rows that are simulated, with their conditions and nothing measured."""
+    """Rows to simulate, with conditions and without measurements."""
     if isinstance(commands, Campaign):
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
@@ -52,7 +53,7 @@ def _commanded(
 
 
 def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> Campaign:
-    """Return the rows of a campaign, without what was measured."""
+    """Rows of a campaign without its measurements."""
     if rows is not None or repeats != 1:
         expected = "neither rows nor repeats beside a campaign, which has its own"
         raise CampaignError(CALL, "too much is said of the rows", expected=expected)
@@ -67,7 +68,7 @@ def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> C
 
 
 def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
-    """Return (P, n) different poses, and how often each is measured."""
+    """Distinct poses (P, n), and the number of repeats of each."""
     times = fitted(whole(1), repeats, CALL, "repeats")
     if commands is not None:
         if rows is not None:
@@ -86,7 +87,7 @@ def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.
 
 
 def _given(robot: Robot, commands: Any) -> Array:
-    """Return (P, n) positions that a user gave; (n,) counts as one row."""
+    """Positions (P, n) that a user gave; (n,) counts as one row."""
     rows = f"rows of {robot.n} joint positions, or a campaign, which read_samples makes of a table"
     if not isinstance(commands, (list, tuple, np.ndarray)):
         raise CampaignError(CALL, "no positions", column="commands", found=type(commands).__name__, expected=rows)
@@ -100,7 +101,7 @@ def _given(robot: Robot, commands: Any) -> Array:
 
 
 def _under(plan: Campaign, conditions: Any) -> Campaign:
-    """Return the rows under conditions that are given, beside those that they had."""
+    """Rows under given conditions, in addition to their own."""
     given: Mapping[str, Any] = checked_mapping(CALL, "conditions", {} if conditions is None else conditions)
     covariates, labels, extra = dict(plan.covariates), dict(plan.labels), list(plan.extra)
     for name, values in given.items():
@@ -121,7 +122,7 @@ def _under(plan: Campaign, conditions: Any) -> Campaign:
 
 
 def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
-    """Return (N,) values of a condition; one stands for all rows."""
+    """Values (N,) of a condition; one value is broadcast."""
     try:
         found = np.asarray(values, dtype=np.str_ if name in columns.LABELS else np.float64)
         return np.broadcast_to(found, rows).copy()
@@ -131,7 +132,7 @@ def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
 
 
 def _known(name: str, robot: Robot) -> bool:
-    """Tell whether the format defines a column; refuse one that is no condition, and typing errors."""
+    """Whether the format defines a column; other columns than conditions are refused."""
     if name in robot.joint_names or name in (*columns.MEASURED, *columns.SIMULATED):
         what = "is commanded, no condition" if name in robot.joint_names else "is no condition"
         raise CampaignError(CALL, what, column=name, expected="positions in commands; poses are what is simulated")
@@ -197,7 +198,7 @@ def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
 
 
 def _require_conditions(effect: Effect, seen: Observations) -> None:
-    """Refuse an effect that has nothing to follow, by what would be needed."""
+    """Refuse an effect without a quantity to follow, naming the missing columns."""
     # a condition may stand still, as on a robot that has warmed through
     lacks = [column for column in gate.missing(effect, seen) if column not in seen.covariates]
     if not lacks:
@@ -208,7 +209,7 @@ def _require_conditions(effect: Effect, seen: Observations) -> None:
 
 
 def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
-    """Return (P,) the values of an effect's parameters."""
+    """Parameter values (P,) of an effect."""
     pairs: Iterable[tuple[int, Any]]
     names = [place.name for place in places]
     if isinstance(given, Mapping):
@@ -231,7 +232,7 @@ def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
 
 
 def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
-    """Return the index of the one parameter of a name, of a place, or of a label."""
+    """Index of the one parameter of a name, a place, or a label."""
     for candidates in ([p.name for p in places], [p.place for p in places], [p.label for p in places]):
         found = [k for k, candidate in enumerate(candidates) if candidate == name]
         if len(found) == 1:
@@ -245,7 +246,7 @@ def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
 
 
 def _number(effect: Effect, place: Parameter, value: Any) -> float:
-    """Return a value of a parameter, seen to be one."""
+    """Return the validated parameter value."""
     least = 0.0 if place.positive else -LARGEST
     what = f"a number{', not negative,' if place.positive else ''} in {place.unit}"
     kind = number(least=least, expected=what)
@@ -255,20 +256,21 @@ def _number(effect: Effect, place: Parameter, value: Any) -> float:
         raise EffectError(str(error)) from None
 
 
-_MEASURES = ("position", "pose")
+_MEASURES = ("position", "pose", "socket", "plane", "distance", "controller")
+_TURNED = ("pose", "controller")
 _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 """Quaternion wxyz of no turn: it tells effects that orientations will be measured."""
 
 
-def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[bool, float, float]:
-    """Return whether orientations are measured, too, and one sigma per axis, m and rad."""
+def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[str, float, float]:
+    """Return what is measured, and one sigma per axis, m and rad."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
-    if turn > 0.0 and what != "pose":
+    if turn > 0.0 and what not in _TURNED:
         expected = 'measures="pose", or no noise of orientations'
         raise CampaignError(CALL, "only positions are measured", column="noise_orientation", expected=expected)
-    return what == "pose", shift, turn
+    return str(what), shift, turn
 
 
 _RIGID = 1e-6
@@ -276,7 +278,7 @@ _RIGID = 1e-6
 
 
 def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
-    """Return the rows with what they declare of their frames, and the true ones; see :func:`thermal_robot.simulate`."""
+    """Rows with declared frames, and the true frames; see :func:`thermal_robot.simulate`."""
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
     ground = Frames.declared(plan).base if base is None else _pose("base", base)
@@ -303,7 +305,7 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
 
 
 def _array(given: Any) -> Array:
-    """Return numbers as an array; an empty one of everything else."""
+    """Array of numbers; empty for anything else."""
     try:
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
@@ -311,7 +313,7 @@ def _array(given: Any) -> Array:
 
 
 def _pose(key: str, given: Any) -> Array:
-    """Return a (4, 4) pose, seen to be rigid."""
+    """Rigid pose (4, 4), validated."""
     also, pose = ", or three numbers" if key == "tool" else "", _array(given)
     if pose.shape == (4, 4) and np.isfinite(pose).all():
         turn = pose[:3, :3]
@@ -330,10 +332,10 @@ def _measured(
     joints: np.random.Generator,
     readings: np.random.Generator,
 ) -> Campaign:
-    """Return the campaign that an instrument measures of a robot with effects at work, at its true frames.
+    """Return the simulated measurement of a robot with effects at work, at its true frames.
 
     Each effect has the (P,) values of its parameters; ``noise`` is one sigma per axis, m and rad; ``joints`` and
-    ``readings`` are the chance of what scatters, and of the instrument.
+    ``readings`` are the random generators of the scatter and of the instrument.
     """
     systematic = [(effect, values) for effect, values in effects if not isinstance(effect, RandomEffect)]
     moved, shift = displacement(observe(plan, frames), systematic)
@@ -352,7 +354,7 @@ def _measured(
 
 
 def _scatter(plan: Campaign, effects: Sequence[tuple[Effect, Array]], rng: np.random.Generator) -> Array:
-    """(N, n) by how much joints stand elsewhere than they were told to by chance, rad or m."""
+    """Random deviation (N, n) of the joints from their commands, rad or m."""
     away, pose, names = np.zeros_like(plan.q), repeated_poses(plan), plan.robot.joint_names
     for effect, sizes in effects:
         if isinstance(effect, RandomEffect):
@@ -384,7 +386,7 @@ def simulate(
     tool_known: bool | None = None,
     seed: int = 0,
 ) -> Campaign:
-    """Simulate what would be measured of a robot with effects of known size at work.
+    """Simulate the measurement of a robot with effects of known size.
 
     The exact model of the program, not its linear one: joints, links, base and tool are displaced by what the effects
     say, and the kinematics run through all of it, as in :meth:`CorrectedModel.predict
@@ -405,7 +407,7 @@ def simulate(
     tool_frame
         Link whose pose is measured; only where ``robot`` is no robot yet.
     rows
-        How many are measured, 60 by default, at poses drawn evenly within the joints' limits, and within 2.4 rad where
+        Number of measurements, 60 by default, at poses drawn evenly within the joints' limits, and within 2.4 rad where
         a joint can turn once round.
     repeats
         How often each pose is measured: once a round, labelled ``pose``.
@@ -418,7 +420,10 @@ def simulate(
         ``temperature``). Directions of approach follow from the order of the rows where none are given.
     measures
         ``"position"``, or ``"pose"`` for orientations, too; by default what the campaign in ``commands`` has, or
-        positions.
+        positions. ``"distance"`` to four points about the robot, whose places and common zero nobody knows;
+        ``"controller"``, the pose that the controller has of it. ``"socket"``, two on each of three stands, and
+        ``"plane"``, three at right angles that are touched: the postures are led there from those drawn, by the robot
+        that is simulated.
     noise, noise_orientation
         One sigma per axis of the instrument, m and rad, normal; the campaign states it.
     base
@@ -430,7 +435,7 @@ def simulate(
     base_known, tool_known
         Whether the campaign declares these frames as known, if not as said above.
     seed
-        Of everything that is drawn: the same seed gives the same campaign, and the same poses whatever is at work.
+        Random seed: the same seed gives the same campaign, and the same poses whatever the effects.
 
     Returns
     -------
@@ -462,13 +467,16 @@ def simulate(
     seed = fitted(whole(0), seed, CALL, "seed")
     poses, joints, readings = (np.random.default_rng([seed, part]) for part in (_POSES, _JOINTS, _INSTRUMENT))
     given = commands.measures if measures is None and isinstance(commands, Campaign) else measures
-    turns, *noises = _instrument(given, noise, noise_orientation)
+    what, *noises = _instrument(given, noise, noise_orientation)
     plan = _commanded(robot, rows, repeats, commands, conditions, poses)
-    plan = replace(plan, orientation=np.tile(_ALIGNED, (plan.samples, 1)) if turns else None)
+    plan = replace(plan, orientation=np.tile(_ALIGNED, (plan.samples, 1)) if what in _TURNED else None)
     plan, frames = _placed(plan, base, tool, base_known, tool_known)
     seen = observe(plan, frames)
     at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
-    return _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings)
+    if what in TOUCHED:
+        systematic = [(effect, values) for effect, values in at_work if not isinstance(effect, RandomEffect)]
+        return touched(what, plan, frames, systematic, noises[0], readings)
+    return as_kind(what, _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings))
 
 
 def _loaded(robot: Any, tool_frame: str) -> Robot:

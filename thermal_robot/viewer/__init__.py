@@ -1,1 +1,1 @@
-"""A campaign in three dimensions: the robot in each of its poses, and the gap there; served to the browser."""
+"""Three-dimensional view of a campaign in the browser: robot, poses, gap."""

@@ -1,4 +1,4 @@
-"""What is shown of a campaign, as numbers: poses of all links, the gap row by row, each place's share of it."""
+"""Scene data of a campaign: link poses, gap by row, share by place."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from thermal_robot.viewer import settings
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """N rows of a campaign, ready to be drawn; m, root frame.
+    """Scene of N rows of a campaign; m, root frame.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Scene:
 
     @property
     def eye(self) -> Array:
-        """(3,) where the scene is looked at from: across the arm, so that it does not point there."""
+        """Viewpoint (3,), across the arm."""
         up, mean = self.up, self.predicted.mean(axis=0)
         ahead = mean - (mean @ up) * up
         reach = np.linalg.norm(ahead)
@@ -98,11 +98,11 @@ class Scene:
         return np.asarray(self.centre + self.size * away)
 
     def links(self, row: int) -> Array:
-        """Return (L, 4, 4): poses of the links of the URDF in one row, in the order of ``robot.urdf_links``."""
+        """Poses (L, 4, 4) of the URDF's links in one row, in the order of ``robot.urdf_links``."""
         return np.asarray(link_poses(self.robot, self.q[row])[0])
 
     def joints(self, row: int) -> tuple[Array, Array]:
-        """Return (n, 3) origins and (n, 3) unit axes of the driven joints in one row, or of what first follows them."""
+        """Origins (n, 3) and unit axes (n, 3) of the driven joints in one row, or of their first followers."""
         chain, frames = self.robot.chain, chain_frames(self.robot, self.q[row])
         elements = chain.movable[chain.coupling.driving]
         axes = np.einsum("kij,kj->ki", frames.rotations[0, elements], chain.axes[elements])
@@ -110,7 +110,7 @@ class Scene:
 
 
 def scene_of_campaign(campaign: Campaign) -> Scene:
-    """Return the gap of a campaign, with the unknown frames fitted and nothing else.
+    """Scene of a campaign's gap after registration.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def scene_of_campaign(campaign: Campaign) -> Scene:
 
 
 def scene_of_diagnosis(diagnosis: Diagnosis) -> Scene:
-    """Return the gap of a diagnosed campaign, what remains of it, and each place's share.
+    """Scene of a diagnosed campaign: gap, residual, share of each place.
 
     Raises
     ------
@@ -154,11 +154,11 @@ def _scene(
 
 
 def arrows(displacements: Array, magnification: float, size: float, thicker: float = 1.0) -> tuple[Array, Array]:
-    """Return what makes arrows of displacements (N, 3), m, of copies of :func:`unit_arrow`.
+    """Return the transforms of :func:`unit_arrow` that draw displacements (N, 3), m.
 
-    Unit quaternions wxyz (N, 4) turn the z axis along them; factors (N, 3) stretch the arrow along its own axes, the
-    last of them to its length, m. The ``size`` of the scene, m, bounds how long it is, and how thick: ``thicker`` times
-    as usual.
+    Returns unit quaternions wxyz (N, 4) that turn the z axis along them; factors (N, 3) stretch the arrow along its own
+    axes, the last of them to its length, m. The ``size`` of the scene, m, bounds how long it is, and how thick:
+    ``thicker`` times as usual.
     """
     lengths = np.minimum(magnification * np.linalg.norm(displacements, axis=1), settings.LONGEST_ARROW * size)
     bounds = thicker * size * settings.NARROWEST, thicker * size * settings.WIDEST
@@ -168,7 +168,7 @@ def arrows(displacements: Array, magnification: float, size: float, thicker: flo
 
 
 def unit_arrow() -> Any:
-    """Return the arrow from the origin to (0, 0, 1), whose head has the radius 1, as a ``trimesh.Trimesh``."""
+    """Arrow from the origin to (0, 0, 1), its head of radius 1, as a ``trimesh.Trimesh``."""
     import trimesh
 
     neck, foot = 1.0 - settings.HEAD_LENGTH, np.eye(4)
@@ -180,7 +180,7 @@ def unit_arrow() -> Any:
 
 
 def readable(displacements: Array, size: float) -> float:
-    """Return the magnification, 1, 2 or 5 times a power of ten, at which large arrows are as long as settings say.
+    """Magnification, 1, 2 or 5 times a power of ten, that gives large arrows the chosen length.
 
     Displacements (N, 3) and the size of the scene are in m.
     """
@@ -190,7 +190,7 @@ def readable(displacements: Array, size: float) -> float:
 
 
 def turned_along(directions: Array) -> Array:
-    """Return (N, 3, 3): rotations that turn the z axis along each of N directions, and leave it where there is none."""
+    """Rotations (N, 3, 3) from the z axis to each of N directions; identity for a zero vector."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     z = np.where(lengths > 0.0, directions / np.where(lengths > 0.0, lengths, 1.0), [0.0, 0.0, 1.0])
     # the axis of the root frame that lies farthest from it, made perpendicular

@@ -1,4 +1,4 @@
-"""Every number of the viewer that somebody chose, with its unit and its reason; lengths are shares of the scene."""
+"""Chosen numbers of the viewer, each with its unit and reason; lengths are shares of the scene."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ FAINT = (225, 229, 233)
 
 
 def colours(shares: Mapping[tuple[str, str], float]) -> dict[tuple[str, str], Colour]:
-    """Return colours on a linear scale from grey, for no share, to purple, for the largest.
+    """Colours on a linear scale from grey, for no share, to purple, for the largest.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _between(part: float) -> Colour:
 
 
 def linear(colours: ArrayLike) -> NDArray[np.uint8]:
-    """Return the light of sRGB colours (..., 3), both 0..255: the inverse transfer function of IEC 61966-2-1.
+    """Linear light of sRGB colours (..., 3), both 0..255: inverse transfer function of IEC 61966-2-1.
 
     Viser takes the colours of single objects as a screen does, and those of many copies of an object as light.
     """

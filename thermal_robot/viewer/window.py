@@ -1,4 +1,4 @@
-"""The scene in the browser: a thin layer over viser, which is loaded once a window opens."""
+"""Browser window of the scene, on viser, imported on first use."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _PART = "margin:0 0.8em 0.7em 0.8em;font-size:0.85em;line-height:1.5"
 
 
 def of_campaign(scene: Scene) -> str:
-    """Return the name of the campaign and what is said of it, as HTML."""
+    """HTML of the campaign's name and description."""
     return _panel([f"<b>{escape(scene.title)}</b>", escape(scene.summary)])
 
 
 def of_row(scene: Scene, row: int, magnification: float) -> str:
-    """Return what is measured in one row, 0..N − 1, as HTML."""
+    """HTML of the measurement in one row, 0..N − 1."""
     gap, cut = scene.gap[row], settings.LONGEST_ARROW * scene.size
     size = float(np.linalg.norm(gap))
     along = ", ".join(f"{axis} {quantity(part, 'm')}" for axis, part in zip("xyz", gap.tolist(), strict=True))
@@ -52,7 +52,7 @@ def of_row(scene: Scene, row: int, magnification: float) -> str:
 
 
 def of_places(scene: Scene) -> str:
-    """Return the places with their colours and shares, largest first, as HTML."""
+    """HTML legend of the places with colours and shares, largest first."""
     lines = [
         f"{_mark(colour)}{escape(in_words(*place))}<span style='float:right'>{percent(scene.shares[place])}</span>"
         for place, colour in colours(scene.shares).items()
@@ -62,7 +62,7 @@ def of_places(scene: Scene) -> str:
 
 
 def of_arrows(scene: Scene) -> str:
-    """Return what the colours of the arrows mean, as HTML."""
+    """HTML legend of the arrow colours."""
     lines = [f"{_mark(settings.CHOSEN)}{_mark(settings.GAP)}gap: measured − predicted, this row and others"]
     if scene.remainder is not None:
         marks = _mark(settings.CHOSEN_AFTER) + _mark(settings.REMAINDER)
@@ -73,7 +73,7 @@ def of_arrows(scene: Scene) -> str:
 
 
 def names_of_places(scene: Scene) -> dict[tuple[str, str], str]:
-    """Return what is written at each place that is named: ``joint_3 37.7 %``."""
+    """Labels of the places: ``joint_3 37.7 %``."""
     return {place: f"{in_words(*place)} {percent(s)}" for place, s in scene.shares.items() if s >= settings.TOLD}
 
 
@@ -90,7 +90,7 @@ _SHORTEST = 1e-6
 
 
 def solids(urdf: str, folder: Path, size: float) -> dict[str, Any]:
-    """Return by link, in the order of the URDF, a ``trimesh.Trimesh`` in its frame, m.
+    """Geometry of each link, in the order of the URDF, as a ``trimesh.Trimesh`` in its frame, m.
 
     A link whose meshes are missing is a stick to each joint that it carries; so are all links where none has a shape.
     A :class:`~thermal_robot.errors.Note` names a file. Paths of meshes start from ``folder``; sticks are as thick as
@@ -119,7 +119,7 @@ def solids(urdf: str, folder: Path, size: float) -> dict[str, Any]:
 
 
 def _sticks(link: str, joints: Iterable[Any], size: float) -> list[Any]:
-    """Return a knot at the link's origin, a rod to each joint that it carries, and the rail on which it slides."""
+    """Stick figure of a link: knot at its origin, rod to each joint, rail of a slide."""
     import trimesh
 
     parts = [trimesh.creation.icosphere(subdivisions=2, radius=settings.KNOT * size)]
@@ -137,7 +137,7 @@ def _sticks(link: str, joints: Iterable[Any], size: float) -> list[Any]:
 
 
 class Puppet:
-    """The robot in the browser, in the colours of its places: nodes of a viser scene, shaped as :func:`solids` says."""
+    """Posable robot as nodes of a viser scene, coloured by the shares of its places (:func:`solids`)."""
 
     def __init__(self, nodes: Any, scene: Scene, shapes: Mapping[str, Any]) -> None:
         import trimesh
@@ -162,7 +162,7 @@ class Puppet:
         self._names = [self._name(*place, text) for place, text in names_of_places(scene).items()]
 
     def pose(self, row: int) -> None:
-        """Take the pose of a row, 0..N − 1."""
+        """Set the pose of a row, 0..N − 1."""
         poses = self._scene.links(row)
         origins, axes = self._scene.joints(row)
         for node, position, rotation in zip(
@@ -174,7 +174,7 @@ class Puppet:
             node.position, node.wxyz = position, rotation_to_quaternion(rotation)
 
     def name(self, shown: bool) -> None:
-        """Show the names of the places, or hide them."""
+        """Show or hide the labels of the places."""
         for label in self._names:
             label.visible = shown
 
@@ -197,7 +197,7 @@ class Puppet:
 
 
 class Cloud:
-    """Arrows of displacements (N, 3), m, root frame, which begin where the robot was predicted to be: one viser node.
+    """Arrows of displacements (N, 3), m, root frame, from the predicted positions: one viser node.
 
     Rows that were set aside are grey, the others of the ``colour``; all are so many times ``thicker`` than usual.
     """
@@ -210,7 +210,7 @@ class Cloud:
         self._node: Any = None
 
     def show(self, rows: NDArray[np.intp], magnification: float, visible: bool) -> None:
-        """Draw the arrows of k rows, the same number each time, or hide them."""
+        """Draw the arrows of k rows, always the same number, or hide them."""
         scene = self._scene
         turns, stretches = arrows(self._vectors[rows], magnification, scene.size, self._thicker)
         drawn: dict[str, Any] = {"batched_positions": scene.predicted[rows], "batched_wxyzs": turns}
@@ -227,7 +227,7 @@ BACK, ON, WORST = "previous", "next", "largest gap"
 
 
 class Window:
-    """A scene that is served on the loopback address until it is closed.
+    """Scene served on the loopback address until closed.
 
     Shapes of links are as :func:`solids` returns them. The next free port is taken where ``port`` is; 0 asks for any.
     """
@@ -247,16 +247,16 @@ class Window:
 
     @property
     def url(self) -> str:
-        """Where it is served."""
+        """Address of the server."""
         return f"http://{settings.HOST}:{self._server.get_port()}"
 
     def close(self) -> None:
-        """Serve no longer."""
+        """Stop the server."""
         with redirect_stdout(io.StringIO()):
             self._server.stop()
 
     def _look(self) -> None:
-        """Look at the whole robot from a little above, its own up being up."""
+        """Set the camera to the whole robot from a little above."""
         scene, nodes = self.scene, self._server.scene
         nodes.set_up_direction(tuple(scene.up))
         camera = self._server.initial_camera
@@ -267,7 +267,7 @@ class Window:
         nodes.add_grid("/floor", width=wide, height=wide, wxyz=level, **cells)
 
     def _add_clouds(self) -> list[tuple[Cloud, Cloud]]:
-        """Return the arrows of the row that is shown and those of all rows: before the correction, and after it."""
+        """Arrows of the current row and of all rows, before and after the correction."""
         scene, nodes = self.scene, self._server.scene
         kinds = [("/gap", scene.gap, settings.CHOSEN, settings.GAP)]
         if scene.remainder is not None:
@@ -300,7 +300,7 @@ class Window:
         self._step.on_click(lambda _: self._go(self._step.value))
 
     def _go(self, where: str) -> None:
-        """Go to the row before, to the one behind, or to the one with the largest gap of those not set aside."""
+        """Go to the previous or next row, or to the one with the largest gap that is no outlier."""
         size = np.where(self.scene.aside, -1.0, np.linalg.norm(self.scene.gap, axis=1))
         row = {BACK: self.row - 1, ON: self.row + 1, WORST: int(np.argmax(size))}[where]
         self._slider.value = min(max(row, 0), len(self.scene.q) - 1) + 1
@@ -321,7 +321,7 @@ class Window:
 
 
 def _server(label: str, port: int) -> Any:
-    """Start to serve an empty scene, to this machine alone."""
+    """Start the server of an empty scene, on the loopback address."""
     import viser
 
     with redirect_stdout(io.StringIO()):  # where it says so in its own words

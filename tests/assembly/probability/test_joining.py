@@ -1,10 +1,13 @@
 """Joining probability against mpmath at hard points, closed forms, limits and invariances."""
 
+from functools import partial
+
 import mpmath as mp
 import numpy as np
 import pytest
 
 from thermal_robot.assembly.probability import UniformSpread, failing_probability, joining_probability
+from thermal_robot.assembly.probability.joining import link_nodes, planar_link_nodes
 
 
 def turned(angle):
@@ -64,6 +67,14 @@ def exact_disc(matrix, clearance, mean):
         (1e4, 0.3, 16.0, (0.0, 0.0)),
         (1e4, 0.9, 3.0, (5.0, 1.0)),
         (1e4, -0.9, 0.01, (0.1, 0.0)),
+        (9.0, 0.0, 2.0, (4.0, -1.0)),
+        (64.0, 0.0, 2.0, (2.5, 0.4)),
+        (1600.0, 0.0, 2.0, (0.0, 1.04)),
+        (1e4, 0.0, 1.0, (0.2, 0.495)),
+        # the small variance has to keep its digits: the determinant cancels
+        (1.0, 1.0 - 1e-10, 4.0, (0.3, 0.3)),
+        (1.0, -1.0 + 1e-12, 4.0, (0.3, -0.3)),
+        (1e8, 0.0, 2.0, (0.3, 0.2)),
     ],
 )
 def test_disc_agrees_with_mpmath(ratio, rho, clearance, mean):
@@ -174,25 +185,61 @@ def averaged(function, matrix, size, mean, generators, count=40):
     return shares @ function(matrix, size, mean + grids @ generators.T)
 
 
+@pytest.mark.parametrize(("shape", "size"), [("circle", 7.0), ("rectangle", (7.0, 3.0))])
 @pytest.mark.parametrize("rho", [0.0, 0.7])
 @pytest.mark.parametrize("mean", [(0.0, 0.0), (2.0, -1.0)])
-def test_segment_is_the_average_over_shifted_means(rho, mean):
+def test_segment_is_the_average_over_shifted_means(rho, mean, shape, size):
     matrix, end = covariance(2.0, rho), np.array([0.9, -1.3])
-    spread = UniformSpread.segment(end)
-    for function in (joining_probability, failing_probability):
-        expected = averaged(function, matrix, 7.0, np.array(mean), end[:, None])
-        assert function(matrix, 7.0, mean, thermal=spread) == pytest.approx(expected, rel=1e-12)
+    for spread in (UniformSpread.segment(end), UniformSpread.segment(-end)):
+        for function in (joining_probability, failing_probability):
+            expected = averaged(partial(function, shape=shape), matrix, size, np.array(mean), end[:, None])
+            found = function(matrix, size, mean, shape=shape, thermal=spread)
+            assert found == pytest.approx(expected, rel=1e-12)
+    each = joining_probability(matrix[None], size, mean, segments=[end], shape=shape)
+    assert each == pytest.approx(float(joining_probability(matrix, size, mean, shape=shape, thermal=spread)), abs=1e-14)
 
 
-def test_box_and_links_are_the_average_over_shifted_means():
-    matrix = covariance(2.0, 0.3)
-    box = averaged(failing_probability, matrix, 9.0, np.zeros(2), np.diag([0.7, 0.4]))
-    assert failing_probability(matrix, 9.0, thermal=UniformSpread.box([0.7, 0.4])) == pytest.approx(box, rel=1e-11)
+@pytest.mark.parametrize(("shape", "size"), [("circle", 9.0), ("rectangle", (9.0, 6.0))])
+def test_box_and_links_are_the_average_over_shifted_means(shape, size):
+    matrix, function = covariance(2.0, 0.3), partial(failing_probability, shape=shape)
+    box = averaged(function, matrix, size, np.zeros(2), np.diag([0.7, 0.4]))
+    assert function(matrix, size, thermal=UniformSpread.box([0.7, 0.4])) == pytest.approx(box, rel=1e-11)
     # Three links, the third in the direction of the first.
     columns = np.array([[0.5, 0.2, 1.0], [0.1, 0.6, 0.2]])
     half = UniformSpread.zonotope(columns, -0.5, 0.5)
-    expected = averaged(failing_probability, matrix, 6.0, np.zeros(2), 0.5 * columns, 14)
-    assert failing_probability(matrix, 6.0, thermal=half) == pytest.approx(expected, rel=1e-11)
+    expected = averaged(function, matrix, size, np.zeros(2), 0.5 * columns, 14)
+    assert function(matrix, size, thermal=half) == pytest.approx(expected, rel=1e-11)
+
+
+def test_a_shift_adds_to_the_mean_and_each_error_may_have_its_own():
+    shifted = joining_probability(np.eye(2), 4.0, [1.0, 2.0], thermal=[[3.0, -1.0], [0.2, -1.0]])
+    expected = [joining_probability(np.eye(2), 4.0, mean) for mean in ([4.0, 1.0], [1.2, 1.0])]
+    np.testing.assert_allclose(shifted, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("nodes", [link_nodes, planar_link_nodes])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_nodes_of_links_keep_the_moments_and_refuse_a_vanishing_normal_part_at_once(nodes, count):
+    columns = np.array([[0.5, 0.2, 1.0], [0.1, 0.6, 0.2]])[:, :count]
+    shifts, weights = nodes(0.3 * np.eye(2), columns)
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(weights @ shifts, 0.0, atol=1e-13)
+    # A generator with u uniform on [−1, 1] has a third of its square as variance; independent ones add.
+    np.testing.assert_allclose((shifts.T * weights) @ shifts, columns @ columns.T / 3.0, rtol=1e-11, atol=1e-13)
+    # Without a limit that is known beforehand there would be 1e12 nodes: no memory holds them.
+    for variance in (1e-8, 1e-10, 0.0):
+        with pytest.raises(ValueError, match="so narrow a normal part need too many nodes"):
+            nodes(variance * np.eye(2), columns)
+
+
+def test_number_of_planar_nodes_does_not_grow_with_the_number_of_generators():
+    """The same sum of lengths, cut into more and more pieces; parallel ones need a line of nodes only."""
+    columns = np.array([[0.15, 0.06], [0.03, 0.18]])
+    counts = [len(planar_link_nodes(np.eye(2), np.tile(columns / k, k))[1]) for k in (1, 2, 4)]
+    assert counts[1] == counts[2] < 3 * counts[0]
+    assert len(link_nodes(np.eye(2), np.tile(columns / 2, 2))[1]) > 10 * counts[1]
+    shifts, _ = planar_link_nodes(np.eye(2), np.array([[0.5, 1.0, -0.2], [0.25, 0.5, -0.1]]))
+    np.testing.assert_allclose(shifts @ np.array([1.0, -2.0]), 0.0, atol=1e-14)
 
 
 def test_heat_without_a_normal_part_is_geometry():
@@ -242,23 +289,40 @@ def test_many_cases_at_once_are_the_single_ones():
             assert table[i, j] == pytest.approx(float(single), rel=1e-14)
 
 
+SEGMENT = UniformSpread.segment([1.0, 0.0])
+
+
+@pytest.mark.parametrize("first", [0, 60], ids=["alone", "among many"])
 @pytest.mark.parametrize(
-    ("matrix", "clearance", "mean", "options"),
+    ("given", "words"),
     [
-        (np.diag([1.0, -1.0]), 1.0, 0.0, {}),
-        (np.array([[1.0, 2.0], [2.0, 1.0]]), 1.0, 0.0, {}),
-        (np.array([[1.0, 0.2], [0.1, 1.0]]), 1.0, 0.0, {}),
-        (np.eye(3), 1.0, 0.0, {}),
-        (np.eye(2), -1.0, 0.0, {}),
-        (np.eye(2), np.nan, 0.0, {}),
-        (np.eye(2), 1.0, (0.0, 0.0, 0.0), {}),
-        (np.eye(2), 1.0, 0.0, {"shape": "ellipse"}),
-        (np.eye(2), 1.0, 0.0, {"thermal": (1.0, 2.0, 3.0)}),
-        (np.eye(2), 1.0, 0.0, {"thermal": UniformSpread.box([1.0, 1.0, 1.0])}),
-        (np.eye(2), 1.0, 0.0, {"thermal": UniformSpread.box([1.0, 1.0]), "randomised": "gauss"}),
-        (np.eye(2), (1.0, 2.0, 3.0), 0.0, {"shape": "rectangle"}),
+        ({"covariance": np.diag([1.0, -1.0])}, "semidefinite"),
+        ({"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "semidefinite"),
+        ({"covariance": [[1.0, 0.2], [0.1, 1.0]]}, "symmetric"),
+        ({"covariance": [[np.nan, 0.0], [0.0, 1.0]]}, "finite"),
+        ({"covariance": np.eye(3)}, "shape"),
+        ({"clearance": -1.0}, "negative or missing"),
+        ({"clearance": np.nan}, "negative or missing"),
+        ({"clearance": (1.0, 2.0, 3.0), "shape": "rectangle"}, "."),
+        ({"mean": [0.0, 0.0, 0.0]}, "mean must be finite with shape"),
+        ({"mean": [1.0]}, "mean must be finite with shape"),
+        ({"mean": [np.inf, 0.0]}, "mean must be finite"),
+        ({"shape": "ellipse"}, "."),
+        ({"thermal": (1.0, 2.0, 3.0)}, "a thermal shift must be finite"),
+        ({"thermal": [np.nan, 0.0]}, "a thermal shift must be finite"),
+        ({"thermal": UniformSpread.box([1.0, 1.0, 1.0])}, "must be planar"),
+        ({"thermal": SEGMENT, "randomised": "gauss"}, "randomised must be"),
+        ({"segments": [1.0, 2.0, 3.0]}, "segments must be finite"),
+        ({"segments": [1.0, 0.0], "thermal": SEGMENT}, "not both"),
     ],
 )
-def test_impossible_questions_are_refused(matrix, clearance, mean, options):
-    with pytest.raises(ValueError):  # noqa: PT011  the messages differ, the kind does not
-        joining_probability(matrix, clearance, mean, **options)
+def test_impossible_questions_are_refused(given, words, first):
+    covariance = np.asarray(given.get("covariance", np.eye(2)), dtype=float)
+    many = np.broadcast_to(covariance, (first, *covariance.shape)) if first else covariance
+    with pytest.raises(ValueError, match=words):
+        joining_probability(**{"clearance": 1.0, **given, "covariance": many})
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="cannot be broadcast"):
+        joining_probability(np.broadcast_to(np.eye(2), (3, 2, 2)), np.ones(4))

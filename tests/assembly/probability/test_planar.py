@@ -1,123 +1,131 @@
-"""Normal plus uniform along a segment in the plane: axes in exact arithmetic, probabilities by products and draws."""
+"""Discs by every engine: the cheap integrals, graded panels and compiled loops find the same chances."""
 
-from fractions import Fraction
-
-import mpmath as mp
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.stats import ncx2
 
-from thermal_robot.assembly.probability.planar import Frame, Principal, planar_probability
+from thermal_robot import compiling
+from thermal_robot.assembly.probability import compiled, failing_probability, joining_probability, required_clearance
+from thermal_robot.assembly.probability.planar import TOLD, Principal, _graded, disc_chances
 
-MATRICES = {
-    "round": np.eye(2),
-    "turned": np.array([[2.0, 0.9], [0.9, 0.7]]),
-    "nearly singular": np.array([[1.0, 1.0 - 1e-13], [1.0 - 1e-13, 1.0]]),
-    "cancelling": np.array([[0.7, 0.3], [0.3, 0.09 / 0.7 * (1.0 + 1e-10)]]),
-    "µm": 1e-12 * np.array([[196.0, 30.0], [30.0, 324.0]]),
-    "unequal": np.diag([1e4, 1e-4]),
-}
-
-
-def turned(angle):
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+needs_loops = pytest.mark.skipif(
+    not compiling.loads("thermal_robot.assembly.probability.loops"),
+    reason="the loops are in the extra fast: numba is not installed",
+)
+COUNT = 1000
 
 
-@pytest.mark.parametrize("name", MATRICES)
-def test_principal_axes_are_right_also_where_the_determinant_cancels(name):
-    matrix = MATRICES[name]
-    found = Principal.of(matrix)
-    with mp.workdps(60):
-        values = sorted(mp.eigsy(mp.matrix(matrix.tolist()), eigvals_only=True))
-    assert found.large == pytest.approx(float(values[1]), rel=1e-14, abs=0.0)
-    assert found.small == pytest.approx(float(values[0]), rel=1e-12, abs=0.0)
-    a, b, c = (Fraction(float(v)) for v in (matrix[0, 0], matrix[0, 1], matrix[1, 1]))
-    assert found.large * found.small == pytest.approx(float(a * c - b * b), rel=1e-12, abs=0.0)
-    direction = found.direction
-    assert np.hypot(*direction) == pytest.approx(1.0, rel=1e-15)
-    np.testing.assert_allclose(matrix @ direction, found.large * direction, atol=1e-13 * found.large)
+def cases(seed, ratio, segments, count=300):
+    """Covariances of ratios up to one given, means, radii, segments: of all sizes beside each other."""
+    rng = np.random.default_rng(seed)
+    wide = np.exp(rng.uniform(-2.0, 2.0, count))
+    narrow = wide / ratio ** rng.uniform(0.0, 1.0, count) if ratio else np.zeros(count)
+    angle = rng.uniform(0.0, np.pi, count)
+    turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=-1).reshape(-1, 2, 2)
+    matrices = np.einsum("nij,nj,nkj->nik", turn, np.stack([wide, narrow], axis=-1) ** 2, turn)
+    means = rng.normal(size=(count, 2)) * (wide * rng.uniform(0.0, 3.0, count))[:, None]
+    means[rng.random(count) < 0.3] = 0.0
+    ends = rng.normal(size=(count, 2)) * (wide * np.exp(rng.uniform(-4.0, 1.5, count)))[:, None]
+    radii = wide * np.exp(rng.uniform(-3.0, 2.0, count))
+    return 0.5 * (matrices + np.swapaxes(matrices, 1, 2)), means, radii, ends if segments else None
 
 
-def test_singular_and_zero_covariances_have_axes_too():
-    line = Principal.of(np.outer([0.6, 0.8], [0.6, 0.8]) * 25.0)
-    assert line.large == pytest.approx(25.0, rel=1e-14)
-    assert line.small == pytest.approx(0.0, abs=1e-14)
-    assert abs(line.direction @ np.array([0.6, 0.8])) == pytest.approx(1.0, rel=1e-14)
-    nothing = Principal.of(np.zeros((2, 2)))
-    assert (nothing.large, nothing.small) == (0.0, 0.0)
+@pytest.mark.parametrize("segments", [False, True])
+@pytest.mark.parametrize("ratio", [3.0, 100.0, 1e4, 1e8, 0.0])
+def test_what_is_told_is_what_graded_panels_find(ratio, segments):
+    matrices, means, radii, ends = cases(1, ratio, segments)
+    principal = Principal.of(matrices)
+    found = disc_chances(principal, means, radii, ends)
+    inside, outside = (_graded(principal, means, 2.0 * radii[:, None], "circle", ends, out) for out in (False, True))
+    told, digits = np.isfinite(found.inside), np.isfinite(found.outside)
+    np.testing.assert_allclose(found.inside[told], inside[told], rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(found.outside[digits], outside[digits], rtol=1e-10)
+    assert np.all(digits[told & (outside > 1.01 * TOLD)])
+    assert told.all() or segments, "without a segment every disc is resolved"
 
 
-@pytest.mark.parametrize("name", MATRICES)
-@pytest.mark.parametrize("angle", [0.0, 0.4, 1.9])
-def test_frame_has_the_covariance_in_its_own_axes(name, angle):
-    second = turned(angle)[:, 1]
-    frame = Frame.along(Principal.of(MATRICES[name]), second, 0.5)
-    np.testing.assert_allclose(frame.rotation @ frame.rotation.T, np.eye(2), atol=1e-15)
-    np.testing.assert_array_equal(frame.rotation[1], second)
-    # x with its deviation; y = slope x plus an independent remainder.
-    root = np.array([[frame.spread, 0.0], [frame.slope * frame.spread, frame.remainder]])
-    inside = frame.rotation @ MATRICES[name] @ frame.rotation.T
-    np.testing.assert_allclose(root @ root.T, inside, atol=1e-12 * np.abs(MATRICES[name]).max())
-    # However narrow, the remainder keeps its digits: the product of both variances is the determinant.
-    a, b, c = (Fraction(float(v)) for v in MATRICES[name][np.triu_indices(2)])
-    assert (frame.spread * frame.remainder) ** 2 == pytest.approx(float(a * c - b * b), rel=1e-11, abs=0.0)
+@pytest.mark.parametrize("failing", [0.7, 6.6e-5, np.exp(-200.0)])
+@pytest.mark.parametrize("segments", [False, True])
+@pytest.mark.parametrize("ratio", [3.0, 1e4])
+def test_many_clearances_fail_as_often_as_is_asked_and_are_as_one_by_one(ratio, failing, segments):
+    matrices, means, _, ends = cases(6, ratio, segments, count=12)
+    heated = {} if ends is None else {"segments": ends}
+    found = required_clearance(matrices, failing=failing, mean=means, **heated)
+    fails = failing_probability(matrices, found, means, **heated)
+    np.testing.assert_allclose(np.log(fails), np.log(failing), rtol=1e-9)
+    single = {name: part[3] for name, part in heated.items()}
+    one = required_clearance(matrices[3], failing=failing, mean=means[3], **single)
+    assert isinstance(one, float)
+    assert found[3] == pytest.approx(one, rel=1e-12)
 
 
-@pytest.mark.parametrize("outside", [False, True])
-@pytest.mark.parametrize("shape", ["circle", "rectangle"])
-@pytest.mark.parametrize("segment", [None, [1.5, -0.4]])
-def test_probability_is_that_of_drawn_errors(shape, segment, outside):
-    rng, drawn, mean = np.random.default_rng(6), 200_000, np.array([0.4, -0.7])
-    error = rng.standard_normal((drawn, 2)) @ np.linalg.cholesky(MATRICES["turned"]).T + mean
-    if segment is not None:
-        error += rng.uniform(-1.0, 1.0, drawn)[:, None] * segment
-    sizes = np.array([[3.0]]) if shape == "circle" else np.array([[3.0, 1.6]])
-    within = np.hypot(*error.T) < 1.5 if shape == "circle" else np.all(np.abs(error) < 0.5 * sizes, axis=1)
-    counted = np.mean(~within if outside else within)
-    along = None if segment is None else np.array(segment)
-    found = planar_probability(MATRICES["turned"], mean[None], sizes, shape=shape, segment=along, outside=outside)
-    assert abs(found[0] - counted) < 5.0 * np.sqrt(found[0] * (1.0 - found[0]) / drawn)
+@pytest.fixture
+def always(monkeypatch):
+    """Compiled loops, however few cases there are."""
+    monkeypatch.setattr(compiled, "MANY", 1)
 
 
-def test_rectangle_of_independent_axes_is_a_product():
-    means = np.array([[0.0, 0.0], [1.0, -2.0], [5.0, 0.3]])
-    sides, deviations = np.array([[2.0, 3.0], [0.1, 7.0], [4.0, 1.0]]), np.array([1.3, 0.4])
-    ends = [(sign * 0.5 * sides - means) / deviations for sign in (1.0, -1.0)]
-    expected = np.prod(ndtr(ends[0]) - ndtr(ends[1]), axis=1)
-    found = planar_probability(np.diag(deviations**2), means, sides, shape="rectangle")
-    np.testing.assert_allclose(found, expected, rtol=1e-11)
+def both(monkeypatch, *case):
+    """Return the chances inside and outside, by the loops and without them."""
+    found = []
+    for many in (1, 10**9):
+        monkeypatch.setattr(compiled, "MANY", many)
+        found.append((joining_probability(*case), failing_probability(*case)))
+    return found
 
 
-@pytest.mark.parametrize("segment", [None, [0.8, 0.3]])
-def test_a_disc_does_not_know_its_directions(segment):
-    mean, along = np.array([[0.7, -1.1]]), None if segment is None else np.array(segment)
-    reference = planar_probability(MATRICES["turned"], mean, np.array([[2.0]]), shape="circle", segment=along)
-    for angle in (0.4, 1.9, np.pi):
-        turn = turned(angle)
-        moved = None if along is None else turn @ along
-        found = planar_probability(
-            turn @ MATRICES["turned"] @ turn.T, mean @ turn.T, np.array([[2.0]]), shape="circle", segment=moved
-        )
-        np.testing.assert_allclose(found, reference, rtol=1e-12)
+@needs_loops
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0, 1e4, 1e8])
+@pytest.mark.parametrize("reach", [0.01, 1.0, 3.0, 12.0], ids="{}_deviations".format)
+@pytest.mark.parametrize("shifted", [False, True], ids=["central", "shifted"])
+def test_loops_agree_with_the_other_engine(monkeypatch, ratio, reach, shifted):
+    count = COUNT if ratio < 1e8 else 100  # beyond their reach they ask the other engine, which takes its time
+    matrices, means, _, _ = cases(int(ratio + reach), ratio, False, count)
+    deviation = np.sqrt(Principal.of(matrices).large)
+    radius = reach * deviation * np.random.default_rng(1).uniform(0.5, 2.0, count)
+    means = means if shifted else 0.0
+    # in metres: the loops may not know the unit
+    (inside, outside), (expected, missed) = both(monkeypatch, 1e-10 * matrices, 2e-5 * radius, 1e-5 * means)
+    np.testing.assert_allclose(inside, expected, rtol=0.0, atol=4e-15)
+    np.testing.assert_allclose(outside, missed, rtol=1e-10, atol=0.0)
+    assert ((inside >= 0.0) & (inside <= 1.0)).all()
 
 
-@pytest.mark.parametrize("shape", ["circle", "rectangle"])
-def test_a_short_segment_is_none_and_a_reversed_one_the_same(shape):
-    means, sizes = np.array([[0.3, 0.2], [2.0, 1.0]]), np.full((2, 1 if shape == "circle" else 2), 2.5)
-    options = {"shape": shape, "outside": True}
-    plain = planar_probability(MATRICES["turned"], means, sizes, **options)
-    short = planar_probability(MATRICES["turned"], means, sizes, segment=np.array([1e-9, 2e-9]), **options)
-    np.testing.assert_allclose(short, plain, rtol=1e-12)
-    end = np.array([0.9, -0.3])
-    one, other = (planar_probability(MATRICES["turned"], means, sizes, segment=s, **options) for s in (end, -end))
-    np.testing.assert_allclose(one, other, rtol=1e-12)
+@needs_loops
+def test_round_deviations_have_the_law_of_a_non_central_square(always):
+    rng = np.random.default_rng(2)
+    mean, radius = rng.normal(size=(COUNT, 2)), rng.uniform(0.1, 4.0, COUNT)
+    found = joining_probability(np.eye(2), 2.0 * radius, mean)
+    np.testing.assert_allclose(found, ncx2.cdf(radius**2, 2, (mean**2).sum(axis=1)), rtol=0.0, atol=1e-12)
 
 
-def test_many_errors_at_once_are_the_single_ones():
-    rng = np.random.default_rng(7)
-    means, sizes = rng.normal(size=(6, 2)), rng.uniform(0.1, 9.0, (6, 1))
-    together = planar_probability(MATRICES["turned"], means, sizes, shape="circle")
-    single = [
-        planar_probability(MATRICES["turned"], means[[k]], sizes[[k]], shape="circle")[0] for k in range(len(means))
-    ]
-    np.testing.assert_allclose(together, single, rtol=1e-12)
+@needs_loops
+def test_the_number_of_threads_does_not_show(always, monkeypatch):
+    matrices, means, _, _ = cases(3, 4.0, False, COUNT)
+    found = []
+    for threads, piece in ((1, 16_384), (3, 170)):
+        monkeypatch.setattr(compiling, "THREADS", threads)
+        monkeypatch.setattr(compiling, "PIECE", piece)
+        found.append(joining_probability(matrices, 5.0, means))
+    np.testing.assert_array_equal(*found)
+
+
+@needs_loops
+def test_loops_broadcast_and_more_clearance_joins_more_often(always):
+    matrices = cases(4, 2.0, False, 20)[0]
+    matrices /= Principal.of(matrices).large[:, None, None]
+    found = joining_probability(matrices[:, None], np.linspace(0.0, 10.0, 30), [1.0, 0.0])
+    assert found.shape == (20, 30)
+    assert (np.diff(found, axis=1) >= 0.0).all()
+    np.testing.assert_array_equal(found[:, 0], 0.0)
+
+
+@needs_loops
+def test_what_loops_cannot_tell_is_told_by_others(monkeypatch):
+    """No clearance and an endless one, a deviation of nothing, one without any width, and a very narrow one."""
+    covariance = np.array([np.eye(2), np.eye(2), np.zeros((2, 2)), [[1.0, 1.0], [1.0, 1.0]], np.diag([1.0, 1e-20])])
+    clearance, mean = np.array([0.0, np.inf, 2.0, 2.0, 2.0]), np.array([[0.0, 0.0]] * 4 + [[0.3, 0.0]])
+    (inside, outside), (expected, missed) = both(monkeypatch, covariance, clearance, mean)
+    np.testing.assert_allclose(inside, expected, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(outside, missed, rtol=1e-12, atol=0.0)
+    np.testing.assert_array_equal(inside[:3], [0.0, 1.0, 1.0])

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Seconds over a size, for a plot and its exponent.
-
-    Attributes
-    ----------
-    name
-        What was timed.
-    sizes, seconds
-        Of each call.
-    """
+    """Seconds over a size, for a plot and its exponent."""
 
     name: str
     sizes: tuple[float, ...]
@@ -34,19 +26,9 @@ class Plot:
 
 @dataclass(frozen=True)
 class Part:
-    """One part of the page.
-
-    Attributes
-    ----------
-    title, text
-        Heading, and what was done, in whole sentences.
-    tables
-        Each with its heading first, cells as text.
-    plots
-        Drawn below.
-    """
+    """One part of the page: heading, what was done, tables of text with their heading first, plots below."""
 
     title: str
     text: str
     tables: tuple[tuple[tuple[str, ...], ...], ...] = ()
-    plots: tuple[Plot, ...] = field(default=())
+    plots: tuple[Plot, ...] = ()

@@ -25,19 +25,7 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Peer:
-    """A program that calibrates.
-
-    Attributes
-    ----------
-    name
-        As it is told.
-    packages
-        What pip installs.
-    script
-        Beside this file: what its Python runs.
-    methods
-        That it has.
-    """
+    """A program that calibrates: as it is told, what pip installs, what its Python runs, and the methods it has."""
 
     name: str
     packages: tuple[str, ...]

@@ -9,10 +9,10 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from thermal_robot.blind.plan import ROBOTS
 from thermal_robot.blind.reality import FAULTS, UNLISTED, World
-from thermal_robot.blind.reality.fault import Fault, clock, joints, own_position, ratings, segments
+from thermal_robot.blind.reality.fault import ratings
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import Gauge, place
-from thermal_robot.blind.reality.unlisted import INTERPLAY, SLOW, deviation, slipped, wandered
+from thermal_robot.blind.reality.unlisted import INTERPLAY, SLOW, slipped, wandered
 from thermal_robot.blind.reality.world import from_vector, rpy_matrix
 from thermal_robot.effects import library
 from thermal_robot.robot import load_robot
@@ -77,11 +77,6 @@ def hanging(err, setting):
         return err("backlash", HALF, 30.0, SOFT, torque=torque, approach=approach) / HALF
 
     return of
-
-
-def test_a_zero_is_elsewhere_by_a_constant_and_a_graduation_by_a_share(err, setting):
-    np.testing.assert_allclose(err("joint_offset", 2e-3), 2e-3)
-    np.testing.assert_allclose(err("joint_gain", 2e-3) / setting.q[:, 1], 2e-3)
 
 
 def test_a_disc_off_its_centre_misreads_by_the_arc_sine_at_most(err, turning):
@@ -373,21 +368,6 @@ def test_every_effect_can_be_drawn_for_an_arm_of_four_joints(name, scara):
     assert draws.shape[1] == max(len(FAULTS[name].places(scara)), 1)
 
 
-def test_size_scales_all_but_what_is_no_size():
-    fault = Fault("x", lambda s, rng: np.ones((2, 3)), lambda *_: None, joints, fixed=((1, (0.0,)),))
-    values = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    np.testing.assert_array_equal(fault.scaled(values, 3.0), [[3.0, 2.0, 9.0], [12.0, 5.0, 18.0]])
-    np.testing.assert_array_equal(values[0], [1.0, 2.0, 3.0])
-
-
-def test_places_and_their_quantities_are_named_by_the_robot(setting):
-    world = setting.world
-    assert joints(setting) == [("joint", name) for name in world.names]
-    assert segments(setting) == [("link", link) for link in world.links]
-    assert own_position(setting, [("joint", "elbow_joint")]) == ["elbow_joint"]
-    assert list(clock(setting, [])) == ["time", "order"]
-
-
 # ---- causes that no library knows: one quantity at one place
 
 
@@ -492,11 +472,6 @@ def test_what_a_cause_follows_is_a_column_that_can_be_asked_for(name, setting):
 
 
 # ---- effects that change with a condition, and products of two quantities
-
-
-def test_a_deviation_runs_from_end_to_end_and_what_stands_still_has_none():
-    np.testing.assert_allclose(deviation(np.array([2.0, 3.0, 6.0])), [-1.0, -0.5, 1.0])
-    np.testing.assert_array_equal(deviation(np.full(4, 7.0)), 0.0)
 
 
 @pytest.mark.parametrize("name", ["loaded_play", "warm_spring", "warm_gain"])

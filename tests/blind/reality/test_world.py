@@ -18,13 +18,12 @@ from thermal_robot.blind.reality.world import (
     free_columns,
     from_vector,
     quaternion,
-    read,
     rpy_matrix,
     slopes,
 )
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects.compliance import overturning
-from thermal_robot.kinematics import gravity_torques, tool_poses
+from thermal_robot.kinematics import exp3, gravity_torques, tool_poses
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 
@@ -45,6 +44,7 @@ def test_a_sound_robot_stands_where_pinocchio_has_it(name):
     q = drawn(world, 60, 1)
     assert world.names == robot.joint_names
     assert world.slides.tolist() == [j.kind == "prismatic" for j in world.joints]
+    np.testing.assert_array_equal([world.lower, world.upper], [robot.lower, robot.upper])
     poses, torque = world.poses(q, np.zeros(60), world.sound(60))
     np.testing.assert_allclose(poses, tool_poses(robot, q), atol=1e-9)
     np.testing.assert_allclose(torque, gravity_torques(robot, q), atol=1e-8)
@@ -191,19 +191,11 @@ def test_what_holds_a_driver_is_what_its_motion_lifts(parallelograms):
 # ---- rigid motions
 
 RNG = np.random.default_rng(8)
-TWISTS = RNG.normal(size=(20, 6))
-
-
-def test_motions_are_rigid_and_turn_about_their_axis_by_its_length():
-    turns = from_vector(TWISTS)[:, :3, :3]
-    np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), atol=1e-14)
-    np.testing.assert_allclose(np.linalg.det(turns), 1.0)
-    np.testing.assert_allclose((turns @ TWISTS[:, 3:, None])[:, :, 0], TWISTS[:, 3:], atol=1e-12)
-    angle = np.linalg.norm(TWISTS[:, 3:], axis=1)
-    np.testing.assert_allclose(np.trace(turns, axis1=1, axis2=2), 1.0 + 2.0 * np.cos(angle))
 
 
 def test_turns_and_quaternions_follow_their_conventions():
+    twists = RNG.normal(size=(20, 6))
+    np.testing.assert_allclose(from_vector(twists)[:, :3], np.dstack([exp3(twists[:, 3:]), twists[:, :3]]), atol=1e-14)
     motion = from_vector(np.array([[1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2]]))[0]
     np.testing.assert_allclose(motion @ [1.0, 0.0, 0.0, 1.0], [1.0, 3.0, 3.0, 1.0], atol=1e-15)
     # roll, pitch, yaw: about the fixed axes x, then y, then z
@@ -235,58 +227,6 @@ def test_columns_of_the_frames_are_what_a_small_motion_does():
         np.testing.assert_allclose(columns[:, 6 + k], (turns @ offset).ravel())
     for base, tool, freedoms in ((True, False, 6), (False, True, 3), (False, False, 0)):
         assert free_columns(points, turns, base, tool).shape == (45, freedoms)
-
-
-# ---- the reality's own reading of a URDF
-
-
-@pytest.fixture(scope="module")
-def tree():
-    return read('<?xml version="1.0" encoding="utf-8"?>' + AWKWARD)
-
-
-def test_joints_of_the_chain_lead_from_the_root_to_the_tool(tree):
-    chain = tree.chain("tip")
-    assert tree.root == chain[0].parent == "ground"
-    assert [j.child for j in chain[:-1]] == [j.parent for j in chain[1:]]
-    assert chain[-1].child == "tip"
-    assert [j.name for j in chain if j.movable] == ["lift", "turret", "slide", "roll_joint", "rail_joint", "hand_joint"]
-    assert tree.chain("ground") == ()
-    # a joint comes after the one that carries it
-    seen = {tree.root}
-    for joint in tree.joints:
-        assert joint.parent in seen
-        seen.add(joint.child)
-    assert seen == set(tree.mass)
-
-
-def test_axes_are_unit_vectors_and_along_x_where_none_is_given(tree):
-    axes = {j.name: j.axis for j in tree.joints}
-    np.testing.assert_allclose([np.linalg.norm(axis) for axis in axes.values()], 1.0)
-    np.testing.assert_allclose(axes["turret"], np.array([1.0, 2.0, -3.0]) / np.sqrt(14.0))
-    np.testing.assert_array_equal(axes["tip_joint"], [1.0, 0.0, 0.0])
-    # only a continuous joint has no limits
-    joints = {j.name: j for j in tree.joints}
-    assert (joints["turret"].lower, joints["turret"].upper) == (-2.0, 2.5)
-    assert (joints["hand_joint"].lower, joints["hand_joint"].upper) == (-np.inf, np.inf)
-
-
-@pytest.mark.parametrize(
-    ("name", "place"), [("lift", 0.2), ("branch_joint", -0.3), ("turret", 0.0), ("hand_joint", 0.0)]
-)
-def test_a_joint_that_nobody_moves_is_held_nearest_to_zero(tree, name, place):
-    assert next(j for j in tree.joints if j.name == name).held == place
-
-
-def test_a_link_without_inertia_weighs_nothing(tree):
-    assert tree.mass["rail"] == 0.0
-    np.testing.assert_array_equal(tree.centre["rail"], 0.0)
-    assert tree.mass["turret"] == 3.0
-    np.testing.assert_array_equal(tree.centre["turret"], [0.02, 0.0, 0.1])
-    # a link carries itself and all branches beyond it
-    assert tree.carried(tree.root) == pytest.approx(sum(tree.mass.values()))
-    assert tree.carried("slide") == pytest.approx(2.0 + 1.0 + 1.5 + 0.5)  # the held branch, too
-    assert tree.carried("tip") == 0.0
 
 
 # ---- slopes of a sound robot, against small faults of the whole one

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import load_arm
+from diagnosis.simulated import some
 from several import LONG, table_of
 from simulate import simulate
 from spoilt_tables import DRAWN, SPOILT, coupled, measured_at, paired_late, with_joints
@@ -14,8 +15,8 @@ from spoilt_tables import DRAWN, SPOILT, coupled, measured_at, paired_late, with
 from thermal_robot import read_campaign
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
-from thermal_robot.diagnosis.data_faults.faults import TURNS, Readings
-from thermal_robot.diagnosis.data_faults.find import KINDS, Screen, Struck, consensus, mixture, part_of, spread, window
+from thermal_robot.diagnosis.data_faults.faults import TURNS
+from thermal_robot.diagnosis.data_faults.find import KINDS
 from thermal_robot.robot import load_robot
 
 NOISE = 25e-6
@@ -44,8 +45,7 @@ def test_a_fault_is_named(sound, kind):
     assert found.rows == ()
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("name", ["rv_m2", "panda"])
+@pytest.mark.parametrize(("name", "seed"), [("rv_m2", 0), ("panda", 1), ("rv_m2", 2), ("panda", 3)])
 def test_a_sound_table_has_no_fault(name, seed):
     effects = [["joint_offset"], ["geometric", "drift"], ["backlash"], []][seed]
     sound = simulate(load_arm(name), effects, samples=40, seed=seed, outliers=0.1, heavy=True, ratio=(20.0, 60.0))[0]
@@ -57,19 +57,20 @@ def test_measurements_in_no_order_are_mended_by_nothing(sound):
     assert data_fault(measured_at(sound, shuffled)) is None
 
 
-@pytest.mark.parametrize("share", [0.15, 0.45])
+@pytest.mark.parametrize("share", [0.15, 0.45, 0.55, 0.65])
 def test_a_fault_of_some_rows_is_named_with_them(sound, share):
     struck = np.random.default_rng(1).random(sound.samples) < share
-    found = data_fault(paired_late(replace(sound, orientation=None, noise_orientation=None), struck))
-    # the row above is also where the arm was some time before
-    assert {"clock offset", "shifted rows"} & set(found.kinds)
-    named = np.isin(sound.rows, found.rows)
-    # the first row has none before it; where the arm hardly moved a late row is no other
-    assert (named != struck).mean() < 0.05
-    reversed_in_some = with_joints(sound, lambda q: np.where(struck[:, None], -q, q), 2)
-    found = data_fault(reversed_in_some)
+    points = replace(sound, orientation=None, noise_orientation=None)
+    found = data_fault(with_joints(points, lambda q: np.where(struck[:, None], -q, q), 2))
     assert found.kinds == ("reversed joint",)
+    # a joint that is near zero counts alike both ways, and the rows that were struck are most
     assert (np.isin(sound.rows, found.rows) != struck).mean() < 0.05
+    if share < 0.5:
+        found = data_fault(paired_late(points, struck))
+        # the row above is also where the arm was some time before
+        assert {"clock offset", "shifted rows"} & set(found.kinds)
+        # the first row has none before it; where the arm hardly moved a late row is no other
+        assert (np.isin(sound.rows, found.rows) != struck).mean() < 0.05
 
 
 def test_what_the_instrument_stands_on_cannot_tell_is_said_to_be_so(sound):
@@ -121,8 +122,10 @@ def test_a_fault_of_the_axes_is_named_where_several_targets_tell_the_pose(kind, 
     assert found.rms_after < 20.0 * NOISE
 
 
-@pytest.mark.parametrize("kind", DRAWN)
-@pytest.mark.parametrize(("arm", "seed"), [("rv_m2", 1), ("panda", 2), ("ur10", 3)])
+ARMS = (("rv_m2", 1), ("panda", 2), ("ur10", 3))
+
+
+@pytest.mark.parametrize(("kind", "arm", "seed"), some(((kind, *arm) for kind in DRAWN for arm in ARMS), 4))
 def test_faults_of_drawn_joints_and_sizes_are_named(kind, arm, seed):
     rng = np.random.default_rng(seed)
     sound = simulate(load_arm(arm), ["joint_offset"], samples=50, seed=seed, noise=NOISE, ratio=(20.0, 60.0))[0]
@@ -145,8 +148,7 @@ PAIRS = [
 ]
 
 
-@pytest.mark.parametrize("pair", PAIRS, ids=" + ".join)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("pair", "seed"), some(((pair, seed) for seed in (1, 2) for pair in PAIRS), 2))
 def test_two_faults_at_once_are_named_in_one_sentence(pair, seed):
     rng = np.random.default_rng(seed)
     arm = load_arm(["ur10", "panda"][seed % 2])
@@ -185,15 +187,17 @@ def test_reversed_joints_come_before_the_mirrored_instrument_that_does_the_same(
     assert "a2 and a5 count the other way round" in only.what
 
 
-@pytest.mark.parametrize("factor", [1e3, 1e-3, 25.4, 1.0 / 25.4, 0.0254, 1.0 / 0.0254])
-@pytest.mark.parametrize("some", [False, True])
-def test_another_unit_is_told_by_its_factor_in_all_rows_or_in_some(sound, factor, some):
-    struck = np.random.default_rng(0).random(sound.samples) < (0.3 if some else 2.0)
+FACTORS = (1e3, 1e-3, 25.4, 1.0 / 25.4, 0.0254, 1.0 / 0.0254)
+
+
+@pytest.mark.parametrize(("factor", "part"), some(((f, part) for f in FACTORS for part in (False, True)), 3))
+def test_another_unit_is_told_by_its_factor_in_all_rows_or_in_some(sound, factor, part):
+    struck = np.random.default_rng(0).random(sound.samples) < (0.3 if part else 2.0)
     spoilt = replace(sound, position=np.where(struck[:, None], factor, 1.0) * sound.position)
     found = data_fault(spoilt)
     assert found.kinds == (("metric unit",) if round(np.log10(factor), 6) % 1.0 == 0.0 else ("inch",))
     assert f"lengths are {max(factor, 1.0 / factor):.4g} times too {'large' if factor > 1.0 else 'small'}" in found.what
-    assert found.rows == (tuple(int(r) for r in sound.rows[struck]) if some else ())
+    assert found.rows == (tuple(int(r) for r in sound.rows[struck]) if part else ())
 
 
 def test_what_makes_the_robot_stand_still_mends_nothing():
@@ -204,8 +208,10 @@ def test_what_makes_the_robot_stand_still_mends_nothing():
     assert data_fault(replace(sound, position=0.05 * foreign)) is None
 
 
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize(("joint", "other"), [(2, 1), (4, 5), (5, 4)])
+@pytest.mark.parametrize(
+    ("joint", "other", "sign"),
+    some([(2, 1, -1.0), (2, 1, 1.0), (4, 5, 1.0), (4, 5, -1.0), (5, 4, -1.0), (5, 4, 1.0)], 2),
+)
 def test_a_coupling_is_told_with_its_sign(sound, joint, other, sign):
     found = data_fault(coupled(sound, joint, other, sign))
     assert "coupled joints" in found.kinds
@@ -226,81 +232,3 @@ def test_a_pair_of_faults_is_told_once(sound):
     shifted = np.array(sound.q) + np.array([0.0, 0.0, np.pi, np.pi / 2, 0.0, 0.0])
     pairs = data_fault(replace(sound, q=shifted)).what.split(", or ")
     assert len({frozenset(pair.split(" and ")) for pair in pairs}) == len(pairs)
-
-
-def best(tried, faults):
-    own = min((t for t in tried if len(t.fault) == faults), key=lambda t: t.typical)
-    return {p.kind.name for p in own.fault}, own
-
-
-def test_known_frames_are_not_fitted(sound):
-    readings = Readings.of(SPOILT["reversed joint"](sound))
-    rows = np.ones(sound.samples, dtype=bool)
-    frames = Readings.of(sound).align()
-    screen = Screen(Struck(readings, rows, readings.distance(frames), frames))
-    kinds, own = best(screen.singly(), 1)
-    assert kinds == {"reversed joint"}
-    assert own.typical < 2e-3
-
-
-def test_where_not_even_a_map_leaves_little_nothing_is_looked_at(sound):
-    """A joint that does something else than its column says: neither units nor axes nor two faults mend it."""
-    q = np.array(sound.q)
-    q[:, 1] = np.sin(2.0 * q[:, 1]) + 0.3 * q[:, 2]
-    screen = Screen(Struck.whole(Readings.of(replace(sound, q=q, orientation=None, noise_orientation=None))))
-    assert [t for t in screen.both_sides() if len(t.fault) == 2] == []
-    assert screen.two_of_joints() == []
-    assert screen.asked > 10_000  # they count as tried all the same
-
-
-@pytest.fixture(scope="module")
-def points(sound):
-    return replace(sound, orientation=None, noise_orientation=None)
-
-
-def reversed_rows(campaign, share):
-    struck = np.random.default_rng(1).random(campaign.samples) < share
-    return Readings.of(with_joints(campaign, lambda q: np.where(struck[:, None], -q, q), 2)), struck
-
-
-@pytest.mark.parametrize("share", [0.15, 0.3, 0.45])
-def test_few_rows_drawn_at_random_bring_the_sound_ones_near(points, share):
-    readings, struck = reversed_rows(points, share)
-    distance = readings.distance(consensus(readings))
-    assert distance[~struck].max() < readings.tolerance < np.median(distance[struck])
-    part = part_of(readings, consensus(readings))
-    # a joint that is near zero counts alike both ways
-    assert (part.rows != struck).mean() < 0.05
-    assert part.median == pytest.approx(np.median(distance[struck]), rel=0.3)
-
-
-def test_nobody_strays_from_a_sound_table(points):
-    readings = Readings.of(points)
-    assert part_of(readings, readings.align()) is None
-
-
-@pytest.mark.parametrize("share", [0.55, 0.65])
-def test_rows_that_choose_between_two_tables_are_told_apart(points, share):
-    readings, struck = reversed_rows(points, share)
-    found = mixture(Struck.whole(readings))
-    assert (found.rows != struck).mean() < 0.05
-    assert mixture(Struck.whole(Readings.of(points))) is None
-
-
-def test_a_sketch_has_so_many_rows_and_is_none_where_most_are_not_determined(points):
-    struck = Struck.whole(Readings.of(points))
-    assert len(struck.sketch((), 7).q) == 7
-    assert len(struck.sketch((), 700).q) == points.samples
-    shift = next(p for kind in KINDS if kind.name == "shifted rows" for p in kind.proposed(struck.readings))
-    assert len(struck.sketch((shift,), 700).q) == points.samples
-    assert Struck.whole(struck.readings.take(np.arange(3))).sketch((shift,), 7) is None
-
-
-def test_rows_are_spread_over_the_campaign_and_a_window_is_its_middle(points):
-    assert spread(np.arange(5), 9).tolist() == [0, 1, 2, 3, 4]
-    assert spread(np.arange(101), 3).tolist() == [0, 50, 100]
-    long = simulate(load_arm("ur10"), samples=300, seed=2)[0]
-    seen = window(Readings.of(long)).clock
-    assert len(seen) < 300
-    ordered = np.sort(long.covariates["time"])
-    assert np.array_equal(np.sort(seen), ordered[(ordered >= seen.min()) & (ordered <= seen.max())])

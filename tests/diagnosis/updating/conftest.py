@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from updating_cases import ALL, OLD, measured
 
-import thermal_robot as tr
 from thermal_robot.diagnosis.updated import fixed_point
 
 ASKED = ["joint_offset", "backlash", "joint_gain"]
@@ -17,15 +16,15 @@ def whole():
 
 
 @pytest.fixture(scope="session")
-def found(whole):
+def found(whole, diagnosed_once):
     """The diagnosis of the first 900."""
-    return tr.diagnose(whole.take(np.arange(OLD)), only=ASKED)
+    return diagnosed_once(whole.take(np.arange(OLD)), only=ASKED)
 
 
 @pytest.fixture(scope="session")
-def fresh(whole):
+def fresh(whole, diagnosed_once):
     """The diagnosis of all."""
-    return tr.diagnose(whole, only=ASKED)
+    return diagnosed_once(whole, only=ASKED)
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Capability of a joint, and the clearance that it needs: from probability to ``C_p`` and back."""
+"""Process capability ``C_p`` of a joint, and required clearance: from probability to ``C_p`` and back."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def capability(
     failing: npt.ArrayLike | None = None,
     convention: Convention = "two_sided",
 ) -> Array:
-    """Capability ``C_p`` that a probability of joining corresponds to.
+    """Process capability ``C_p`` equivalent to a probability of joining.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def required_clearance(
 
 
 def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Array:
-    """Return clearances ``(N,)``: all at once where cheap integrals resolve them, one after the other elsewhere."""
+    """Return the required clearances ``(N,)``: in batch where cheap integrals suffice, by Brent's method elsewhere."""
     found = np.full(len(law.means), np.nan)
     pieces = () if law.spread is None else law.spread.pieces
     if shape == "circle" and len(pieces) < 2 and all(piece.generators.shape[1] < 2 for piece in pieces):
@@ -193,7 +193,7 @@ def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Arr
 
 
 def _one_clearance(law: Law, target: float, shape: Shape, proportion: Array) -> float:
-    """Return the clearance of a single law, by Brent's method."""
+    """Return the required clearance of a single law, by Brent's method."""
 
     def excess(log_size: float) -> float:
         size = np.exp(log_size) * (1.0 if shape == "circle" else proportion)
@@ -209,7 +209,7 @@ def _one_clearance(law: Law, target: float, shape: Shape, proportion: Array) -> 
 
 
 def _typical_size(law: Law) -> float:
-    """Start the search at the size of the errors."""
+    """Start value of the search: the size of the errors."""
     square = float(np.trace(law.matrices[0])) + float(np.sum(np.square(law.means)))
     if law.spread is not None:
         square += float(np.trace(law.spread.covariance) + np.sum(law.spread.mean**2))
@@ -221,7 +221,7 @@ def _typical_size(law: Law) -> float:
 
 
 def _solve(excess: Callable[[float], float], start: float) -> float:
-    """Root of a decreasing function of the logarithm of the size: widen the bracket by doubling, then Brent."""
+    """Root of a decreasing function of the log size: bracket by doubling, then Brent's method."""
     low = high = start
     step = np.log(2.0)
     while excess(high) > 0.0:

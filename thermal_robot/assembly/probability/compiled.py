@@ -1,4 +1,4 @@
-"""Chances of very many discs with the extra ``fast``: loops compiled by numba, on all processors."""
+"""Probabilities of large batches of discs by numba (the extra ``fast``), on all processors."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MANY = 20_000
 
 
 def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt.ArrayLike) -> Array | None:
-    """(2, ...) chances that normal deviations lie in, and out of, circles about the origin, by shapes that broadcast.
+    """Probabilities (2, ...) that normal deviations lie in, and out of, circles about the origin; inputs broadcast.
 
-    They need not be checked: NaN for a case that is not proper, or that another integral tells. ``None`` where these
-    loops are not installed or not worth while, or the shapes do not fit.
+    The input need not be validated: the result is NaN for an invalid case and for one outside this method's range.
+    ``None`` where numba is missing or not worth while, or the shapes do not fit.
     """
     matrices, sizes, means = np.asarray(covariance, float), np.asarray(diameter, float), np.asarray(mean, float)
     if not means.ndim and means == 0.0:
@@ -47,7 +47,7 @@ def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt
 
 @cache
 def _angles() -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Numbers of angles, and their cosines and sines, all of them and those of a quarter."""
+    """Angle counts, with cosines and sines of all angles and of a quarter of them."""
     table = np.zeros((len(NODES), 2, int(NODES[-1])))
     for row, count in zip(table, NODES, strict=True):
         angle = (2.0 * np.pi / count) * (np.arange(count) + 0.5)

@@ -39,7 +39,7 @@ def eq18_printed_area() -> float:
 
 
 def _parts(r: npt.ArrayLike) -> tuple[Array, Array]:
-    """Return the normal standard deviation and the uniform half width of total variance one."""
+    """Return the normal standard deviation and uniform half width of total variance one."""
     ratio = np.asarray(r, dtype=float)
     with np.errstate(divide="ignore"):
         sigma = 1.0 / np.hypot(1.0, ratio)
@@ -306,7 +306,7 @@ def fit_maximum_likelihood(
 
 
 def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
-    """Smallest losses, and where they are, from several starts; none where all three parameters are held."""
+    """Largest likelihoods from several starts; empty where all three parameters are fixed."""
     free = [k for k in range(3) if held[k] is None]
     if not free:
         return []
@@ -328,7 +328,7 @@ def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
 
 
 def _completed(held: Held, point: Array) -> tuple[float, float, float]:
-    """Mean, logarithm of the size and angle: what is held, and the point's coordinates for the rest."""
+    """Mean, log size and angle from the fixed parameters and the free coordinates."""
     rest = iter(point)
     place, size, angle = (float(next(rest)) if value is None else value for value in held)
     return place, size, angle
@@ -340,7 +340,7 @@ def _estimate(point: tuple[float, float, float]) -> Estimate:
 
 
 def _limit(scaled: Array, limit: float, loc: float | None, log_scale: float | None) -> tuple[float, float]:
-    """Mean and total standard deviation of the likeliest normal (``limit = 0``) or uniform (``inf``) distribution."""
+    """Maximum likelihood at a limit, normal (``limit = 0``) or uniform (``inf``): mean, total standard deviation."""
     if limit == 0.0:
         place = float(np.mean(scaled)) if loc is None else loc
         size = float(np.sqrt(np.mean((scaled - place) ** 2)))

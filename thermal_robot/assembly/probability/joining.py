@@ -1,4 +1,4 @@
-"""Probability that a peg finds its hole (Eq 22): the position error stays within the clearance.
+"""Probability of joining (Eq 22): the position error of a peg stays within the clearance.
 
 Several independent uniform parts are Gauss-Legendre sums, as fine as the normal part demands.
 """
@@ -24,7 +24,7 @@ Thermal = UniformSpread | npt.ArrayLike | None
 
 @dataclass(frozen=True)
 class Law:
-    """Laws of planar errors; their leading axes broadcast.
+    """Batch of laws of planar errors; leading axes broadcast.
 
     Covariances ``(..., 2, 2)`` and means ``(..., 2)`` of the normal parts; a uniform ``spread`` of all of them, or one
     of each, from ``-segment`` to ``segment``, ``(..., 2)``.
@@ -44,7 +44,7 @@ class Law:
         randomised: Randomised = "uniform",
         segments: npt.ArrayLike | None = None,
     ) -> Law:
-        """Check what `joining_probability` is given, and put the thermal part where it belongs."""
+        """Validate the input of `joining_probability`, and sort the thermal part into mean, segments and box."""
         matrices = check_covariance(covariance)
         ends = None if segments is None else _vectors(segments, "segments")
         if ends is not None and isinstance(thermal, UniformSpread):
@@ -63,12 +63,12 @@ class Law:
 
     @property
     def leading(self) -> tuple[int, ...]:
-        """Shape of the laws."""
+        """Leading shape of the laws."""
         own = () if self.segments is None else self.segments.shape[:-1]
         return np.broadcast_shapes(self.matrices.shape[:-2], self.means.shape[:-1], own)
 
     def flat(self, leading: tuple[int, ...]) -> Law:
-        """Return the laws broadcast to a shape, one after the other."""
+        """Laws broadcast to a shape, flattened."""
         ends = self.segments
         return Law(
             np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2),
@@ -78,7 +78,7 @@ class Law:
         )
 
     def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Law:
-        """Return some of the laws that are flat."""
+        """Subset of flattened laws."""
         ends = self.segments
         return Law(self.matrices[chosen], self.means[chosen], self.spread, None if ends is None else ends[chosen])
 
@@ -91,7 +91,7 @@ def _vectors(value: npt.ArrayLike, name: str) -> Array:
 
 
 def check_covariance(covariance: npt.ArrayLike) -> Array:
-    """Return a covariance of shape ``(..., 2, 2)``, or raise ``ValueError`` if it is none."""
+    """Validate a covariance of shape ``(..., 2, 2)``; ``ValueError`` otherwise."""
     matrices = np.asarray(covariance, dtype=float)
     if matrices.shape[-2:] != (2, 2) or not np.all(np.isfinite(matrices)):
         raise ValueError(f"covariance must be finite with shape (..., 2, 2), not of shape {matrices.shape}")
@@ -112,7 +112,7 @@ _REACH, _REACH_MANY = 38.0, 9.0
 
 
 def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
-    """(N, d) nodes and (N,) weights for the mean over ``generators @ u``, the ``u`` independent and uniform on [-1, 1].
+    """Quadrature nodes (N, d) and weights (N,) for the mean over ``generators @ u``, ``u`` uniform on [-1, 1].
 
     A function smoothed by the normal part grows along a generator no faster than ``exp(reach * length * u)``, with the
     length and the reach in standard deviations; panels and nodes follow from that. Refused where the normal part is too
@@ -130,7 +130,7 @@ def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
 
 
 def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
-    """(N, 2) nodes and (N,) weights for the same mean in the plane, as many for any number of generators.
+    """Quadrature nodes (N, 2) and weights (N,) for the same mean in the plane, for any number of generators.
 
     A smooth function of the sum of many generators depends on a point in the plane only. The law of the sum is
     therefore moved, one generator after the other, on a fixed product grid of Chebyshev points over the sum's bounding
@@ -179,7 +179,7 @@ def generator_lengths(covariance: Array, generators: Array) -> list[float]:
 
 
 def _rule(length: float, reach: float) -> tuple[Array, Array]:
-    """Composite rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
+    """Composite Gauss rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
     panels, count = _rule_size(length, reach)
     points, weights = np.polynomial.legendre.leggauss(count)
     centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
@@ -187,7 +187,7 @@ def _rule(length: float, reach: float) -> tuple[Array, Array]:
 
 
 def _rule_size(length: float, reach: float) -> tuple[int, int]:
-    """Panels of that rule, and points on each."""
+    """Return the number of panels of that rule, and of points on each."""
     panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
     return panels, _node_count(length / panels * (reach + length))
 
@@ -288,7 +288,7 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
-    """Check, broadcast, and integrate all cases at once; compiled loops tell the plain ones of very many."""
+    """Validate, broadcast and integrate all cases; large batches of plain ones go to compiled loops."""
     plain = shape == "circle" and thermal is None and segments is None
     chances = circle_chances(covariance, clearance, mean) if plain else None
     quick: Array | None = None if chances is None else chances[int(outside)]
@@ -308,7 +308,7 @@ def _evaluate(
 
 
 def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Integrate cases that were checked, one after the other."""
+    """Integrate validated cases one by one."""
     if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
         return _cases(law, sizes, shape, outside)
     # sums over several generators are as fine as the normal part demands: one covariance after the other
@@ -321,7 +321,7 @@ def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
-    """Diameters ``(..., 1)`` or side lengths ``(..., 2)``."""
+    """Clearances as diameters ``(..., 1)`` or side lengths ``(..., 2)``."""
     sizes = np.asarray(clearance, dtype=float)
     if shape == "circle":
         sizes = sizes[..., None]
@@ -337,7 +337,7 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
 
 
 def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Return all cases; zero and infinite clearances are settled here."""
+    """Flattened cases; zero and infinite clearances are answered here."""
     result = np.full(len(sizes), 1.0 if outside else 0.0)
     pieces = law.spread.pieces if law.spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
     reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)
@@ -365,7 +365,7 @@ def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
 def _piece_probability(
     covariance: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool
 ) -> Array:
-    """Take the longest generator in closed form, the others by sums; next to a narrow normal part the second adapts."""
+    """Integrate one parallelotope: longest generator in closed form, the others by quadrature."""
     count = generators.shape[1]
     segment = generators[:, 0] if count else None
     if count < 2:
@@ -390,7 +390,7 @@ def _piece_probability(
 
 
 def _second_breakpoints(generators: Array, means: Array, sizes: Array) -> Array:
-    """Panels over the second generator, graded to where the first one's segment passes through the region's centre."""
+    """Breakpoints over the second generator, graded to where the first one's segment crosses the centre."""
     first, second = generators[:, 0], generators[:, 1]
     normal = np.array([-first[1], first[0]])
     across = float(second @ normal)

@@ -84,7 +84,7 @@ def _log_difference(upper: Array, lower: Array) -> Array:
 
 
 def _split(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> tuple[Array, Array, Array]:
-    """Broadcast to arrays of one shape (at least one-dimensional, so that masks can be assigned)."""
+    """Broadcast to arrays of one shape, at least one-dimensional."""
     one, two, three = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (x, sigma, half_width)))
     return one, two, three
 
@@ -195,7 +195,7 @@ def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> A
 
 
 def _either_tail(x: Array, sigma: Array, half_width: Array) -> Array:
-    """P(X > x) by the shortest way: without the uniform part it is one call of ``ndtr``."""
+    """P(X > x); without the uniform part one call of ``ndtr``."""
     if not np.any(half_width) and np.all(sigma > 0.0):
         return np.asarray(ndtr(-x / sigma))
     return tail(x, sigma, half_width)
@@ -236,7 +236,7 @@ def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width
 
 
 def _inside_uniform(low: Array, high: Array, half_width: Array) -> Array:
-    """Without a normal part: the share of the uniform one, or whether the point mass is inside."""
+    """P(low <= X <= high) without a normal part, point masses included."""
     overlap = np.minimum(high, half_width) - np.maximum(low, -half_width)
     point = np.where((low <= 0.0) & (high >= 0.0), 1.0, 0.0)
     share = np.maximum(overlap, 0.0) / np.where(half_width > 0.0, 2.0 * half_width, 1.0)

@@ -1,8 +1,8 @@
-"""Compiled loops of the probability of a disc: one deviation after the other, its angles side by side.
+"""Compiled loops for the probability of a disc: cases one by one, angles in vector lanes.
 
 Imported only where numba is installed. The same integral along the edge as in `planar`, from the same numbers of angles
-and the same principal axes; what it leaves out is told by NaN. Where constants of `planar` are changed, touch this
-file: numba looks at nothing else to see whether what it has kept is old.
+and the same principal axes; cases outside its range are NaN. Where constants of `planar` are changed, touch this file:
+numba looks at nothing else to see whether what it has kept is old.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ _SPLIT = 134217729.0
 
 
 def _reordered(function: Any) -> Any:
-    """Compile a loop whose sums may be taken in any order, as vector instructions take them."""
+    """Compile a loop with reassociated sums, for vector instructions."""
     return compiled(function, {"contract", "reassoc"})
 
 
 def _exact(function: Any) -> Any:
-    """Compile what rounds every step by itself."""
+    """Compile with strict floating-point rounding."""
     return compiled(function, False)
 
 
 @_exact
 def _product(p: float, q: float) -> tuple[float, float]:
-    """Return a product and what it rounded away (Dekker)."""
+    """Exact product: rounded value and rounding error (Dekker)."""
     head, p1, q1 = p * q, p * _SPLIT, q * _SPLIT
     ph, qh = p1 - (p1 - p), q1 - (q1 - q)
     pl, ql = p - ph, q - qh
@@ -50,7 +50,7 @@ def _product(p: float, q: float) -> tuple[float, float]:
 
 @_exact
 def variances(a: float, b: float, c: float) -> tuple[float, float]:
-    """Return the larger and the smaller variance of a covariance ((a, b), (b, c)) whose largest figure is near one."""
+    """Eigenvalues, larger first, of a covariance ((a, b), (b, c)) scaled to about one."""
     large = 0.5 * (a + c + math.hypot(a - c, 2.0 * b))
     one, one_low = _product(a, c)
     two, two_low = _product(b, b)
@@ -59,7 +59,7 @@ def variances(a: float, b: float, c: float) -> tuple[float, float]:
 
 @_reordered
 def _decays(room: Array, bits: npt.NDArray[np.int64], count: int) -> None:
-    """Write exp(−h) of the first row of the room to the second; ``bits`` is the room as whole numbers."""
+    """Write exp(−h) of the first row of the work array into the second; ``bits`` is its integer view."""
     for k in range(count):
         room[1, k] = max(-room[0, k], _LEAST) * _LOG2E + _ROUND
     for k in range(count):
@@ -79,7 +79,7 @@ def _decays(room: Array, bits: npt.NDArray[np.int64], count: int) -> None:
 def _edge(
     axes: tuple[float, float], at: tuple[float, float], circle: Array, room: Array, bits: npt.NDArray[np.int64]
 ) -> tuple[float, float]:
-    """Return the means of w (1 − exp(−h))/2h and of w exp(−h)/2h over the angles, of which ``circle`` is (2, n)."""
+    """Means of w (1 − exp(−h))/2h and of w exp(−h)/2h over the angles, of which ``circle`` is (2, n)."""
     count = circle.shape[1]
     area, by_cosine, by_sine, least = axes[0] * axes[1], -at[0] * axes[1], -at[1] * axes[0], np.inf
     for k in range(count):
@@ -106,7 +106,7 @@ def _edge(
 
 @_exact
 def _poles(axes: tuple[float, float], at: tuple[float, float], count: int) -> float:
-    """Return what the poles of exp(−h)/2h add to the sum over so many angles; see `planar`."""
+    """Pole correction of the trapezoidal sum of exp(−h)/2h over the angles; see `planar`."""
     lead, low = 0.5 * (axes[0] + axes[1]), 0.5 * (axes[0] - axes[1])
     middle = complex(at[0], at[1])
     root = np.sqrt(middle * middle - 4.0 * lead * low)
@@ -142,7 +142,7 @@ def circles(
     stop: int,
     found: Array,
 ) -> None:
-    """Write the chances inside and outside of the cases from ``start`` to ``stop``, (2, N); NaN where others tell them.
+    """Write probabilities (2, N) inside and outside, of the cases from ``start`` to ``stop``; NaN where not applicable.
 
     ``nodes`` (K,) numbers of angles; ``table``, ``quarters`` (K, 2, most) their cosines and sines, those of a quarter
     of the edge apart.

@@ -1,4 +1,4 @@
-"""Shapiro-Wilk's decision with its power: what a sample of this size can, and cannot, tell from a normal one."""
+"""Shapiro-Wilk test of normality with its power at the sample size."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def shapiro_wilk_critical(n: int, alpha: float = 0.05) -> float:
 
 @dataclass(frozen=True)
 class Power:
-    """Share of samples in which the test rejects normality.
+    """Power of the test: share of samples in which it rejects normality.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def sample_size_to_see(
     samples: int = 1000,
     random_state: int | None = _SEED,
 ) -> int | None:
-    """Sample size at which Shapiro-Wilk's test sees a flat-normal distribution for what it is.
+    """Sample size at which Shapiro-Wilk's test rejects a flat-normal distribution with a given power.
 
     Bisection in ``ln n`` on simulated power, every size with the same seed; the result carries the simulation's error
     (about 3 % in power with 1000 samples).
@@ -160,7 +160,7 @@ def sample_size_to_see(
 
 @dataclass(frozen=True)
 class NormalityDecision:
-    """Outcome of Shapiro-Wilk's test, and what it is worth.
+    """Decision of Shapiro-Wilk's test with its power.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class NormalityDecision:
     power: tuple[Power, ...]
 
     def __str__(self) -> str:
-        """Say the decision and its worth in one or two sentences."""
+        """Decision and power in one or two sentences."""
         verdict = "is rejected" if self.rejected else "is not rejected"
         text = f"Normality {verdict}: W = {self.statistic:.4f}, critical {self.critical:.4f}"
         text += f" (n = {self.n}, alpha = {self.alpha:g})."
@@ -201,7 +201,7 @@ def normality_test(
     samples: int = 500,
     random_state: int | None = _SEED,
 ) -> NormalityDecision:
-    """Test a sample for normality, and say what the test could have seen.
+    """Shapiro-Wilk test of a sample, with its power against flat-normal distributions.
 
     Parameters
     ----------

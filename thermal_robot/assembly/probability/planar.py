@@ -1,7 +1,8 @@
 """Probability that a planar deviation lies in a disc or a rectangle: normal, plus uniform along one segment.
 
 A disc's integral runs along its edge where so many angles as `NODES` holds resolve it, along chords across the narrow
-axis where 64 nodes do. Rectangles, what neither resolves, and tails that want all digits are left to graded panels.
+axis where 64 nodes do. Graded panels serve rectangles, discs that neither resolves, and tails to full relative
+accuracy.
 
 **Edge** (Green): a trapezoidal rule that is exact to rounding. In the principal axes of the normal part, each in its
 standard deviation, the disc's edge about the mean is ``z(t) = (a1 cos t - b1, a2 sin t - b2)`` with ``a = R / sigma``
@@ -76,7 +77,7 @@ def _difference_of_products(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 @dataclass(frozen=True)
 class Principal:
-    """2x2 covariances by their principal axes: variances ``large >= small >= 0``, and the unit vector of the first."""
+    """Eigendecomposition of 2x2 covariances: variances ``large >= small >= 0``, unit vector of the first."""
 
     large: Array
     small: Array
@@ -84,7 +85,7 @@ class Principal:
 
     @classmethod
     def of(cls, covariance: Array) -> Principal:
-        """Decompose; the smaller variance comes from the determinant, which keeps its digits next to a large one."""
+        """Decompose; the smaller variance comes from the determinant, accurate next to a large one."""
         size = np.max(np.abs(covariance), axis=(-2, -1))
         nothing = size == 0.0
         # a power of two: to divide by it rounds nothing
@@ -102,7 +103,7 @@ class Principal:
         return np.stack([first, vectors[:, 1] * e1[..., 0] - vectors[:, 0] * e1[..., 1]], axis=1)
 
     def rows(self, chosen: npt.NDArray[np.intp]) -> Principal:
-        """Return the axes of some rows."""
+        """Subset of the rows."""
         return Principal(self.large[chosen], self.small[chosen], self.direction[chosen])
 
 
@@ -119,7 +120,7 @@ _ROOT_2PI = np.sqrt(2.0 * np.pi)
 
 
 def angles_needed(axes: Array, centre: Array) -> Array:
-    """Return how many angles resolve discs with half axes ``(N, 2)`` about ``-centre``, shape ``(N,)``.
+    """Return the number of angles ``(N,)`` that resolve discs with half axes ``(N, 2)`` about ``-centre``.
 
     A second axis last: the one with the smaller deviation.
     """
@@ -129,7 +130,7 @@ def angles_needed(axes: Array, centre: Array) -> Array:
 
 
 def disc_by_edge(axes: Array, centre: Array, count: int, *, central: bool = False) -> tuple[Array, Array, Array]:
-    """Chances in and out of discs about the origin, and ``dP / d log radius``, by ``count`` angles on the edge.
+    """Probabilities in and out of discs about the origin, and ``dP / d log radius``, by ``count`` angles on the edge.
 
     ``axes`` and ``centre`` ``(N, 2)``: radius and mean over standard deviation along both principal axes. ``count`` is
     at least `angles_needed`, a multiple of four; where the means are zero (``central``) a quarter of the edge says all.
@@ -178,7 +179,7 @@ def _mean_decay(half: Array) -> Array:
 
 
 def _poles(axes: Array, centre: Array, count: int) -> Array:
-    """Return what the poles add to the sum of ``exp(-h)``: one for each root of ``z1 + i z2`` in ``exp(it)``.
+    """Pole corrections of the trapezoidal sum of ``exp(-h)``: one for each root of ``z1 + i z2`` in ``exp(it)``.
 
     Over the ``n`` roots of -1 the mean of ``z / (z - c)`` is ``1 / (1 + c**n)``.
     """
@@ -229,7 +230,7 @@ _CHANGE = 12.0  # wide standard deviations by which a chord may change for 64 no
 
 
 def _window(narrow: Array, beside: Array) -> tuple[Array, Array, Array, Array]:
-    """Angle of the mean, ends of the window about it, and how far the mean lies beyond the edge, over the radius.
+    """Angle of the mean, window about it, and relative distance of the mean beyond the edge.
 
     ``narrow`` and ``beside`` are the deviation and the mean's distance (not negative) over the radius. With ``1 - cos
     c = d`` the difference of two angles is ``2 asin`` of a quotient of products.
@@ -248,7 +249,7 @@ def _window(narrow: Array, beside: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def chords_resolve(axes: Array, centre: Array) -> npt.NDArray[np.bool_]:
-    """Whether 64 nodes follow the chords of each disc; arguments as for `disc_by_chords`."""
+    """Whether 64 nodes resolve the chords of each disc; arguments as for `disc_by_chords`."""
     narrow = 1.0 / axes[:, 1]
     start, low, high, _ = _window(narrow, np.abs(centre[:, 1]))
     ends = np.sin(start + low), np.sin(start + high)
@@ -297,7 +298,7 @@ _UNITS, _SHARES = np.polynomial.legendre.leggauss(16)
 
 @dataclass(frozen=True)
 class Chances:
-    """What is known of N deviations and discs: ``P`` to rounding, ``1 - P`` to ten digits, ``dP / d log radius``.
+    """Probabilities of N deviations in discs: ``P`` to rounding, ``1 - P`` to ten digits, ``dP / d log radius``.
 
     NaN where that needs another integral.
     """
@@ -308,7 +309,7 @@ class Chances:
 
 
 def disc_chances(principal: Principal, means: Array, radii: Array, segments: Array | None = None) -> Chances:
-    """Chances of ``N`` deviations with means ``(N, 2)`` to lie in, and out of, discs about the origin.
+    """Probabilities of ``N`` deviations with means ``(N, 2)`` in, and out of, discs about the origin.
 
     Uniform parts run from ``-segment`` to ``segment``, ``(N, 2)``.
     """
@@ -340,7 +341,7 @@ def disc_chances(principal: Principal, means: Array, radii: Array, segments: Arr
 
 @dataclass(frozen=True)
 class _Discs:
-    """Discs and laws along the principal axes: radius, mean and end of the segment over the deviations, ``(N, 2)``.
+    """Discs and laws in principal axes: radius, mean and segment end over the deviations, ``(N, 2)``.
 
     ``over_radius``: the mean, along the second axis over the radius. ``far``: which have a segment longer than a
     deviation; ``short``: rows of those with one that is not, they are sums of others. ``which`` of `NODES` resolves
@@ -388,7 +389,7 @@ class _Discs:
 
 
 def _fill(result: Array, chance: Callable[..., Found], chosen: npt.NDArray[np.bool_], cells: int) -> None:
-    """Fill in the rows that are chosen, so many at a time that their arrays stay in cache."""
+    """Compute the chosen rows in chunks that fit the cache."""
     rows = np.flatnonzero(chosen)
     step = max(_CELLS // cells, 1)
     for start in range(0, len(rows), step):
@@ -397,18 +398,18 @@ def _fill(result: Array, chance: Callable[..., Found], chosen: npt.NDArray[np.bo
 
 
 class Region(Protocol):
-    """A convex region about the origin, or ``N`` of one kind, in a frame whose second axis runs along the chords.
+    """Protocol of convex regions about the origin, in a frame whose second axis runs along the chords.
 
     The coordinate ``t`` parametrises the first axis, ``x = x(t)``, so that the chords' ends are smooth in ``t``
     between the breaks.
     """
 
     def breaks(self) -> Array:
-        """Return ends and kinks in ``t``, ascending, shape ``(N, B)``."""
+        """Return the ends and kinks in ``t``, ascending, shape ``(N, B)``."""
         ...
 
     def abscissa(self, owner: npt.NDArray[np.intp], t: Array) -> tuple[Array, Array]:
-        """Return ``x(t)`` and ``dx/dt`` of region ``owner``, in the shape of ``t`` (first axis: ``owner``)."""
+        """Abscissa ``x(t)`` and ``dx/dt`` of region ``owner``, in the shape of ``t`` (first axis: ``owner``)."""
         ...
 
     def parameter(self, x: Array) -> Array:
@@ -518,7 +519,7 @@ _ROWS = 512  # integrals whose breakpoints are found together: they take some me
 
 @dataclass(frozen=True)
 class Frame:
-    """Normal parts in the frames of their chords: ``x`` normal, ``y`` given ``x`` normal about a line.
+    """Normal laws in the frames of their chords: ``x`` normal, ``y`` given ``x`` normal about a line.
 
     Rows of ``rotation`` are the two axes in the plane; ``spread`` is the standard deviation of ``x``; ``y = slope x``
     on the average, with the deviation ``remainder`` about it, and the uniform part's ``half_width`` along it.
@@ -551,14 +552,14 @@ class Frame:
         return cls(np.stack([first, second], axis=-2), np.sqrt(variance), slope, np.sqrt(remainder), half)
 
     def rows(self, chosen: npt.NDArray[np.intp]) -> Frame:
-        """Return the frames of some rows."""
+        """Subset of the rows."""
         return Frame(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def planar_probability(
     covariance: Array, means: Array, sizes: Array, *, shape: str, segment: Array | None = None, outside: bool = False
 ) -> Array:
-    """``(N,)`` probability of planar deviations to lie in, or ``outside`` of, their regions, integrated directly.
+    """Probability ``(N,)`` that planar deviations lie in, or ``outside`` of, their regions, integrated directly.
 
     Covariance ``(..., 2, 2)`` of the normal part, means ``(N, 2)``, diameters ``(N, 1)`` of a ``"circle"`` or sides
     ``(N, 2)`` of a ``"rectangle"``, finite and positive; the uniform part runs from ``-segment`` to ``segment``,
@@ -648,7 +649,7 @@ def _integrate(
 
 
 def _ladder_steps(frame: Frame, shape: str, sizes: Array) -> npt.NDArray[np.intp]:
-    """Return steps of the graded panels of each row; 0 where even panels do, as the normal part is wide."""
+    """Return the number of steps of the graded panels of each row; 0 where even panels suffice."""
     scales = np.where(
         frame.remainder > 0.0,
         np.minimum(frame.spread, frame.remainder / np.maximum(np.abs(frame.slope), 1.0)),
@@ -740,7 +741,7 @@ _CLOSE = 1e-14  # relative: less than the rounding of the failing probability mo
 
 
 def disc_clearances(covariance: Array, means: Array, log_failing: float, segments: Array | None = None) -> Array:
-    """``(N,)`` diameters at which discs about the origin fail with a probability; NaN where no cheap integral does.
+    """Diameters ``(N,)`` at which discs about the origin have a failing probability; NaN where not applicable.
 
     Arguments as for `disc_chances`; ``log_failing``, the logarithm of that probability, is negative and finite.
     """

@@ -1,4 +1,4 @@
-"""The thermal part of an error, known by its bounds only: a zonotope (Eqs 14-15) and what is uniform on it (16, 19).
+"""Thermal displacement with bounds only: zonotope (Eqs 14-15) and uniform distributions on it (16, 19).
 
 The displacement is ``sum of g_i delta_i`` with ``lower_i <= delta_i <= upper_i``, the ``g_i`` being the sensitivities.
 The set of its values is a zonotope: in a plane a polygon whose edges are the ``g_i`` themselves (the parallel lines of
@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 
 @dataclass(frozen=True)
 class Parallelotope:
-    """One piece of a spread: ``centre + generators @ u`` with the ``u`` independent and uniform on [-1, 1].
+    """Piece of a zonotope: ``centre + generators @ u`` with ``u`` independent and uniform on [-1, 1].
 
     ``weight``: share of the spread's probability; generators are half edges ``(d, m)``, none zero, longest first.
     """
@@ -31,7 +31,7 @@ class Parallelotope:
 
 @dataclass(frozen=True)
 class UniformSpread:
-    """A displacement known only by its bounds, randomised with the uniform distribution (section 4 of the paper).
+    """Uniform distribution of a displacement known by its bounds (section 4 of the paper).
 
     Use the constructors `segment`, `box` and `zonotope`; the fields are what they have in common.
 
@@ -142,7 +142,7 @@ class UniformSpread:
 def generator_bounds(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Check columns ``(d, k)`` and their bounds, scalars or ``(k,)``, finite and ascending; return all as arrays."""
+    """Validate columns ``(d, k)`` and their bounds, scalars or ``(k,)``; return all as arrays."""
     columns = np.asarray(generators, dtype=float)
     if columns.ndim != 2:
         raise ValueError(f"generators must be columns, shape (d, k), not {columns.shape}")
@@ -207,7 +207,7 @@ _PARALLEL = 1e-12
 
 @dataclass(frozen=True)
 class Zonotope:
-    """All displacements within the bounds, in a plane or in space; in the unit of ``generators * bounds``.
+    """Zonotope: all displacements within the bounds, in a plane or in space.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ class Zonotope:
 
 
 def zonotope(generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Zonotope:
-    """Build the polygon (Eqs 14-15) or the polyhedron of all displacements within the bounds.
+    """Zonotope of all displacements within the bounds: polygon (Eqs 14-15) or polyhedron.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ def zonotope(generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLi
 def polygon_in_plane(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike, plane: npt.ArrayLike | str
 ) -> Zonotope:
-    """Project the displacements on a plane, and return their polygon there.
+    """Projection of the displacements on a plane, and its polygon.
 
     Parameters
     ----------
@@ -436,7 +436,7 @@ def _polygon(columns: Array, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _directions(edges: Array) -> tuple[Array, int]:
-    """Return unit vectors of the edges' directions ``(n, d)``, then those at right angles to all, and their rank."""
+    """Return the unit vectors ``(n, d)`` of the edges' directions, then those orthogonal to all, and their rank."""
     basis = np.array([direction for direction, _ in _groups(edges)]).reshape(-1, len(edges))
     rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if len(basis) else 0
     return np.concatenate([basis, np.linalg.svd(basis)[2][rank:] if len(basis) else np.eye(len(edges))]), rank

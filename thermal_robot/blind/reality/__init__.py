@@ -1,4 +1,4 @@
-"""A robot on springs in MuJoCo, with its faults and instrument: takes nothing from the program it puts to the test.
+"""Independent simulation of a robot on springs in MuJoCo, with faults and an instrument.
 
 It imports of the package only what a case is and the exception for a user's file. What it shares with the program
 nevertheless (formats.md, Newton's law of cooling, Hooke's) is listed in docs/blind.md.

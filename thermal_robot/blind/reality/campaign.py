@@ -1,4 +1,4 @@
-"""One case becomes a folder with a campaign, or several and a list of them, and the answers that stay outside it.
+"""Generation of a case: one or several campaigns, and the answers that stay outside.
 
 Of several campaigns of one robot: it errs alike on all days, but for one number that is another from a day on, or grows
 in a straight line of time. Of a fleet: a fault that all its robots share, or those of one hall, and faults of single
@@ -51,7 +51,7 @@ _TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment t
 
 
 def make(case: Case, folder: Path) -> dict[str, Any]:
-    """Write a case's campaign, or its several campaigns, into a folder and return the answers.
+    """Generate a case's campaign, or its several campaigns, in a folder and return the answers.
 
     The folder gets campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers);
     everything that is drawn follows from the case's seed.
@@ -111,7 +111,7 @@ def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -
 
 
 def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None:
-    """Add the columns that a fault follows, and now and then the same columns where nothing does."""
+    """Add the columns that a fault follows, and at random the same columns as decoys."""
     if "humidity" in wants and "humidity" not in setting.extra:
         setting.extra["humidity"] = humidity(setting.samples, rng)
     if "motor_temperature" in wants or rng.random() < 0.2:
@@ -124,7 +124,7 @@ def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None
 
 
 def _gears(setting: Setting, done: AtWork) -> dict[str, float]:
-    """Return the ratios that the file must state for wheels that turn with the motor to be seen."""
+    """Gear ratios that the file must state for errors of the motor's side to be testable."""
     ratios = {float(v) for fault, values in done if fault.name == "transmission_error" for v in values[:, 4]} - {1.0}
     return {name: ratio for ratio in sorted(ratios) for name in setting.world.names}
 
@@ -149,9 +149,10 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
 
 
 def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.random.Generator) -> Array:
-    """Draw a fault and make it as large as the case asks.
+    """Draw a fault and scale it to the size that the case asks for.
 
-    Where the cause is not in the library, taken from it, or hidden, that counts which no two other effects imitate.
+    Where the cause is outside the library, removed from it, or hidden, the size is that after the best imitation by two
+    other effects.
     """
     wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
     rough = sized(gauge, fault, fault.draw(gauge.setting, rng), wanted)
@@ -166,7 +167,7 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
 
 
 def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
-    """Draw several effects again where one of them leaves nothing that another could not have done as well."""
+    """Redraw (:class:`Unseen`) where one of several effects could be imitated by another."""
     if len(done) < 2:
         return
     for fault, values in done:
@@ -177,7 +178,7 @@ def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
 
 
 def _background(case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, rng: np.random.Generator) -> AtWork:
-    """All the other effects that are always there, each far below the noise."""
+    """All other effects, each far below the noise."""
     if not case.background:
         return []
     named, quiet = {fault.name for fault in main}, []
@@ -196,9 +197,9 @@ _SENSORS = ("robot", "links")
 
 
 def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:
-    """Draw campaigns of positions; where base and target are nobody knows.
+    """Draw campaigns of positions with unknown base and target.
 
-    Alike are the instrument's noise, whether it is stated, and what is recorded of the links.
+    All days share the instrument's noise, whether it is stated, and the temperature sensors.
     """
     noise, stated = float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED)
     sensor, days = str(rng.choice(_SENSORS)), []
@@ -224,7 +225,7 @@ _DRAWS = 20
 def draw_fleet(
     case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
 ) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
-    """Draw which robot has what: labels by name, what is at work in each robot, the truth; a day is one of each."""
+    """Draw the faults of a fleet: labels by name, faults of each robot, truth; a day is one robot."""
     count = len(days)
     robots = [f"r{number + 1:02d}" for number in range(count)]
     # halls of equal size, but for one
@@ -250,7 +251,7 @@ def draw_fleet(
 
 
 def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Generator) -> tuple[Spot, Array]:
-    """Draw a fault at one place where no fault of its kind is yet, as large as the case asks."""
+    """Draw a fault at one place that has none of its kind, scaled to the size that the case asks for."""
     fault, gauge = FAULTS[name], day.gauge
     for _ in range(_DRAWS):
         values = fault.draw(gauge.setting, rng)
@@ -277,7 +278,7 @@ _LARGEST = 10.0  # × noise: a change that must leave more to be told is not ask
 
 
 def make_several(case: Case, several: Several, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
-    """Write the campaigns of a case into a folder, and return its answers."""
+    """Generate the campaigns of a case in a folder, and return its answers."""
     count = int(rng.integers(several.campaigns[0], several.campaigns[1] + 1))
     days = draw_days(case, world, count, rng)
     if case.kind == "fleet":
@@ -296,7 +297,7 @@ def make_several(case: Case, several: Several, world: World, rng: np.random.Gene
 def _followed(
     case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
 ) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
-    """Return dates, what is at work on each day, and the truth."""
+    """Draw dates, faults on each day, and the truth."""
     first, noise = days[0].gauge, days[0].instrument.noise
     done: AtWork = []
     for name in case.effects:
@@ -321,7 +322,7 @@ def _followed(
 def _moving(
     several: Several, days: Sequence[Day], done: AtWork, time: Array, rng: np.random.Generator
 ) -> tuple[list[AtWork], dict[str, Any]]:
-    """Let one number of a fault change; return what is at work on each day, and what changed."""
+    """Change one number of a fault over time; return the faults on each day, and the change."""
     own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
     fault, values = done[own]
     others = [item for k, item in enumerate(done) if k != own]
@@ -338,7 +339,7 @@ def _moving(
 
 
 def _tells(several: Several, days: Sequence[Day], spot: Spot, values: Array, others: AtWork) -> float:
-    """Return the deviation in which a change is counted: of a difference, or of the first campaign."""
+    """Return the standard deviation of a change, of a difference or of the first campaign."""
     noise = days[0].instrument.noise
     told = days[:2] if several.how == "changes" else days[:1]
     found = [deviation(day.gauge, spot, values, others, noise) for day in told]

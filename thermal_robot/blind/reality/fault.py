@@ -1,4 +1,4 @@
-"""Faults: how large each is drawn, what it does, which answers about it are right; and those of formats.md."""
+"""Faults of the trial: size distribution, displacement, and right answers in the words of formats.md."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Fault:
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def scaled(self, values: Array, factor: float) -> Array:
-        """Return values of another size."""
+        """Scale the size of a fault's values."""
         result = values * factor
         for column, _ in self.fixed:
             result[:, column] = values[:, column]
@@ -72,24 +72,24 @@ class Fault:
 
 
 def joints(setting: Setting) -> list[Place]:
-    """Return every joint."""
+    """All joints."""
     return [("joint", name) for name in setting.world.names]
 
 
 def segments(setting: Setting) -> list[Place]:
-    """Return the link of every segment."""
+    """Link of every segment."""
     return [("link", link) for link in setting.world.links]
 
 
 def parents(setting: Setting) -> list[Place]:
-    """Return the link that carries each joint of the chain."""
+    """Link that carries each joint of the chain."""
     return [("link", joint.parent) for joint in setting.world.chain]
 
 
 def adds(
     to: str, name: str, draw: Draw, what: Does, places: Callable[[Setting], Sequence[Place]], **more: Any
 ) -> Fault:
-    """Return a fault that adds something to one attribute of the body."""
+    """Fault that adds to one attribute of the body."""
 
     def act(body: Body, setting: Setting, values: Array) -> None:
         setattr(body, to, getattr(body, to) + what(setting, values))
@@ -98,12 +98,12 @@ def adds(
 
 
 def in_joints(name: str, draw: Draw, err: Does, **more: Any) -> Fault:
-    """Return a fault of few joints, of an error in each row and joint, (N, n) or what broadcasts to it, rad or m."""
+    """Fault of few joints by an error in each row and joint, (N, n) or broadcastable, rad or m."""
     return adds("joints", name, draw, err, joints, few=True, **more)
 
 
 def at(where: str, name: str, draw: Draw, twist: Does, **more: Any) -> Fault:
-    """Return a fault of the ``base`` or the ``tool``, of (N, 6) or (1, 6) translations (m) and rotation vectors."""
+    """Fault of the ``base`` or the ``tool`` by twists (N, 6) or (1, 6): translations (m) and rotation vectors."""
 
     def act(body: Body, setting: Setting, values: Array) -> None:
         body.move(where, twist(setting, values))
@@ -112,12 +112,12 @@ def at(where: str, name: str, draw: Draw, twist: Does, **more: Any) -> Fault:
 
 
 def own_position(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Return that joint's own position."""
+    """Position of that joint as the quantity that it follows."""
     return [name for _, name in places]
 
 
 def follows(*columns: str) -> Quantities:
-    """Return the same columns wherever it sits."""
+    """Fixed quantities, whatever the place."""
     return lambda setting, places: columns
 
 
@@ -126,30 +126,30 @@ clock = follows("time", "order")
 
 
 def weights(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Return what the moments of gravity follow: the payload, and where the joints stand."""
+    """Quantities that moments of gravity follow: payload, and joint positions."""
     return ["payload", *setting.world.names]
 
 
 def warmths(setting: Setting, places: Sequence[Place] = ()) -> list[str]:
-    """Return all temperatures that may be recorded of a robot."""
+    """All temperatures that may be recorded of a robot."""
     return ["temperature", *(f"temperature.{link}" for link in dict.fromkeys(setting.world.links))]
 
 
 def each_joint(label: str, of: Callable[[Array], Array] = lambda values: np.abs(values[:, 0])) -> Known:
-    """Return one parameter a joint: a function of the (n, D) values, the size of the first where it is left out."""
+    """One parameter for each joint: a function of the (n, D) values, by default the size."""
     return lambda setting, values: {
         f"{label}, {name}": float(value) for name, value in zip(setting.world.names, of(values), strict=True)
     }
 
 
 def twist(where: str) -> Known:
-    """Return the components of a twist in the first row of the values: translation, then rotation."""
+    """Components of a twist in the first row of the values: translation, then rotation."""
     names = [f"{kind} {axis}, {where}" for kind in ("translation", "rotation") for axis in "xyz"]
     return lambda setting, values: dict(zip(names, values[0].tolist(), strict=True))
 
 
 def some(size: float, numbers: int = 1, *, first: bool = True, positive: bool = False, turning: bool = False) -> Draw:
-    """Draw values for one to three joints but the last; the first is left out, too, where frames would hide it.
+    """Draw values of one to three joints, not the last, and not the first where frames would hide it.
 
     ``turning`` leaves out those that slide.
     """
@@ -175,7 +175,7 @@ Number = Callable[[Setting, int, np.random.Generator], float]
 
 
 def one(*numbers: Number) -> Draw:
-    """Draw one joint, never the first or the last, and numbers for it; the first one is its size."""
+    """Draw one joint, neither the first nor the last, and its values; the first value is its size."""
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
         values = np.zeros((setting.world.n, len(numbers)))
@@ -187,22 +187,22 @@ def one(*numbers: Number) -> Draw:
 
 
 def milli(setting: Setting, j: int, rng: np.random.Generator) -> float:
-    """Return a thousandth, of either sign."""
+    """Draw 10⁻³ with a random sign."""
     return float(rng.choice([-1e-3, 1e-3]))
 
 
 def part(low: float, high: float) -> Number:
-    """Draw a number between two."""
+    """Draw a uniform number between two."""
     return lambda setting, j, rng: float(rng.uniform(low, high))
 
 
 def within(low: float, high: float) -> Number:
-    """Draw a position of the joint between two quantiles of where it goes."""
+    """Draw a joint position between two quantiles of its positions."""
     return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))
 
 
 def waves(name: str, orders: tuple[float, float]) -> Fault:
-    """Return the fault of one joint that errs by a wave of its own position, of an order drawn between two.
+    """Fault of one joint by a wave of its own position, of an order drawn between two.
 
     Teeth, balls or a motor's wheel come round; a joint that slides has rad/m. Evenly over the order's logarithm.
     """
@@ -243,7 +243,7 @@ _HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
 def _wheels(setting: Setting, values: Array) -> Array:
-    """Read an angle on a disc whose centre is off, and turn an oval wheel: a ray of a circle, not a sine.
+    """Eccentric encoder disc and oval wheel, in exact geometry.
 
     The disc turns with the joint, or ``ratio`` times as fast with its motor.
     """
@@ -256,7 +256,7 @@ def _wheels(setting: Setting, values: Array) -> Array:
 
 
 def _draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw how far discs are off, across and along, how oval wheels are, their phase (rad) and ratio.
+    """Draw eccentricities of discs, across and along, ovality of wheels, their phase (rad) and ratio.
 
     A joint that slides has no disc of its own, only its motor has: its ratio is in rad/m.
     """
@@ -269,7 +269,7 @@ def _draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _harmonics(setting: Setting, values: Array) -> dict[str, float]:
-    """Fourier's amplitudes of wheels: a disc off by e adds eᵏ/k of order k, an oval one nearly order 2."""
+    """Fourier amplitudes of the wheels: a disc of eccentricity e adds eᵏ/k in order k, an oval one nearly order 2."""
     found = {}
     for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
         disc = complex(along, -across)
@@ -281,7 +281,7 @@ def _harmonics(setting: Setting, values: Array) -> dict[str, float]:
 
 
 def _play(setting: Setting, values: Array) -> Array:
-    """Lay teeth on the side to which the torque through them presses.
+    """Backlash: teeth rest on the side to which the torque through them presses.
 
     A joint that arrived on its way s = ±1 is pushed there against dry friction F (N·m) while gravity wants the
     torque τ: its teeth carry τ + F s. The grease between them is pressed out gradually, over a share of F. One that
@@ -297,7 +297,7 @@ def _play(setting: Setting, values: Array) -> Array:
 
 
 def _draw_play(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw half of each play, rad or m; friction, N·m or N; and the share of it over which teeth change sides.
+    """Draw half of each backlash, rad or m; friction, N·m or N; and the share of it over which teeth change sides.
 
     Gears of one arm are of one make and one grease: friction is one share of what each is built to hold, but for a
     fifth. Where gravity has its way in more than three rows of four, hardly anything is left of the play but an offset
@@ -313,7 +313,7 @@ def _draw_play(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def ratings(setting: Setting) -> Array:
-    """Return what each joint's gear is built to hold, (n,) N·m or N: arm and payload, stretched out level.
+    """Rated torque (n,) of each joint's gear, N·m or N: arm and payload, stretched out level.
 
     The arm's own weight counts half way out, the payload's at the tool; a joint that slides lifts them.
     """
@@ -328,7 +328,7 @@ def ratings(setting: Setting) -> Array:
 
 
 def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw the compliance of every joint; now and then one worn gear among stiff ones."""
+    """Draw the compliance of every joint; at random one worn gear among stiff ones."""
     values = np.abs(rng.normal(1.0, 0.5, (setting.world.n, 1))) * 1e-5
     if rng.random() < 0.4:  # one worn gear
         values *= 0.05
@@ -338,7 +338,7 @@ def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _servo(setting: Setting, values: Array) -> Array:
-    """Follow the command late, dragged by dry friction.
+    """Servo lag: delay and dry friction.
 
     Of the delay T a share p is the loop's, which has a bandwidth, the rest the clock's, which is a dead time:
     exp(−(1 − p) T s) / (1 + p T s) = 1 − T s + ((1 + p²) / 2) T² s² − …
@@ -349,14 +349,14 @@ def _servo(setting: Setting, values: Array) -> Array:
 
 
 def _lags(setting: Setting, values: Array) -> dict[str, float]:
-    """Delay, friction and what acceleration does, of each joint."""
+    """Delay, friction and coefficient of acceleration of each joint."""
     delay, friction, loop = values.T
     each = (("delay", delay), ("friction", friction), ("effect of acceleration", (1.0 + loop**2) / 2.0 * delay**2))
     return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(setting.world.names, of, strict=True)}
 
 
 def _draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw each joint's delay, s, what friction leaves, rad or m, and the loop's share of the delay."""
+    """Draw each joint's delay, s, friction error, rad or m, and the loop's share of the delay."""
     erring = some(1.0)(setting, rng) != 0.0
     low, high = np.log(np.array([_DELAY, _DRAG])).T
     values = np.exp(rng.uniform(low, high, (setting.world.n, 2)))
@@ -364,14 +364,14 @@ def _draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _ticks(setting: Setting, values: Array) -> Array:
-    """Count in steps: the joint stands at the nearest one."""
+    """Quantisation: the joint stands at the nearest step."""
     step = np.abs(values[:, 0])
     known = np.where(step > 0.0, step, 1.0)
     return np.where(step > 0.0, np.round(setting.q / known) * step - setting.q, 0.0)
 
 
 def _scatter(setting: Setting, values: Array) -> Array:
-    """Scatter each joint anew at every visit: the same at any size, another in any campaign."""
+    """Random scatter of each joint at every visit; the same draw at any size, another in any campaign."""
     chance = np.random.default_rng(int(setting.time.sum() * 10) % 2**32)
     return np.asarray(chance.normal(size=setting.q.shape) * np.abs(values[:, 0]))
 
@@ -385,7 +385,7 @@ def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _strains(setting: Setting, values: Array) -> dict[str, float]:
-    """Only where each link's temperature is recorded: another sensor's kelvin is not the link's."""
+    """Strain per kelvin, only where each link's temperature is recorded."""
     if setting.sensor != "links":
         return {}
     placed = zip((setting.world.chain[k] for k in setting.world.segments), values[:, 0], strict=True)
@@ -393,19 +393,19 @@ def _strains(setting: Setting, values: Array) -> dict[str, float]:
 
 
 def _creep(setting: Setting, values: Array) -> Array:
-    """A stand or floor warms through towards a hall that has changed: Newton's law of cooling."""
+    """Warm-up of a stand or floor after a change of the hall's temperature: Newton's law of cooling."""
     grown = -np.expm1(-(setting.time - setting.time[0]) / values[0, 6])
     return np.asarray(grown[:, None] * values[0, :6])
 
 
 def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
-    """How far the base has gone in the last row that was measured."""
+    """Displacement of the base in the last measured row."""
     last = setting.time[setting.given][-1] - setting.time[0]
     return twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6]))
 
 
 def _tip(setting: Setting, values: Array) -> Array:
-    """A base on springs turns under the moment of all weights, about a point on the vertical through its origin."""
+    """Base on springs, tipped by the moment of all weights about a point on the vertical through its origin."""
     springs, depth = np.abs(values[0, :2]), values[0, 2]
     turn = np.column_stack([setting.overturning[:, :2] * springs, np.zeros(setting.samples)])
     return np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn])
@@ -418,7 +418,7 @@ def _draw_tip(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _tipped(setting: Setting, values: Array) -> dict[str, float]:
-    """The springs; and, where the base turns about a point below, how far the moment shifts it."""
+    """Spring compliances, and the base's shift by the moment about a lower point."""
     depth = float(values[0, 2])
     found = {}
     for axis, spring in zip("xy", np.abs(values[0, :2]).tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""One day of measurements: the instrument, how it scatters, which rows it spoils, and the files that it leaves."""
+"""Measurement of one day: instrument, noise, outliers, and the files of the campaign."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from thermal_robot.files import write_text
 
 @dataclass(frozen=True)
 class Instrument:
-    """One instrument and one target.
+    """Simulated instrument with its target and noise.
 
     Attributes
     ----------
@@ -54,27 +54,27 @@ class Instrument:
 
 @dataclass(frozen=True, eq=False)
 class Day:
-    """One campaign: what was commanded, and the instrument that measured the rows that are given."""
+    """Simulated campaign: commands, and the instrument that measures them."""
 
     setting: Setting
     instrument: Instrument
 
     @cached_property
     def gauge(self) -> Gauge:
-        """Measure of displacements on the rows that are given."""
+        """Sensitivity of the given rows to displacements."""
         known = self.instrument
         return Gauge(self.setting, self.rows, known.target, not known.base_known, not known.tool_known)
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """(M,) the rows that are given."""
+        """Row numbers (M,) that are given to the diagnosis."""
         return np.flatnonzero(self.setting.given)
 
 
 def measure(
     day: Day, faults: Sequence[tuple[Fault, Array]], rng: np.random.Generator
 ) -> tuple[Array, pd.DataFrame, list[int]]:
-    """Measure a robot with these faults.
+    """Simulate the measurement of a robot with faults.
 
     Returns (N, 3) where the target really is, m, the columns x, y, z (m) and, of a pose, the quaternion of the rows
     that are given, and the table's row numbers that are spoilt.
@@ -95,7 +95,7 @@ def measure(
 
 
 def registered(day: Day, position: Array, spoilt: Sequence[int]) -> Array:
-    """(N, 3) where the sound robot has the target after the unknown frames were fitted to (M, 3) measured positions.
+    """Position (N, 3) of the sound robot's target after registration to (M, 3) measured positions.
 
     Gauss–Newton from the true frames, spoilt rows left out; by least squares of the positions.
     """
@@ -122,7 +122,7 @@ def registered(day: Day, position: Array, spoilt: Sequence[int]) -> Array:
 def write_folder(
     folder: Path, case: Case, day: Day, measured: pd.DataFrame, gears: dict[str, float] | None = None
 ) -> None:
-    """Write campaign.toml, robot.urdf, measurements.csv and, where something is to be predicted, fresh.csv.
+    """Write campaign.toml, robot.urdf, measurements.csv and, with samples to predict, fresh.csv.
 
     Gears are the transmission ratios by joint.
     """
@@ -143,7 +143,7 @@ def write_folder(
 
 
 def conditions(setting: Setting) -> pd.DataFrame:
-    """Return commands and everything that is recorded beside the measurement, one row each: rad, mm, s, °C, kg."""
+    """Table of commands and all recorded conditions, one row each: rad, mm, s, °C, kg."""
     names = setting.world.names
     unit = np.where(setting.world.slides, 1e3, 1.0)  # a sliding joint's column is in mm, a turning one's in rad
     table = pd.DataFrame((setting.q * unit).round(9), columns=list(names))

@@ -1,4 +1,4 @@
-"""The day of a campaign: where the robot is sent, in which order, and how warm it and its hall become."""
+"""Conditions of a campaign: commands, their order, and temperatures of robot and hall."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ _MOTOR = (300.0, 3000.0)  # s for a motor to reach its temperature, from a wrist
 
 
 def time_constant(rng: np.random.Generator) -> float:
-    """Draw how fast a link follows its surroundings, s: ρ c d / h of a wall that is cooled on one side."""
+    """Draw the thermal time constant of a link, s: ρ c d / h of a wall cooled on one side."""
     return float(rng.uniform(*_HOLDS) * rng.uniform(*_WALL) / rng.uniform(*_FILM))
 
 
 def hall(time: Array, rng: np.random.Generator) -> Array:
-    """(N,) °C: air that swings and rises."""
+    """Air temperature (N,) °C: oscillation and drift."""
     swing = rng.uniform(1.0, 4.0) * np.sin(time / time[-1] * rng.uniform(1.5, 9.0) + rng.uniform(0, 6.0))
     return np.asarray(21.0 + swing + rng.uniform(-1.0, 5.0) * time / time[-1])
 
 
 def warmed(world: World, time: Array, air: Array, session: NDArray[np.int64] | None, rng: np.random.Generator) -> Array:
-    """(N, S) °C of each segment's link: it follows the air with a time constant of its own, and its motor warms it."""
+    """Link temperature (N, S) °C: first-order lag behind the air, with heat from the motor."""
     since = np.full_like(time, np.inf)  # without sessions the motors have been on for long
     for s in np.unique(session) if session is not None else ():  # cold at the start of each session
         rows = session == s
@@ -44,7 +44,7 @@ def warmed(world: World, time: Array, air: Array, session: NDArray[np.int64] | N
 
 
 def followed(time: Array, drive: Array, constant: float, start: float | None = None) -> Array:
-    """Integrate T' = (drive − T) / constant, (N,) °C, between rows in steps of a second on a drive that runs straight.
+    """First-order lag (N,) °C, T' = (drive − T) / constant, in steps of a second on a piecewise linear drive.
 
     Time, increasing, and constant are in s; ``start`` is the temperature at the first row, the drive's where absent.
     """
@@ -63,7 +63,7 @@ _WANDERS = 9.0  # %
 
 @dataclass
 class Setting:
-    """What was commanded and what it was like, N rows in the order in which they were measured.
+    """Commands and conditions of N rows, in the order of measurement.
 
     Attributes
     ----------
@@ -111,17 +111,17 @@ class Setting:
 
     @property
     def samples(self) -> int:
-        """N."""
+        """Number of rows N."""
         return len(self.time)
 
     @cached_property
     def overturning(self) -> Array:
-        """(N, 3) moment of the sound robot's weight and payload about the root frame's origin, N·m."""
+        """Overturning moment (N, 3) of the sound robot's weight and payload about the root frame's origin, N·m."""
         return self.world.overturning(self.q, self.payload)
 
     @property
     def before(self) -> NDArray[np.int64]:
-        """(N,) where the robot came from: the row before among those that are measured, or among the others.
+        """Index (N,) of the row visited before, among the measured or among the other rows.
 
         The first one's is itself.
         """
@@ -142,7 +142,7 @@ def draw_setting(
     sensor: str | None = None,
     sessions: bool = False,
 ) -> Setting:
-    """Draw one campaign's commands and conditions, of rows that are measured and ``fresh`` ones scattered among them.
+    """Draw commands and conditions of one campaign, with ``fresh`` rows scattered among the measured ones.
 
     Each pose is measured so many ``visits``, drawn between the two, in mixed order; in ``sessions`` the robot is
     switched off once or twice. The sensor, as in :class:`Setting`, is drawn where absent.
@@ -189,14 +189,14 @@ def draw_setting(
 
 
 def humidity(samples: int, rng: np.random.Generator) -> Array:
-    """(N,) % of the hall's air: it wanders by some 9 % in a day, however many rows that has."""
+    """Relative humidity (N,) % of the hall's air: a random walk of some 9 % a day."""
     return np.round(45.0 + np.cumsum(rng.normal(0.0, _WANDERS / np.sqrt(samples), samples)), 1)
 
 
 def _visits(
     world: World, samples: int, fresh: int, visits: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.bool_], Array, NDArray[np.int64] | None]:
-    """(N,) rows that are measured, (N, n) commands in the order of visits, and which pose each is if some are repeated.
+    """Mask (N,) of measured rows, commands (N, n) in the order of visits, and pose numbers if some repeat.
 
     The first row is measured: from it drift counts. What is to be predicted is never a pose that was measured.
     """
@@ -211,7 +211,7 @@ def _visits(
 
 
 def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Array, NDArray[np.int64] | None]:
-    """(N,) s from the first row on, and the number of each row's session where the robot rests in between."""
+    """Time (N,) s from the first row on, and the session number of each row."""
     length = rng.uniform(1.5, 6.0) * 3600.0
     steps = rng.gamma(4.0, 1.0, samples)
     time = np.cumsum(steps) - steps[0]
@@ -224,7 +224,7 @@ def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Arra
 
 
 def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.random.Generator) -> Array:
-    """(N, S) °C of links that are such that the sensor that there is says something of them."""
+    """Link temperatures (N, S) °C of a robot for which the available sensor is informative."""
     if sensor == "robot":  # one casting: its links warm nearly alike, or one sensor would be of no use
         common = links.mean(axis=1, keepdims=True)
         return np.asarray(common + 0.06 * (links - common))
@@ -234,7 +234,7 @@ def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.rando
 
 
 def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
-    """(count, n) within a share of the limits; the third of the poses that is nearest to the root is left out."""
+    """Random commands (count, n) within a share of the limits, without the third nearest to the root."""
     lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
     middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
     drawn = rng.uniform(middle - half, middle + half, (2 * count + 60, world.n))

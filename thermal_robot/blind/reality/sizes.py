@@ -1,4 +1,4 @@
-"""How large a fault is, what no other fault can imitate, and how well a campaign tells a change of one number of it."""
+"""Identifiability of faults: size, imitation by other faults, and detectability of a change."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _NEAR = 0.01  # of a size, as a share of it
 
 
 class Unseen(Exception):
-    """A fault leaves nothing in the campaign that was drawn for it."""
+    """A fault has no effect on the measurements of its campaign."""
 
 
 @dataclass
 class Gauge:
-    """Measures displacements of the target on the (M,) rows that are given to the diagnosis.
+    """Displacements of the target on the (M,) rows given to the diagnosis, aligned to unknown frames.
 
     Attributes
     ----------
@@ -55,17 +55,17 @@ class Gauge:
         return slopes(self.setting.world, self.setting.q[self.rows], self.setting.payload[self.rows], self.target)
 
     def moved(self, fault: Fault, values: Array) -> Array:
-        """(3M,) displacement of the target by one fault alone."""
+        """Displacement (3M,) of the target by one fault alone."""
         return (place(self.setting, [(fault, values)], self.target, rows=self.rows)[0] - self.sound).ravel()
 
     def slope(self, fault: Fault, values: Array) -> Array:
-        """(3M,) the same to first order, a thousand times as fast."""
+        """First-order displacement (3M,) of the target by one fault alone."""
         body = self.setting.world.sound(self.setting.samples)
         fault.act(body, self.setting, values)
         return (self.slopes.place(body.take(self.rows)) - self.sound).ravel()
 
     def left(self, moved: Array) -> Array:
-        """(3M,) or (3M, K) what remains of displacements after alignment."""
+        """Residual (3M,) or (3M, K) of displacements after alignment."""
         return np.asarray(moved - self.frames @ (self.frames.T @ moved))
 
     def rms(self, moved: Array) -> float:
@@ -73,11 +73,11 @@ class Gauge:
         return float(np.sqrt((moved**2).mean()))
 
     def leaves(self, fault: Fault, values: Array) -> float:
-        """Rms per axis, m, that one fault alone leaves after alignment."""
+        """Residual rms per axis, m, of one fault alone after alignment."""
         return self.rms(self.left(self.moved(fault, values)))
 
     def basis(self, fault: Fault) -> Array:
-        """(3M, K) orthonormal: all that this kind of fault can do beyond the frames, to first order."""
+        """Orthonormal basis (3M, K) of all displacements by this kind of fault beyond the frames, to first order."""
         if fault.name in self.bases:
             return self.bases[fault.name]
         draw = fault.draw(self.setting, np.random.default_rng(0))
@@ -101,7 +101,7 @@ class Gauge:
         return found
 
     def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
-        """Rms per axis that other kinds of fault leave of a displacement at their best, one or several ``together``."""
+        """Residual rms per axis of a displacement after the best imitation by one or several (``together``) faults."""
         left = self.left(moved)
         known = [FAULTS[name] for name in others if name != fault.name and not FAULTS[name].random]
         bases = {other.name: self.basis(other) for other in known if testable(other, self)}
@@ -115,7 +115,7 @@ class Gauge:
 
 
 def testable(fault: Fault, gauge: Gauge) -> bool:
-    """Whether this campaign lets a fault of this kind be seen."""
+    """Whether this campaign can reveal a fault of this kind."""
     setting = gauge.setting
     known = {
         "moving": setting.moving,
@@ -129,9 +129,9 @@ def testable(fault: Fault, gauge: Gauge) -> bool:
 
 
 def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
-    """Scale values until what they leave after alignment is as wanted; a few rounds, as faults are nearly linear.
+    """Scale values until the residual after alignment has the wanted size.
 
-    An encoder's steps are not: of the rounds the one that comes nearest counts.
+    Displacements are nearly linear in the values, but for an encoder's steps; the nearest iteration is returned.
     """
     nearest = np.inf, values
     for _ in range(_ROUNDS):
@@ -146,7 +146,7 @@ def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
 
 
 def shares(gauge: Gauge, fault: Fault, values: Array) -> list[tuple[Place, int, float]]:
-    """Return each place of a fault with its number and the rms that it alone leaves, largest first."""
+    """Places of a fault with their numbers and residual rms, largest first."""
     found = []
     for p, where in enumerate(fault.places(gauge.setting)):
         alone = np.zeros_like(values)
@@ -164,7 +164,7 @@ def place(
     instrument: Array | None = None,
     rows: NDArray[np.int64] | None = None,
 ) -> tuple[Array, Array]:
-    """(N, 3) positions of the target and (N, 3, 3) orientations with these faults, in the instrument's frame.
+    """Target positions (N, 3) and orientations (N, 3, 3) with these faults, in the instrument's frame.
 
     ``instrument`` is the (4, 4) pose of the robot's root in it; where it is left out the two are one. ``rows`` are all
     where they are left out.
@@ -196,9 +196,9 @@ def truth(
     background: Sequence[tuple[Fault, Array]],
     noise: float,
 ) -> dict[str, Any]:
-    """Return the truth of :mod:`thermal_robot.blind.cases`, without the rows that are spoilt.
+    """Truth in the format of :mod:`thermal_robot.blind.cases`, without the outliers.
 
-    Of faults that are asked for, and of those that are always there; ``noise`` is one sigma per axis, m.
+    It covers the faults asked for and those in the background; ``noise`` is one sigma per axis, m.
     """
     parts: dict[str, Any] = {}
     answers: list[Place] = []
@@ -233,7 +233,7 @@ def truth(
 
 
 def near(world: World, places: Sequence[Place]) -> list[Place]:
-    """Return places and those beside them: along the chain, base, link, joint, link, joint, ... link, tool.
+    """Places and their neighbours along the chain: base, link, joint, link, ..., tool.
 
     A joint's are the two links that it connects and the joint before and after; those of a link the joints at its ends
     and the links beyond them. Links that no joint moves against each other are one.
@@ -250,7 +250,7 @@ def near(world: World, places: Sequence[Place]) -> list[Place]:
 
 
 def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[Place]:
-    """Name the joints too: a displaced joint placement is as much the joint's as it is the link's that carries it."""
+    """Add the joints to displaced placements, which are as much the joint's as the link's."""
     chain = setting.world.chain
     if len(fault.places(setting)) != len(chain) or fault.places(setting)[0][0] != "link":
         return []
@@ -279,25 +279,25 @@ class Spot:
     number: int
 
     def moved(self, values: Array, by: float) -> Array:
-        """Return values with this number larger."""
+        """Values with this number increased."""
         result = values.copy()
         result[self.number, SIZE] += by
         return result
 
     def named(self, setting: Setting) -> dict[str, Any]:
-        """Return the effect, and where it is."""
+        """Effect and place of this number."""
         [place] = _named([self.fault.places(setting)[self.number]])
         return {"effect": self.fault.name, "place": place}
 
     def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
-        """Return the name of the parameter that this is, and by how much that changes."""
+        """Name of the corresponding parameter, and its change."""
         before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
         [name] = [key for key in after if after[key] != before[key]]
         return name, after[name] - before[name]
 
 
 def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
-    """Draw a place where a fault is at work, or, of joints' zeros and of what is not, any but the first and the last.
+    """Draw a place at which a fault is at work; of joint zeros and idle faults any but the first and the last.
 
     Frames take up what the first and the last joint's zero do.
     """
@@ -313,8 +313,8 @@ def deviation(
     """Return the standard deviation σ / |x − P x| of one number of a fault, whose unit moves the target by x, (3M,).
 
     P projects on the columns of unknown frames, of every joint's zero, and of all other numbers at work; σ is the noise
-    per axis, m. The program that is put to the test takes no part in that. Also the rms per axis, m, of what a unit of
-    the number leaves after alignment.
+    per axis, m. The examined program is not used. Also returns the residual rms per axis, m, of a unit of the number
+    after alignment.
     """
     known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
     known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))
@@ -335,7 +335,7 @@ def deviation(
 
 
 def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
-    """Yield each number of a fault that is a size, and (3M,) how its unit displaces the target."""
+    """Yield each size parameter of a fault with its unit displacement (3M,) of the target."""
     fixed = {column for column, _ in fault.fixed}
     now = gauge.slope(fault, values)
     for p, d in np.ndindex(*values.shape):
@@ -347,7 +347,7 @@ def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[
 
 
 def _span(gauge: Gauge, every: Array) -> Array:
-    """(3M, R) orthonormal: all that these columns can do beside the frames."""
+    """Orthonormal basis (3M, R) of these columns and the frames."""
     aligned, length = gauge.left(every), np.linalg.norm(every, axis=0)
     kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
     if not kept.any():

@@ -1,4 +1,4 @@
-"""Causes that no library knows, as nasty as life: frozen before anything that looks for them was tuned."""
+"""Faults outside the library, fixed before the search for unlisted causes was tuned."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ _NOTHING = follows("none")
 
 
 def _before(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Name the joint before."""
+    """Name of the joint before."""
     names = setting.world.names
     return [names[names.index(name) - 1] for _, name in places]
 
 
 def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
-    """Name products in either order."""
+    """Names of products in either order."""
     return [name for a in first for b in second for name in (f"{a} * {b}", f"{b} * {a}")]
 
 
 def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Quantities:
-    """Name the condition, or its product with what drives the effect itself."""
+    """The condition, or its product with the driver of the effect."""
 
     def quantities(setting: Setting, places: Sequence[Place]) -> list[str]:
         known = conditions(setting, places)
@@ -71,14 +71,14 @@ def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Qua
 
 
 def _running(setting: Setting) -> Array:
-    """(N,) s since the robot was switched on."""
+    """Time (N,) s since the robot was switched on."""
     assert setting.session is not None  # the fault asks for sessions
     first = np.array([setting.time[setting.session == s][0] for s in range(setting.session.max() + 1)])
     return np.asarray(setting.time - first[setting.session])
 
 
 def _nest(setting: Setting, values: Array) -> Array:
-    """A magnetic nest with play: the target falls to the side where gravity pulls it, along one axis only."""
+    """Magnetic nest with play: gravity tips the target to one side along one axis."""
     axis = int(values[0, 1])
     twist = np.zeros((setting.samples, 6))
     twist[:, axis] = values[0, 0] * np.tanh(-setting.poses[:, 2, axis] / 0.15)
@@ -86,12 +86,12 @@ def _nest(setting: Setting, values: Array) -> Array:
 
 
 def _remounted(setting: Setting, values: Array) -> Array:
-    """The target is taken off between two sessions, and does not come back to where it was."""
+    """Target that is removed between two sessions and comes back elsewhere."""
     return np.pad(values, ((0, 0), (0, 3)))[setting.session]
 
 
 def _bolt(setting: Setting, values: Array) -> Array:
-    """A bolt gives way: from one moment on a link's far end is tilted against it."""
+    """Loose bolt: from one moment on a link's far end is tilted."""
     late = setting.time > values[:, 6].max() * setting.time[-1]
     return np.asarray(late[:, None, None] * values[None, :, :6])
 
@@ -206,19 +206,19 @@ _ALONE = (
 
 
 def deviation(values: Array) -> Array:
-    """Return how far values are from the middle of their range, −1 to 1; zeros where they do not vary."""
+    """Normalised deviation from the middle of the range, −1 to 1; zeros where values do not vary."""
     low, high = values.min(axis=0), values.max(axis=0)
     return np.asarray((2.0 * values - low - high) / np.where(high > low, high - low, 1.0))
 
 
 def _at_and_around(size: float) -> Draw:
-    """Draw one joint's effect at the middle of a condition, and by how much it changes to its ends."""
+    """Draw one joint's effect at the middle of a condition, and its change towards the ends."""
     drawn = one(part(*_MIDDLE), lambda setting, j, rng: float(rng.choice([-1.0, 1.0])))
     return lambda setting, rng: size * drawn(setting, rng)
 
 
 def _own_warmth(setting: Setting) -> Array:
-    """(N, n) °C of the link that carries each joint, or of the last one before it that has a length."""
+    """Temperature (N, n) °C of the link before each joint, or of the last one before with a length."""
     world = setting.world
     columns = []
     for joint in world.joints:
@@ -228,7 +228,7 @@ def _own_warmth(setting: Setting) -> Array:
 
 
 def _product(first: Array, second: Array) -> Array:
-    """(N, 1) product of two deviations."""
+    """Product (N, 1) of two deviations."""
     return np.asarray((deviation(first) * deviation(second))[:, None])
 
 
@@ -295,7 +295,7 @@ INTERPLAY = (
 
 
 def _winding(setting: Setting, values: Array) -> Array:
-    """Friction elements in series with springs (Jenkin), side by side: each follows the joint until it slips.
+    """Parallel Jenkin elements (friction in series with springs): each follows the joint until it slips.
 
     What they hold depends on where the joint turned round, and not only on its last direction.
     """
@@ -308,7 +308,7 @@ def _winding(setting: Setting, values: Array) -> Array:
 
 
 def slipped(q: Array, before: NDArray[np.int64], slips: Array) -> Array:
-    """(N, E) how far each element is strained, as a share of what makes it slip; 0 at the start.
+    """Strain (N, E) of each Jenkin element over its slip limit; 0 at the start.
 
     Of (N,) places of the joint, the row that each came from, the first one's own, and (E,) how far the joint goes
     before an element slips.
@@ -321,7 +321,7 @@ def slipped(q: Array, before: NDArray[np.int64], slips: Array) -> Array:
 
 
 def wandered(setting: Setting, lasts: float, seed: float) -> Array:
-    """(N,) Ornstein-Uhlenbeck process of size 1 that forgets itself within some rows' time: no law of time holds it."""
+    """Ornstein-Uhlenbeck process (N,) of size 1 with a correlation time of some rows."""
     chance = np.random.default_rng(int(seed)).normal(size=setting.samples)
     row = setting.time[-1] / max(int(setting.given.sum()), 1)
     kept = np.exp(-np.diff(setting.time) / (lasts * row))
@@ -333,7 +333,7 @@ def wandered(setting: Setting, lasts: float, seed: float) -> Array:
 
 
 def _coolant(setting: Setting, values: Array) -> Array:
-    """A joint whose coolant comes and goes: what it follows is in no column."""
+    """Joint with intermittent cooling: what it follows is not recorded."""
     moved = np.zeros_like(setting.q)
     for j in np.flatnonzero(values[:, 0]):
         moved[:, j] = values[j, 0] * wandered(setting, values[j, 1], values[j, 2])
@@ -386,7 +386,7 @@ UNLISTED: dict[str, Fault] = {fault.name: fault for fault in (*_ALONE, *INTERPLA
 
 
 def load(where: str) -> Fault:
-    """Load a :class:`Fault` that a Python file defines, from ``file.py:NAME``, or what returns it when called.
+    """Load a :class:`Fault` from a Python file, ``file.py:NAME``, or from a function that returns one.
 
     Raises
     ------
@@ -414,5 +414,5 @@ def load(where: str) -> Fault:
 
 
 def known(name: str, own: str = "") -> Fault:
-    """Return a fault by name: the user's own where one is given, else one of the trial's."""
+    """Fault by name: the user's own, else one of the trial's."""
     return load(own) if own else {**FAULTS, **UNLISTED}[name]

@@ -1,4 +1,4 @@
-"""The robot as bodies in MuJoCo: stretched, bent, on springs under gravity and payload."""
+"""Multibody model of the robot in MuJoCo: stretched, bent, on springs under gravity and payload."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def from_vector(twists: Array) -> Array:
-    """(N, 4, 4) motions from (N, 6) translations (m) and rotation vectors (rad)."""
+    """Rigid motions (N, 4, 4) from translations (m) and rotation vectors (rad), (N, 6)."""
     motion = np.tile(np.eye(4), (len(twists), 1, 1))
     motion[:, :3, :3] = Rotation.from_rotvec(twists[:, 3:]).as_matrix()
     motion[:, :3, 3] = twists[:, :3]
@@ -24,17 +24,17 @@ def from_vector(twists: Array) -> Array:
 
 
 def rpy_matrix(rpy: Array) -> Array:
-    """Rotation of a URDF origin: about the fixed axes x, y, z."""
+    """Rotation matrix of roll, pitch, yaw about the fixed axes x, y, z."""
     return np.asarray(Rotation.from_euler("xyz", rpy).as_matrix())
 
 
 def quaternion(rotation: Array) -> Array:
-    """Scalar first, (..., 4)."""
+    """Quaternion (..., 4), scalar first, of rotation matrices."""
     return np.roll(Rotation.from_matrix(rotation).as_quat(), 1, axis=-1)
 
 
 def anywhere(rng: np.random.Generator, reach: float) -> Array:
-    """(4, 4) a random direction, and a place up to ``reach`` along each axis."""
+    """Random pose (4, 4) with a place up to ``reach`` along each axis."""
     motion = np.eye(4)
     motion[:3, :3] = Rotation.random(rng=rng).as_matrix()
     motion[:3, 3] = rng.uniform(-reach, reach, 3)
@@ -42,7 +42,7 @@ def anywhere(rng: np.random.Generator, reach: float) -> Array:
 
 
 def free_columns(reference: Array, rotation: Array, base: bool, tool: bool) -> Array:
-    """(3N, 0..9) displacement per unit of each freedom of the frames."""
+    """Displacement (3N, 0..9) per unit of each unknown frame coordinate."""
     n, centred = len(reference), reference - reference.mean(axis=0)
     parts = []
     if base:
@@ -75,28 +75,28 @@ class Joint:
 
     @property
     def movable(self) -> bool:
-        """Whether it moves at all."""
+        """Whether it is not fixed."""
         return self.kind in ("revolute", "continuous", "prismatic")
 
     @property
     def commanded(self) -> bool:
-        """Whether it is commanded itself, instead of following another one or standing still."""
+        """Whether it is movable, commanded and not mimicking."""
         return self.movable and self.mimic is None
 
     @property
     def held(self) -> float:
-        """Where a joint that is not commanded stands: 0, or its limit nearest to 0."""
+        """Position of a joint that is not commanded: 0, or its limit nearest to 0."""
         return float(np.clip(0.0, self.lower, self.upper))
 
     def displaced(self, error: Array) -> tuple[Array, Array]:
-        """(3,) shift and (3, 3) rotation in the parent link of a placement that errs by (6,) m and rotation vector."""
+        """Shift (3,) and rotation (3, 3) in the parent link, of a placement error (6,) m and rotation vector."""
         rotation, motion = rpy_matrix(self.rpy), from_vector(error[None])[0]
         return rotation @ motion[:3, 3], rotation @ motion[:3, :3]
 
 
 @dataclass(frozen=True)
 class Tree:
-    """Joints in order from the root, masses (kg) and centres of mass (3,) by link, and the root link."""
+    """Kinematic tree: joints from the root on, masses (kg) and centres of mass (3,) by link, root link."""
 
     root: str
     joints: tuple[Joint, ...]
@@ -104,11 +104,11 @@ class Tree:
     centre: dict[str, Array]
 
     def carried(self, link: str) -> float:
-        """Return the mass of a link and of all that hangs on it, kg."""
+        """Mass of a link and its descendants, kg."""
         return self.mass[link] + sum(self.carried(j.child) for j in self.joints if j.parent == link)
 
     def chain(self, tool_frame: str) -> tuple[Joint, ...]:
-        """Return the joints from the root to a link."""
+        """Joints from the root to a link."""
         by_child = {j.child: j for j in self.joints}
         found: list[Joint] = []
         link = tool_frame
@@ -119,7 +119,7 @@ class Tree:
 
 
 def read(text: str) -> Tree:
-    """Read URDF text; meshes and everything that has no part in statics are passed over."""
+    """Parse the kinematics and masses of a URDF."""
     robot = ElementTree.fromstring(re.sub(r"<\?xml[^>]*\?>", "", text).strip())
     mass, centre = {}, {}
     for link in robot.findall("link"):
@@ -175,7 +175,7 @@ _ROTOR = 1.0  # kg m², kg: MuJoCo wants inertia in every freedom; where nothing
 
 @dataclass
 class Body:
-    """What is wrong with a robot over N measurements; everything is zero, empty or one in a sound one.
+    """Deviations of a robot from its URDF over N measurements; neutral in a sound one.
 
     Attributes
     ----------
@@ -206,17 +206,17 @@ class Body:
     scale: float = 0.0
 
     def take(self, rows: NDArray[np.int64]) -> Body:
-        """Return the same over some of the rows."""
+        """Subset of the rows."""
         each = {name: getattr(self, name)[rows] for name in ("joints", "bow", "growth", "base", "tool")}
         return replace(self, **each, placements=self.placements[rows] if self.placements.ndim == 3 else self.placements)
 
     def move(self, where: str, twists: Array) -> None:
-        """Move the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
+        """Displace the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
         setattr(self, where, getattr(self, where) @ from_vector(twists))
 
 
 class World:
-    """One robot in MuJoCo.
+    """Robot model in MuJoCo.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class World:
         return coupling, rest
 
     def sound(self, samples: int) -> Body:
-        """Return the state of a robot without fault."""
+        """Body without fault."""
         s = len(self.segments)
         return Body(
             joints=np.zeros((samples, self.n)),
@@ -287,7 +287,7 @@ class World:
         )
 
     def poses(self, q: Array, payload: Array, body: Body) -> tuple[Array, Array]:
-        """Return where the tool frame stands in the root, (N, 4, 4), and what holds the joints there, (N, n) N·m.
+        """Tool poses (N, 4, 4) in the root frame, and static joint torques (N, n), N·m.
 
         Each row is a statics problem of its own: springs and beams yield until they balance gravity.
         """
@@ -322,7 +322,7 @@ class World:
         return poses, torque
 
     def overturning(self, q: Array, payload: Array) -> Array:
-        """(N, 3) moment about the root frame's origin, N·m, of the weight of all links and of the payload."""
+        """Overturning moment (N, 3) of all links and the payload about the root frame's origin, N·m."""
         model = copy(self.compile(False, None))  # its payload changes
         data = mujoco.MjData(model)
         address = self.address(model)
@@ -335,11 +335,11 @@ class World:
         return moments
 
     def address(self, model: mujoco.MjModel) -> list[int]:
-        """Return where the m movable joints of the chain stand among the coordinates."""
+        """Coordinate addresses of the m movable joints of the chain."""
         return [int(model.joint(joint.name).qposadr[0]) for joint in self.moving]
 
     def compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
-        """Build the robot: ``bending`` with beams for links, ``placements`` as in :class:`Body` or ``None``."""
+        """Compile the model: ``bending`` makes links beams, ``placements`` as in :class:`Body` or ``None``."""
         plain = placements is None or not placements.any()
         if plain and bending in self._sound:
             return self._sound[bending]
@@ -395,7 +395,7 @@ class World:
             body.quat = quaternion(rotation @ turn)
 
     def _beam(self, parent: mujoco.MjsBody, joint: Joint, offset: Array) -> mujoco.MjsBody:
-        """Put a row of hinges, two at each node, between a link and its joint's placement."""
+        """Insert hinges of a beam, two at each node, between a link and its joint's placement."""
         first, second = cross_axes(offset)
         for node in range(NODES):
             step = offset / NODES * (0.5 if node == 0 else 1.0)
@@ -407,12 +407,12 @@ class World:
         return parent
 
     def nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
-        """(S, 2, NODES) addresses of the hinges of the beams."""
+        """Addresses (S, 2, NODES) of the beams' hinges."""
         names = [[[f"{j.name}/{node}/{axis}" for node in range(NODES)] for axis in (0, 1)] for j in self.grown]
         return np.array([[[int(model.joint(n).qposadr[0]) for n in line] for line in pair] for pair in names])
 
     def _place(self, model: mujoco.MjModel, placements: Array) -> None:
-        """Displace placements of this row; a fault that comes and goes cannot be compiled once for all."""
+        """Set the displaced placements of one row."""
         for joint, error in zip(self.chain, placements, strict=True):
             body, (shift, rotation) = model.body(f"link:{joint.child}").id, joint.displaced(error)
             model.body_pos[body] += shift
@@ -420,7 +420,7 @@ class World:
 
 
 def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
-    """Let the tool carry so many kg."""
+    """Set the payload mass, kg."""
     carried = model.body("payload").id
     if model.body_mass[carried] != payload:
         model.body_mass[carried] = payload
@@ -428,7 +428,7 @@ def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
 
 
 def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Return what holds every coordinate against gravity."""
+    """Return the static generalised forces against gravity."""
     held = np.zeros(model.nv)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -437,7 +437,7 @@ def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
-    """Let joints yield from where they are free until springs balance gravity; return what holds them, N·m."""
+    """Solve the static equilibrium of joint springs against gravity; return the joint torques, N·m."""
     yields = bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
@@ -452,7 +452,7 @@ def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance:
 
 
 def cross_axes(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors across a direction."""
+    """Two unit vectors perpendicular to a direction."""
     along = direction / np.linalg.norm(direction)
     least = np.eye(3)[np.argmin(np.abs(along))]
     first = np.cross(along, least)
@@ -462,7 +462,7 @@ def cross_axes(direction: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the target's place in the root frame, M rows, about the sound robot.
+    """Derivatives of the target's position in the root frame, M rows, about the sound robot.
 
     Attributes
     ----------
@@ -487,7 +487,7 @@ class Slopes:
     sag: Array
 
     def place(self, body: Body) -> Array:
-        """(M, 3) where the target is in the root frame as the instrument sees it, with what is wrong with the robot."""
+        """First-order position (M, 3) of the target in the root frame for a faulty body."""
         tool = body.tool[:, :3, :3] @ self.target + body.tool[:, :3, 3]
         seen = np.einsum("mij,mj->mi", self.poses[:, :3, :3], tool) + self.poses[:, :3, 3]
         seen += np.einsum("mij,mj->mi", self.joints, body.joints - body.springs * self.torque)
@@ -501,7 +501,7 @@ class Slopes:
 
 
 def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
-    """Differentiate at (M, n) commands with (M,) payloads, kg; the target is in the tool frame, m."""
+    """Return the derivatives at (M, n) commands with (M,) payloads, kg; the target is in the tool frame, m."""
     model = copy(world.compile(True, None))  # its payload changes
     data = mujoco.MjData(model)
     address, nodes = world.address(model), world.nodes(model)
@@ -536,7 +536,7 @@ def _pose(data: mujoco.MjData, body: int) -> Array:
 
 
 def _placed(world: World, model: mujoco.MjModel, data: mujoco.MjData, point: Array) -> tuple[Array, Array]:
-    """(3, S', 6) and (3, S) by placements and by growth."""
+    """Return the derivatives by placements (3, S', 6) and by growth (3, S)."""
     placements, growth = np.empty((3, len(world.chain), 6)), np.empty((3, len(world.segments)))
     for k, joint in enumerate(world.chain):
         carrier = _pose(data, model.body(f"link:{joint.parent}").id)

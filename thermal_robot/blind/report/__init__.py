@@ -1,1 +1,1 @@
-"""The trial's own report: text, page, Markdown and figures of a score; draws, computes none."""
+"""Report of a trial's score: text, page, Markdown and figures."""

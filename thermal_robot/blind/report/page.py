@@ -52,7 +52,7 @@ _GROUPS = {
 
 
 def confusion_figure(score: Plain, which: str = "single") -> Figure:
-    """Draw the confusion matrix of a table of the score: how often each truth was answered by each name.
+    """Draw the confusion matrix of true and first-named effects.
 
     Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
     """
@@ -98,7 +98,7 @@ def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
 
 
 def calibration_figure(score: Plain) -> Figure:
-    """Draw the reliability diagram: how often effects were at work against how probable they were said to be.
+    """Draw the reliability diagram of effect probabilities.
 
     Above, for each bin of probabilities, the share with its 95 % bar; below, how many effects there were.
     """
@@ -119,7 +119,7 @@ def calibration_figure(score: Plain) -> Figure:
 
 
 def _frequencies(axes: Axes, steps: Sequence[Plain]) -> None:
-    """Draw the share at work of each bin against the mean probability in it, beside the line of a sound scale."""
+    """Draw observed frequency against mean probability of each bin, beside the diagonal."""
     axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
     said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
     said.set(rotation=45, rotation_mode="anchor", transform_rotates_text=True)
@@ -134,7 +134,7 @@ def _frequencies(axes: Axes, steps: Sequence[Plain]) -> None:
 
 
 def _numbers(axes: Axes, steps: Sequence[Plain]) -> None:
-    """Draw how many effects each bin holds, on a logarithmic axis."""
+    """Draw the number of effects in each bin, on a logarithmic axis."""
     for b in steps:
         number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
         axes.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
@@ -158,7 +158,7 @@ def _error(calibration: Plain) -> str:
 
 
 def shrinkage_figure(score: Plain) -> Figure:
-    """Draw what stays of the gap's mean square on fresh samples against what the diagnosis claims to stay."""
+    """Draw the ratio of mean squares on fresh samples against the ratio that the diagnosis claims."""
     pairs = score["shrinkage"]["pairs"]
     if not pairs:
         return _empty("How far the gap shrinks", "No case has fresh samples.")
@@ -205,7 +205,7 @@ _LAST = 1.5  # times the lower bound: where a step without an upper one ends in 
 
 
 def power_figure(score: Plain) -> Figure:
-    """Draw the power of the diagnosis: the share of effects found, against their size and the number of rows.
+    """Draw the power of the diagnosis against effect size and number of rows.
 
     Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower and
     the upper quartile of the other quantity.
@@ -261,7 +261,7 @@ def _panel(axes: Axes, steps: Sequence[Plain], lines: Sequence[Plain], other: Ca
 
 
 def html(score: Plain, generated: str) -> str:
-    """Write a score of the format ``thermal-robot/blind/1`` as a page that needs nothing beside itself, for A4.
+    """HTML page of a score, format ``thermal-robot/blind/1``, self-contained, for A4.
 
     ``generated`` is when it was made, in the words that shall stand in the footer; may be empty.
     """
@@ -271,7 +271,7 @@ def html(score: Plain, generated: str) -> str:
 
 
 def _groups(heading: str, groups: Plain, columns: Sequence[str]) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    """Return heading, names of the columns and rows of a table of rates, false alarms among them."""
+    """Heading, column names and rows of a table of rates, false alarms among them."""
     asked = [q for q in dict.fromkeys((*columns, "false_alarm")) if any(q in rates for rates in groups.values())]
     rows = [(group, *(_share(rates.get(q)) for q in asked)) for group, rates in groups.items()]
     return heading, ("", *map(text.question, asked)), rows

@@ -1,4 +1,4 @@
-"""The score of a blind trial as plain text: what the command line prints."""
+"""Score of a blind trial as plain text for the command line."""
 
 from __future__ import annotations
 
@@ -83,48 +83,48 @@ _EFFECTS = {
 
 
 def kind(name: str) -> str:
-    """Say in plain words what kind of case."""
+    """Kind of case in plain words."""
     return KINDS.get(name, name)
 
 
 def question(name: str, of_kind: str = "") -> str:
-    """Say in plain words what was asked."""
+    """Question in plain words."""
     return _OF_KIND.get((of_kind, name), QUESTIONS.get(name, name))
 
 
 def effect(name: str) -> str:
-    """Say in plain words which effect, or what was said instead of one."""
+    """Effect, or the answer in its place, in plain words."""
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
 def count(rate: Plain) -> str:
-    """Write ``20 of 22``."""
+    """Format ``20 of 22``."""
     return f"{rate['successes']} of {rate['trials']}"
 
 
 def interval(rate: Plain) -> str:
-    """Write a rate's 95 % interval in per cent; nothing without trials."""
+    """95 % interval of a rate in per cent; empty without trials."""
     return f"{units.interval(rate['interval'])} %" if rate["interval"] else ""
 
 
 def lost(score: Plain) -> str:
-    """Say how many diagnoses failed; nothing where none did."""
+    """Return the number of failed diagnoses in words; empty without any."""
     return f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
 
 
 def left(of: Plain) -> str:
-    """Say what stays on fresh samples, rms per axis over the noise, of the cases of one kind."""
+    """Residual on fresh samples, rms per axis over the noise, of the cases of one kind, in words."""
     return f"{of['fresh']['median']:.2f} in the median, 90 % below {of['fresh']['q90']:.2f}"
 
 
 def step(bounds: Plain) -> str:
-    """Write the bounds of a step: ``0.5 to 0.7``, ``200 and more``."""
+    """Bounds of a step in words: ``0.5 to 0.7``, ``200 and more``."""
     low, high = bounds["low"], bounds["high"]
     return f"{low:g} and more" if high is None else f"{low:g} to {high:g}"
 
 
 def needed(curve: Plain, wanted: Plain) -> str:
-    """Say how many rows find an effect of some size in 90 % of cases, and whether data reach so far."""
+    """Rows needed to find an effect of some size in 90 % of cases, and whether that is extrapolated."""
     size = f"{wanted['ratio']:g} times the noise"
     if wanted["samples"] is None:
         return f"an effect of {size}: these cases do not tell how many rows it takes"
@@ -136,7 +136,7 @@ def needed(curve: Plain, wanted: Plain) -> str:
 
 
 def coefficients(curve: Plain) -> str:
-    """Write the curve of detection with its standard deviations: where they are large, the cases do not tell."""
+    """Return the detection curve: coefficients with their standard deviations."""
     names = ("ln size", "ln rows")
     terms = (
         f"({curve[k]:.2g} ± {std:.1g}) {n}"
@@ -146,7 +146,7 @@ def coefficients(curve: Plain) -> str:
 
 
 def facts(score: Plain) -> tuple[tuple[str, str], ...]:
-    """Return the figures that stand alone: what they are, and their values."""
+    """Single figures by name."""
     all_, sure = score["calibration"]["all"], score["calibration"]["doubtful"]
     gap, time, held = score["shrinkage"], score["seconds"], score["coverage"]
     said = []
@@ -176,7 +176,7 @@ def facts(score: Plain) -> tuple[tuple[str, str], ...]:
 
 
 def miss(case: Plain) -> tuple[str, str]:
-    """Say what was true of a case that was answered wrongly, and what was said."""
+    """Truth and answer of a wrong case in words."""
     true = ", ".join(case["truth"]) or "nothing"
     if case["error"] is not None:
         return true, case["error"]
@@ -187,7 +187,7 @@ def miss(case: Plain) -> tuple[str, str]:
 
 
 def markdown(score: Plain) -> str:
-    """Write the table of the README, of a score of the format ``thermal-robot/blind/1``, as Markdown.
+    """Markdown table of a score, format ``thermal-robot/blind/1``, for the README.
 
     One row for each kind of case, then the figures that stand alone; without a newline at the end.
     """
@@ -234,7 +234,7 @@ GROUPED = (
 
 
 def text(score: Plain) -> str:
-    """Write a score of the format ``thermal-robot/blind/1`` for whoever ran the trial.
+    """Plain text of a score, format ``thermal-robot/blind/1``.
 
     At most 100 columns wide unless a name is longer, without a newline at the end.
     """
@@ -320,7 +320,7 @@ def _detection(detection: Plain) -> Iterator[str]:
 
 
 def _both(detection: Plain) -> Iterator[str]:
-    """Show size and rows at once, where there are several of both."""
+    """Return the detection by both size and rows, where there are several of both."""
     table = detection["table"]
     lines = [k for k, row in enumerate(table) if any(rate["trials"] for rate in row)]
     columns = [m for m in range(len(detection["samples"])) if any(row[m]["trials"] for row in table)]

@@ -1,1 +1,1 @@
-"""Other programs' files become campaigns: a format is a module here, and a line in :mod:`run`."""
+"""Importers of other programs' files: each format is a module here, registered in :mod:`run`."""

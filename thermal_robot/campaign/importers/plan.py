@@ -1,4 +1,4 @@
-"""What a mapping says: a campaign.toml whose table has columns of other names, in another layout.
+"""Mapping of a foreign table to a campaign: a campaign.toml with sources for the columns.
 
 A table becomes a campaign by it: every importer's last step. Columns are sums of others with scales, signs and
 instants; orientations quaternions, angles, vectors or matrices.
@@ -40,7 +40,7 @@ JOINTS = "joints"  # Key of the list that names the columns of all joints, in th
 
 @dataclass(frozen=True)
 class Column:
-    """Where the values of one column come from: the sum of some columns, times ``scale``, plus ``offset``."""
+    """Source of one column: a sum of table columns, times ``scale``, plus ``offset``."""
 
     sources: tuple[str | int, ...] = ()  # names of columns, or numbers from 1; several are added
     scale: float = 1.0  # and offset: in the unit that the campaign's column has
@@ -51,7 +51,7 @@ class Column:
     count: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
 
     def numbers(self, table: Table) -> Array:
-        """Return (N,) numbers, NaN where a cell is empty; refuse text and an instant of another pattern."""
+        """Numbers (N,), NaN where a cell is empty; text and times of another pattern are refused."""
         rows = len(table.rows)
         if self.count or self.value is not None:
             return np.arange(float(rows)) if self.count else np.full(rows, float(self.value or 0.0))
@@ -63,12 +63,12 @@ class Column:
         return values - np.nanmin(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
-        """Return the unit that its header names; none of a sum, or where another scale than a sign is stated."""
+        """Return the unit in the header of its source; ``None`` for a sum, or with another scale than a sign."""
         plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
         return bare(found(table, self.sources[0])).unit if plain else None
 
     def complete(self, table: Table, name: str = "") -> Array:
-        """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column, for a message."""
+        """Numbers (N,) without gaps; ``name`` is the campaign's column, for the message."""
         values = self.numbers(table)
         index = first_true(np.isnan(values))
         if index is not None:
@@ -78,13 +78,13 @@ class Column:
         return values
 
     def text(self, table: Table) -> list[str]:
-        """Return N texts; those of several columns with a blank between."""
+        """Texts (N,); those of several sources joined by a blank."""
         if self.value is not None:
             return [str(self.value)] * len(table.rows)
         return [" ".join(row) for row in zip(*(table.text(found(table, each)) for each in self.sources), strict=True)]
 
     def _instants(self, table: Table, name: str) -> Array:
-        """(N,) s since some instant."""
+        """Time stamps (N,) in s since an epoch."""
         seconds = np.full(len(table.rows), np.nan)
         for k, cell in enumerate(table.text(name)):
             try:
@@ -98,7 +98,7 @@ class Column:
 
 
 def found(table: Table, source: str | int) -> str:
-    """Return the name of a column of the table, by its name or its number; refuse one that is not there."""
+    """Name of a table column, by its name or number; an unknown one is refused."""
     names = list(table.columns)
     if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
         return str(source)
@@ -114,7 +114,7 @@ def found(table: Table, source: str | int) -> str:
 
 
 def _either(of_text: Kind, other: Kind, kind: type) -> Kind:
-    """Take a value of a type by one kind, any other value by another."""
+    """Return a validator that uses the first one for values of a type, the other one else."""
     return lambda value, path: (of_text if isinstance(value, kind) else other)(value, path)
 
 
@@ -133,7 +133,7 @@ _ORIGINS = ("column", "sum", "value", "count")
 
 
 def column_kind(value: Any, path: str) -> Column:
-    """Take where a column comes from: a name, a number, or an inline table."""
+    """Validate a column's source: a name, a number, or an inline table."""
     if not isinstance(value, Mapping):
         return Column((_SOURCE(value, path),))
     given = record(_FIELDS, may_lack=_FIELDS)(value, path)
@@ -144,7 +144,7 @@ def column_kind(value: Any, path: str) -> Column:
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
-    """Take where the columns come from: by their name in a campaign, and ``joints`` as a list of sources."""
+    """Validate the sources by column, ``joints`` being a list."""
     if not isinstance(value, Mapping):
         raise MisfitError(path, value, "columns by name")
     joints = list_of(column_kind)
@@ -163,7 +163,7 @@ _TURNED = 0.01  # By how much the product of a matrix with its transpose may dif
 
 @dataclass(frozen=True)
 class Orientation:
-    """How orientations are written."""
+    """Convention of the orientations in a table."""
 
     kind: str  # one of those above
     columns: tuple[Column, ...]  # where the figures come from; of a matrix row by row
@@ -175,7 +175,7 @@ class Orientation:
     inverse: bool = False  # whether they turn vectors of the measurement frame into the target's
 
     def quaternions(self, table: Table) -> Array:
-        """Return (N, 4) unit quaternions wxyz, which turn vectors of the target's frame into the measurement frame.
+        """Return the unit quaternions wxyz (N, 4), from the target's frame to the measurement frame.
 
         Refused are a missing figure, a quaternion whose length is not 1, a matrix that is no rotation.
         """
@@ -207,7 +207,7 @@ class Orientation:
 
     @property
     def position(self) -> tuple[Column, ...]:
-        """The three columns of the position that a matrix of twelve or sixteen has; none elsewhere."""
+        """Position columns of a matrix of twelve or sixteen entries; empty otherwise."""
         return self.columns[3:12:4] if len(self.columns) > 9 else ()
 
 
@@ -222,7 +222,7 @@ _KEYS = {
 
 
 def orientation_kind(value: Any, path: str) -> dict[str, Orientation]:
-    """Take how orientations are written; the one entry of the section is called ``stated``."""
+    """Validate the orientation convention; the one entry of the section is called ``stated``."""
     given = record(_KEYS, may_lack=("order", "sequence", "unit", "inverse"))(value, path)
     kind, counts = given["kind"], _COUNTS[given["kind"]]
     if len(given["columns"]) not in counts:
@@ -246,7 +246,7 @@ _LAID_OUT: Mapping[str, Kind] = {
 }
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     **OF_CAMPAIGN,
-    "measurements": {"angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
+    "measurements": {"angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT, "kind": word(tuple(names.KINDS))},
     "table": {**_LAID_OUT, **dict.fromkeys(JOINING, _NAME)},
     "commands": _LAID_OUT,
     "columns": columns_kind,
@@ -264,31 +264,31 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
 
 @dataclass(frozen=True)
 class Plan:
-    """How tables of another program become a campaign."""
+    """Mapping of a foreign table: sections and keys as in campaign.toml."""
 
     file: str = ""  # the mapping that the user wrote; empty where there is none
     # values by section and key, each of its kind; what is not stated is absent
     sections: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def get(self, section: str, key: str, default: Any = None) -> Any:
-        """Return what is stated, or the default."""
+        """Value of a key, or the default."""
         return self.sections.get(section, {}).get(key, default)
 
     def over(self, other: Plan) -> Plan:
-        """Return this plan with what it does not state taken from another."""
+        """Merge with another mapping, which fills what this one does not state."""
         both = {*other.sections, *self.sections}
         merged = {each: {**other.sections.get(each, {}), **self.sections.get(each, {})} for each in both}
         return Plan(self.file or other.file, merged)
 
     def layout(self, section: str = "table") -> Layout:
-        """Return how a table is laid out; the section is ``table``, or ``commands`` of the second one."""
+        """Layout of a table; the section is ``table``, or ``commands`` of the second one."""
         stated = {key: value for key, value in self.sections.get(section, {}).items() if key not in JOINING}
         if "separator" in stated:
             stated["separator"] = _SEPARATORS[stated["separator"]]
         return Layout(**stated)
 
     def robot(self) -> Robot:
-        """Load the robot; a plan must name one."""
+        """Load the robot, which a mapping must name."""
         urdf = self.get("robot", "urdf")
         if urdf is None:
             expected = "--robot URDF, or [robot] urdf in the file of --mapping"
@@ -299,7 +299,7 @@ class Plan:
         return with_kinematics(robot, measured) if measured else robot
 
     def settings(self, robot: Robot) -> Settings:
-        """Return what a campaign says once about all its rows, SI; units of angles and lengths must be stated."""
+        """Return the settings of a campaign in SI units; the units of angles and lengths are required."""
         for key in ("angle_unit", "length_unit"):
             if self.get("measurements", key) is None:
                 expected = f"[measurements] {key} in the file of --mapping"
@@ -314,7 +314,7 @@ def planned(sections: Mapping[str, Mapping[str, Any]]) -> Plan:
 
 
 def read_mapping(path: Path) -> Plan:
-    """Read a mapping; the robot's path is relative to the file. An error names the line."""
+    """Read a mapping; the robot's path is relative to the file. Errors name the line."""
     sections = Document(path, KINDS).sections
     for key, named in sections.get("robot", {}).items():
         if key in ("urdf", "kinematics") and not named.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
@@ -324,7 +324,7 @@ def read_mapping(path: Path) -> Plan:
 
 @dataclass(frozen=True)
 class Source:
-    """What a format makes of the files that it is given."""
+    """Table read from a format's files, with the format's own mapping and notes."""
 
     table: Table  # rows of commands and measurements, in the columns of that program
     plan: Plan  # what the format says of these columns; the user's mapping counts for more
@@ -334,7 +334,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Format:
-    """A format that can be imported."""
+    """Importable format: its description, its files, and its reader."""
 
     does: str  # what it reads, and files: which files, for the help
     files: str
@@ -344,20 +344,20 @@ class Format:
     most: int = 2
 
     def source(self, files: Sequence[Path], plan: Plan) -> Source:
-        """Read the files, as many as the format has."""
+        """Read the files after a check of their number."""
         files_of(files, self.files, self.least, self.most)
         return self.read(files, plan)
 
 
 def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
-    """Refuse another number of files than a format has, naming what is expected."""
+    """Refuse a wrong number of files, naming what is expected."""
     if not least <= len(files) <= most:
         problem = "another number of files than this format has"
         raise CampaignError("FILES", problem, found=str(len(files)), expected=expected)
 
 
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
-    """Return the campaign of a table, and in sentences how many rows it has and what was left out.
+    """Build a campaign from a foreign table, with sentences on the rows read and left out.
 
     ``plan`` is all that is said of the table, the user's mapping first. What cannot be used is refused with row and
     column of the table.
@@ -368,7 +368,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     settings = plan.settings(robot)
     columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
-    measured = np.zeros(len(table.rows), dtype=bool)
+    measured = np.full(len(table.rows), not places)  # rows of other kinds are measured without a position
     for axis in places:
         measured |= ~np.isnan(columns[axis].numbers(table))
     notes = [*source.notes, f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
@@ -395,7 +395,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
 
 
 def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
-    """Return where each column comes from: as stated, else from the column of that name where there is one."""
+    """Source of each campaign column: as mapped, else the table column of that name."""
     stated = dict(plan.sections.get("columns", {}))
     joints = stated.pop(JOINTS, ())
     if joints and len(joints) != robot.n:
@@ -405,7 +405,13 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    known = {*names.RESERVED, *robot.joint_names, *names.conditions(robot.joint_names, robot.urdf_links)}
+    known = {
+        *names.RESERVED,
+        names.KIND,
+        *names.of_kinds(),
+        *robot.joint_names,
+        *names.conditions(robot.joint_names, robot.urdf_links),
+    }
     own = {name: name for name in table.columns if name in known or names.target_of(name) is not None}
     own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
     found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
@@ -414,24 +420,24 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
 
 
 def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
-    """Return the units of angles and lengths that headers name, of the first column that has one."""
+    """Units of angles and lengths in the headers, of the first column that has one."""
     said = [columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns]
     kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
     return {key: unit for key, kind in kinds.items() for unit in reversed(said) if unit in kind}
 
 
 def _in_units(column: Column, table: Table, unit: str) -> Column:
-    """Return a column whose header's unit is converted to that of the campaign's."""
+    """Column converted from its header's unit to the campaign's."""
     scale = size(column.header_unit(table), unit) if unit else None
     return column if scale is None else replace(column, scale=column.scale * scale)
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:
-    """Return the campaign's columns; none of a command or a measurement may have a gap."""
+    """Cells of the campaign's columns; commands and measurements may have no gaps."""
     whole = [name for name in (*robot.joint_names, *names.POSITION) if name in columns]
     cells: dict[str, Cells] = {}
     for name in dict.fromkeys([*whole, *columns]):
-        if name in names.LABELS:
+        if name in (*names.LABELS, names.KIND, *names.OF_KINDS):
             cells[name] = columns[name].text(table)
         else:
             cells[name] = columns[name].complete(table, name) if name in whole else columns[name].numbers(table)

@@ -1,4 +1,4 @@
-"""Points of robot programs, KUKA's KRL and ABB's RAPID, and what was measured at them.
+"""Importer of robot programs, KUKA's KRL and ABB's RAPID, with measured points.
 
 Sources. KRL: KUKA, *System Software, Operating and Programming Instructions for System Integrators*, data types: AXIS
 and E6AXIS hold A1 … A6 (degrees) and E1 … E6; FRAME, POS and E6POS hold X Y Z (mm) and A B C, degrees about Z, Y and X
@@ -43,13 +43,13 @@ Point = dict[str, float]
 
 
 def _aggregate(text: str) -> list[Point]:
-    """Return what stands in the braces of KRL."""
+    """Fields of an aggregate in braces (KRL)."""
     fields = re.findall(rf"(\w+)\s+({_NUMBER})", text, re.IGNORECASE)
     return [{key.upper(): float(value) for key, value in fields}]
 
 
 def _targets(text: str) -> list[Point]:
-    """Return the targets in brackets of RAPID: one, or those of an array."""
+    """Targets in brackets (RAPID): one, or an array."""
     brackets = re.findall(r"\[([^][]+)\]", text)
     numbers = [[float(part) for part in re.findall(_NUMBER, bracket, re.IGNORECASE)] for bracket in brackets]
     points, at = [], 0
@@ -63,7 +63,7 @@ def _targets(text: str) -> list[Point]:
 
 
 class Language(NamedTuple):
-    """How the programs of a maker are read."""
+    """Syntax of a manufacturer's robot programs."""
 
     endings: tuple[str, ...]
     data: str  # ending of the file beside a program that declares its points
@@ -103,7 +103,7 @@ _RAPID = Language(
 
 
 def _program(file: Path, language: Language) -> Table:
-    """Return the points of a program as a table: their names, axes and places."""
+    """Points of a program as a table: names, joint positions, positions."""
     import pandas as pd
 
     beside = [other for other in file.parent.glob(f"{file.stem}.*") if other.suffix.lower() == language.data]
@@ -125,7 +125,7 @@ def _program(file: Path, language: Language) -> Table:
 
 
 def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
-    """Read a program of axes and what was measured, a table or a program of places, in either order."""
+    """Read a program of joint targets and measured points, a table or a program, in either order."""
     import pandas as pd
 
     tables = [
@@ -155,7 +155,7 @@ def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
 
 
 def _named(measured: Table, points: Sequence[str], stated: str | None) -> tuple[str, list[str]]:
-    """Return the measured column that names the points, empty without one, and the points as they are spelled there.
+    """Measured column with the names of the points, empty without one, and these names as the program spells them.
 
     Of KUKA's point P1 the variable is XP1, and capitals and small letters are the same.
     """

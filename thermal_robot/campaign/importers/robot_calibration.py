@@ -1,4 +1,4 @@
-"""Calibration data: samples or capture poses of ROS robot_calibration; markers and joints of FIGAROH.
+"""Importer of calibration data: ROS robot_calibration samples or capture poses, FIGAROH markers and joints.
 
 Sources. ROS: github.com/mikeferguson/robot_calibration: ``robot_calibration_msgs/msg/CalibrationData.msg`` and
 ``Observation.msg`` (joint_states; observations, each with a sensor_name and features, which are points with x y z), as
@@ -62,7 +62,7 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
-    """Return rows of figures by name as a table; the rows are counted from 1, as samples are."""
+    """Table of rows of numbers by name; rows are counted from 1."""
     columns = {
         name: np.array([row.get(name, np.nan) for row in rows]) for name in dict.fromkeys(n for r in rows for n in r)
     }
@@ -70,7 +70,7 @@ def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
 
 
 def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joints", "positions")) -> dict[str, float]:
-    """Return a capture pose, or the joint states of a sample, as joint positions by name."""
+    """Joint positions by name, of a capture pose or of a sample's joint states."""
     if not isinstance(pose, dict):
         raise _odd(file, index, pose, "joints and positions")
     given: list[Any] = [pose.get(key) for key in keys]
@@ -82,7 +82,7 @@ def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joint
 
 
 def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> dict[str, float]:
-    """Return one sample as joint positions and the measured point; without the point where it was not seen."""
+    """Joint positions and measured point of one sample; without the point where it was not seen."""
     state = sample.get("joint_states") if isinstance(sample, dict) else None
     if not isinstance(state, dict):
         raise _odd(file, index, sample, "joint_states and observations")
@@ -103,7 +103,7 @@ def _observations(sample: Any) -> list[Any]:
 
 
 def _only_sensor(file: str, documents: Sequence[Any]) -> str:
-    """Return the sensor of all observations, where it is one."""
+    """Name of the sensor, if all observations have the same."""
     sensors = sorted({each["sensor_name"] for sample in documents for each in _observations(sample)})
     if len(sensors) != 1:
         problem = "it is not clear which sensor measured" if sensors else "there are no observations"
@@ -145,7 +145,7 @@ def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _configured(file: Path) -> dict[str, dict[str, Any]]:
-    """Return what the YAML says of the chain and of the marker, in either layout."""
+    """Chain and marker in the YAML, in either layout."""
     documents = read_yaml(file)
     whole = documents[0] if documents and isinstance(documents[0], dict) else {}
     task = _within(whole, "tasks", "calibration") or _within(whole, "calibration")
@@ -165,7 +165,7 @@ def _configured(file: Path) -> dict[str, dict[str, Any]]:
 
 
 def _within(content: Any, *keys: str) -> dict[str, Any]:
-    """Return a mapping inside mappings; empty where there is none."""
+    """Nested mapping at some keys; empty where it is missing."""
     for key in keys:
         content = content.get(key) if isinstance(content, dict) else None
     return content if isinstance(content, dict) else {}

@@ -1,4 +1,4 @@
-"""Recordings of a robot's joints and of an instrument, in a bag or as CSV: a row for each standstill.
+"""Importer of recordings of joints and of an instrument, ROS bags or CSV: one row for each standstill.
 
 The joints are those that the robot reports, and stand for the commands. Figures are in rad and m, as everywhere in ROS,
 unless the mapping says otherwise.
@@ -48,7 +48,7 @@ TOLERANCE = 0.05  # s between a row's instant and its sample: instruments measur
 
 @dataclass(frozen=True)
 class Stream:
-    """N samples of k quantities."""
+    """Time series of N samples of k quantities."""
 
     file: str  # where they come from, for messages
     time: Array  # (N,) s, increasing
@@ -60,7 +60,7 @@ class Stream:
         return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
 
     def scaled(self, scale: Array) -> Stream:
-        """Return the stream in other units, (k,) of them to one of its own."""
+        """Time series times (k,) unit factors."""
         return replace(self, values=self.values * scale)
 
     def nearest(self, times: Array) -> NDArray[np.int64]:
@@ -71,7 +71,7 @@ class Stream:
 
 
 def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
-    """Return a stream in the sequence of its clock, without samples that have a gap and without repeated instants."""
+    """Time series sorted by time, without gaps and duplicate times."""
     kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
     _, first = np.unique(time[kept], return_index=True)
     if len(first) < 2:
@@ -82,7 +82,7 @@ def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Strea
 
 @dataclass(frozen=True)
 class Pairs:
-    """Samples of two recordings at standstill."""
+    """Samples of robot and instrument, one pair for each standstill."""
 
     times: Array  # (M,) s, of the robot's clock
     joints: Array  # (M, n) of the samples nearest in time, and target: (M, k)
@@ -101,7 +101,7 @@ def paired(
     velocity: float = VELOCITY,
     settling: float = SETTLING,
 ) -> Pairs:
-    """Return a pair for each standstill, in its middle once the arm has settled.
+    """Pair two recordings at standstills, in the middle of each after settling.
 
     ``lag``, s: the robot's clock shows that much more than the instrument's. The limits are as the constants above.
     """
@@ -129,7 +129,7 @@ LEAST = 60  # samples in motion that a fit of ten figures and its scatter want
 
 @dataclass(frozen=True)
 class Lag:
-    """Offset of two clocks."""
+    """Clock offset of two recordings."""
 
     value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
     std: float  # one standard deviation, s
@@ -184,7 +184,7 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
 
 
 def _speeds(stream: Stream, times: Array) -> Array:
-    """Central differences: (M,) m/s of the target at some instants."""
+    """Central differences: speed (M,) m/s of the target at given times."""
     places = stream.between(times)[:, :3]
     speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
     return speeds
@@ -193,7 +193,7 @@ def _speeds(stream: Stream, times: Array) -> Array:
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
     """Least squares: lag, motion of the instrument's frame and place of the target; and what is left, m rms.
 
-    The motion turns about the aligned start, so that ten figures near nothing are sought.
+    The rotation is about the aligned start, so that all ten unknowns are near zero.
     """
     from scipy.optimize import least_squares
 
@@ -229,7 +229,7 @@ _BEFORE_NAMES = 2  # Fields of a stamp, sec and nanosec, at the beginning of eac
 
 
 def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
-    """Return what a CSV of topics has of the chain's joints and of the target; ``None`` for what it has not.
+    """Time series of the chain's joints and of the target in a CSV of topics; ``None`` where one is missing.
 
     A file that is no table, has no clock, or has some of the joints only is refused.
     """
@@ -249,7 +249,7 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
 
 
 def _begins_with_figures(file: Path) -> bool:
-    """Return whether the first line begins with two whole numbers, a stamp, and is no header."""
+    """Whether the first line begins with two integers, a time stamp, and hence is no header."""
     if not is_file(file):
         return False
     with file.open("rb") as content:
@@ -261,7 +261,7 @@ def _figures(table: Table, columns: Sequence[str]) -> Array:
 
 
 def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
-    """Return the column of each joint; nothing where there is none of any."""
+    """Column of each joint; empty where one is missing."""
     named = {
         table.text(name)[0]: name.replace("name", "position", 1)
         for name in table.columns
@@ -277,7 +277,7 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
 
 
 def _target(table: Table) -> dict[str, str]:
-    """Return the columns of the target's place, and of its orientation where all four are there."""
+    """Columns of the target's position, and of its orientation where all four are there."""
     parts: dict[str, str] = {}
     for name in table.columns:
         if found := _PLACE.search(name):
@@ -294,7 +294,7 @@ def _target(table: Table) -> dict[str, str]:
 
 
 def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
-    """Return the stream of a file whose fields have an order and no names."""
+    """Time series of a file with a fixed order of columns and no header."""
     fields = list(table.columns)
     time = table.numbers(fields[0]) + table.numbers(fields[1]) * _NANOSECOND
     # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
@@ -333,7 +333,7 @@ WITH_ROSBAGS = 'pip install "thermal-robot[ros]"'
 def read_bag(
     path: Path, joints: Sequence[str], joint_topic: str | None, target_topic: str | None
 ) -> tuple[Stream | None, Stream | None]:
-    """Return what a bag has of the chain's joints and of the target; ``None`` where no topic has messages of that kind.
+    """Time series of the chain's joints and of the target in a bag; ``None`` where no topic has such messages.
 
     A topic is ``None`` where one alone has such messages. A bag that cannot be read is refused, and so are several
     topics to choose from and a joint that is not recorded.
@@ -415,7 +415,7 @@ _LIMITS = ("tolerance", "standstill", "velocity", "settling")
 
 
 def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
-    """Read both recordings, estimate how their clocks differ unless it is stated, and pair them at standstill."""
+    """Read both recordings, estimate their clock offset unless stated, and pair them at standstill."""
     own = planned(_UNITS)
     robot = plan.robot()
     settings = plan.over(own).settings(robot)
@@ -450,7 +450,7 @@ def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _streams(files: Sequence[Path], plan: Plan, robot: Robot) -> tuple[Stream, Stream]:
-    """Return the recordings of the joints and of the target, each from the one file that has it."""
+    """Time series of joints and target, each from the one file that has it."""
     found: list[list[Stream]] = [[], []]
     for file in files:
         if file.suffix.lower() in ENDINGS or is_folder(file):

@@ -1,4 +1,4 @@
-"""Files of another program in, the folder of a campaign out; the formats that can be imported."""
+"""Import of foreign files as the folder of a campaign, and the list of formats."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
+from thermal_robot.campaign.importers.hand_eye import CORNERS, MOVEIT
 from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of
 from thermal_robot.campaign.importers.programs import KUKA, RAPID
 from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
 from thermal_robot.campaign.importers.rosbag import ROSBAG
+from thermal_robot.campaign.importers.sockets import MUKCA
 from thermal_robot.campaign.importers.table import IPA_UR10, JACOBI, POINTS, TABLE
 from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
 from thermal_robot.errors import CampaignError
@@ -26,13 +28,16 @@ FORMATS: dict[str, Format] = {
     "rosbag": ROSBAG,
     "jacobi": JACOBI,
     "ipa_ur10": IPA_UR10,
+    "mukca": MUKCA,
+    "moveit": MOVEIT,
+    "corners": CORNERS,
 }
 """Formats by name, in the order of the help."""
 IMPORTED = "Imported by `thermal-robot import"  # What the first line of a campaign.toml says that was imported
 
 
 class Imported(NamedTuple):
-    """A campaign that was imported."""
+    """Result of an import."""
 
     campaign: Campaign  # as it was written
     file: Path  # its campaign.toml
@@ -56,7 +61,7 @@ def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str
 
 
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
-    """Read files of a format and write them as a campaign.
+    """Import files of a format and write them as a campaign.
 
     The directory is made if need be; a campaign in it is replaced where it was imported, too. ``plan`` is what the user
     says beyond the files; it counts for more than what the format says.

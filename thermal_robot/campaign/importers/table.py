@@ -1,4 +1,4 @@
-"""Tables and lists of points: any, by a mapping (docs/importers.md); two that are joined; those of public data sets.
+"""Importers of tables and lists of points: by a mapping (docs/importers.md), two joined ones, and public data sets.
 
 Source of SpatialAnalyzer's layout: New River Kinematics, *SpatialAnalyzer User's Manual*, "Exporting ASCII Formatted
 Points": a line holds the collection, the group and the target, or the last two, or the last, or none of them, then x y
@@ -41,7 +41,7 @@ _FEW = 3  # Names of either table that a sentence shows: enough to see how the t
 
 
 def commands(file: Path, plan: Plan) -> Table:
-    """Read the second of two tables, as ``[commands]`` says; without it as ``[table]`` does of the first, if it fits.
+    """Read the second of two tables, laid out as ``[commands]``, or else as ``[table]``, says.
 
     A layout fits where the header, if it has any, is no row of numbers, and where no row is a header. What does not fit
     is tried with a header or without, and as any table is read.
@@ -67,7 +67,7 @@ def _fits(table: Table) -> bool:
 
 
 def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tuple[str, ...]]:
-    """Return one table with the columns of both, and in sentences what was left out.
+    """Inner join of two tables by point names or row by row, with sentences on what was left out.
 
     A point that was measured several times makes several rows, in the order of the measurements. ``key`` is the column
     of the measured table that holds the names of points; that of the commands is the one that has most of them. Without
@@ -101,7 +101,7 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
 
 
 def _names_of(measured: Table, commanded: Table, key: str) -> str:
-    """Return the column of the commands that has most names of points; refuse commands without any."""
+    """Column of the commands with most names of points; refused without any."""
     points = measured.text(key)
     known = set(points) - {""}
     common = {name: len(known & set(commanded.text(name))) for name in commanded.columns}
@@ -115,7 +115,7 @@ def _names_of(measured: Table, commanded: Table, key: str) -> str:
 
 
 def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Sequence[int], tuple[str, ...]]:
-    """Return the measured rows whose point is commanded, in which row it is, and what was left out."""
+    """Join by name: measured rows that are commanded, their rows among the commands, and what was left out."""
     points, commands = measured.text(key), commanded.text(taken)
     twice = [name for name, count in Counter(commands).items() if count > 1]
     if twice:
@@ -135,7 +135,7 @@ def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[T
 
 
 def _settled(table: Table, order: Sequence[int]) -> dict[str, Cells]:
-    """Return columns in an order of rows, numbers where a column has nothing else: decimal commas are settled here."""
+    """Reorder rows, and convert columns of numbers, decimal commas included."""
     columns: dict[str, Cells] = {}
     for name in table.columns:
         plain = table.first_text(name) is None
@@ -145,7 +145,7 @@ def _settled(table: Table, order: Sequence[int]) -> dict[str, Cells]:
 
 
 def _read_table(files: Sequence[Path], plan: Plan) -> Source:
-    """Read one table, or two that are joined by the names in ``[table] key``, else row by row."""
+    """Read one table, or two joined by the names in ``[table] key``, else row by row."""
     if plan.get("table", "targets") is not None:
         expected = 'the format `points`; or the columns of each target, "x.1" = …, in [columns]'
         raise CampaignError(plan.file, "is for lists of points", column="table.targets", expected=expected)
@@ -170,7 +170,7 @@ _AXES = ("x", "y", "z")
 
 
 def _read_points(files: Sequence[Path], plan: Plan) -> Source:
-    """Read points and commands, joined by the name of the point; without names, row by row."""
+    """Read points and commands, joined by name, or without names row by row."""
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
     table = _called(read_table(files[0], plan.layout() if laid_out else _laid_out(files[0])), plan)
     key, targets = plan.get("table", "key") or _NAMES[-1], plan.get("table", "targets")
@@ -185,7 +185,7 @@ def _read_points(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _laid_out(file: Path) -> Layout:
-    """Return how a list of points is laid out: its first line that is no comment tells."""
+    """Detect the layout of a list of points from its first line that is no comment."""
     for separator in (",", ";", "\t", SPACE):
         layout = Layout(separator, 0, False, COMMENT)
         try:
@@ -200,7 +200,7 @@ def _laid_out(file: Path) -> Layout:
 
 
 def _called(table: Table, plan: Plan) -> Table:
-    """Return the table with its columns called collection, group, target, x, y, z as far as they are there."""
+    """Name the columns collection, group, target, x, y, z as far as they are there."""
     if table.header is not None:
         axes = {name: name.lower() for name in table.columns if name.lower() in _AXES}
         first = min((k for k, name in enumerate(table.columns) if name in axes), default=0)
@@ -218,7 +218,7 @@ def _called(table: Table, plan: Plan) -> Table:
 
 
 def _names_before(table: Table) -> int:
-    """Return how many fields of a line are names: text, or whole numbers throughout where three fields remain."""
+    """Return the number of leading name fields: text, or integers throughout where three fields remain."""
     columns = list(table.columns)
     for count, name in enumerate(columns[: len(_NAMES)]):
         figures = table.first_text(name) is None
@@ -228,7 +228,7 @@ def _names_before(table: Table) -> int:
 
 
 def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
-    """Return a table with a row for each visit of a pose, and in a sentence which targets there are.
+    """Reshape to one row for each visit of a pose, with a sentence on the targets.
 
     Each line of the table is a point, x y z. Targets are numbered as they first appear. One that is measured again at a
     pose begins another visit. A target that a visit lacks has empty cells there. ``key`` and ``targets`` are the

@@ -1,4 +1,4 @@
-"""Faults of the data, before faults of the robot: columns exchanged, turned round, shifted, or in another unit."""
+"""Data faults: columns exchanged, reversed, shifted or in another unit; tested before faults of the robot."""
 
 from thermal_robot.diagnosis.data_faults.find import data_fault
 

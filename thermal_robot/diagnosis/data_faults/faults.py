@@ -1,4 +1,4 @@
-"""Candidate faults of a table: the columns that they strike, what mends them, and what mended columns leave.
+"""Candidate data faults of a table: columns concerned, repair, and distance to the prediction after the repair.
 
 Joints' columns are reversed, exchanged, coupled, in another unit or counted from another zero; measured columns are in
 another unit, of exchanged or mirrored axes, or turned by another convention; or both are paired wrongly. Nearly all of
@@ -34,7 +34,7 @@ _COLUMNS = ("q", "position", "orientation", "simulated_position")
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """The columns of a campaign that a fault of the data may have struck; those of several tables side by side."""
+    """Columns of a campaign that a data fault may concern; leading axes hold several repaired tables side by side."""
 
     robot: Robot
     q: Array  # (..., N, n) commanded joint positions, rad or m
@@ -71,12 +71,12 @@ class Readings:
         return _combined(lambda column: column[rows], [self], (*_COLUMNS, "clock", "known"))
 
     def where(self, own: Rows, other: Readings) -> Readings:
-        """Return the rows of these readings where told (..., N), and of other ones elsewhere."""
+        """Combine two tables: rows where ``own`` (..., N) is true from this one, the others from ``other``."""
         return _combined(lambda mine, theirs: np.where(own[..., None], mine, theirs), [self, other])
 
     @cached_property
     def poses(self) -> Array:
-        """(..., N, 4, 4) of the tool frame as commanded."""
+        """Commanded poses (..., N, 4, 4) of the tool frame."""
         rows = tool_poses(self.robot, self.q.reshape(-1, self.robot.n))
         return np.ascontiguousarray(rows).reshape(*self.q.shape[:-1], 4, 4)
 
@@ -87,11 +87,11 @@ class Readings:
 
     @property
     def tolerance(self) -> float:
-        """Gap, m, above which robot and table are not taken to fit."""
+        """Gap, m, above which robot and table do not match."""
         return settings.MISFIT * self.spread
 
     def still(self) -> Array:
-        """(...) m, the median distance that a robot which does not move leaves."""
+        """Median distance (...), m, of the measurements from the pose of a robot at rest."""
         away2 = _norm2(self.position - np.median(self.position, axis=-2, keepdims=True))
         if self.orientation is not None:
             seen = quaternion_to_rotation(self.orientation)
@@ -100,7 +100,7 @@ class Readings:
         return np.asarray(np.sqrt(middle(away2)))
 
     def align(self, *, coarse: bool = False, begun: Array | None = None) -> Placed:
-        """Register the unknown frames robustly; ``coarse``: in few steps from one start.
+        """Register the unknown frames robustly; ``coarse``: in few iterations from one start.
 
         ``begun`` (..., P, 3) are other places of the target to start from, m.
         """
@@ -111,7 +111,7 @@ class Readings:
         return alternate(self, self.declared, begun, rounds, poses=poses)[1]
 
     def distance(self, frames: Placed, *, turns: bool = True) -> Array:
-        """(..., N) distance between measured and predicted pose, m; a turn counts by what it moves at a lever's length.
+        """Distance (..., N) between measured and predicted pose, m; an angle counts times ``LEVER``.
 
         Without ``turns`` that of positions alone.
         """
@@ -128,12 +128,12 @@ class Readings:
 
     @property
     def maps_place(self) -> bool:
-        """Whether :meth:`relaxed` fits the target's place, too, or it is known: no rigid motion then leaves less."""
+        """Whether the target's place is known, or :meth:`relaxed` fits it: a lower bound for rigid motions."""
         known = self.simulated_position is not None or self.tool_known
         return known or self.q.shape[-2] >= settings.FEWEST_RELAXED
 
     def relaxed(self, weights: Array | None = None) -> tuple[Array, Array]:
-        """Fit an affine map of place and turn of the tool frame instead of a rigid motion (ridge regression).
+        """Fit an affine map instead of a rigid motion to position and rotation of the tool frame (ridge regression).
 
         Whatever it leaves no frames mend, nor another unit, an exchanged or a mirrored axis of the instrument. Rows
         have ``weights`` (..., N); alike where absent. Returns (..., N) distances, of the median distance that a robot
@@ -166,14 +166,14 @@ class Readings:
 
 
 def _combined(how: Callable[..., Any], several: Sequence[Readings], names: Sequence[str] = _COLUMNS) -> Readings:
-    """Return the first of several readings with columns that are made of all of theirs."""
+    """Copy of the first readings with columns computed from the columns of all of them."""
     there = [name for name in names if getattr(several[0], name) is not None]
     columns: dict[str, Any] = {name: how(*(getattr(own, name) for own in several)) for name in there}
     return replace(several[0], **columns)
 
 
 def stacked(several: Sequence[Readings]) -> Readings:
-    """Return readings of as many rows side by side: each column has them in front."""
+    """Stack readings of equal numbers of rows along a new first axis."""
     return _combined(lambda *own: np.stack(own), several)
 
 
@@ -190,7 +190,7 @@ Numbered = Callable[[float], tuple[str, Repair]]
 
 @dataclass(frozen=True)
 class Proposal:
-    """One fault that may have struck: its kind, where it struck in words, and what mends it."""
+    """One candidate fault: its kind, its place in words, and its repair."""
 
     kind: Kind
     place: str
@@ -204,7 +204,7 @@ Fault = tuple[Proposal, ...]
 
 
 class Family(NamedTuple):
-    """Faults of one kind that differ by a number."""
+    """Faults of one kind that differ by a real number, such as a time offset."""
 
     kind: Kind
     tried: tuple[float, ...]  # numbers, in order, between which the best is looked for
@@ -228,16 +228,16 @@ class Kind:
     offsets: Callable[[Readings], Iterable[tuple[tuple[float, ...], Numbered]]] = lambda _: ()
 
     def proposed(self, readings: Readings) -> list[Proposal]:
-        """Return the faults of this kind that readings may have."""
+        """Candidate faults of this kind in some readings."""
         return [Proposal(self, *found) for found in self.proposals(readings)]
 
     def families(self, readings: Readings) -> list[Family]:
-        """Return the faults of this kind that differ by a number."""
+        """Families of this kind that differ by a number."""
         return [Family(self, *found) for found in self.offsets(readings)]
 
 
 def _changed(column: str, change: Callable[[Array], Array]) -> Repair:
-    """Return a repair that changes one column in the rows struck."""
+    """Repair that changes one column in the rows concerned."""
 
     def repair(readings: Readings, struck: Rows) -> Readings:
         return _combined(lambda own: np.where(struck[:, None], change(own), own), [readings], [column])
@@ -251,7 +251,7 @@ def _mapped(column: str, matrix: Array, shift: Array | float = 0.0) -> Repair:
 
 
 def _but(size: int, where: Sequence[int], value: float) -> Array:
-    """(size, size) diagonal matrix of ones, but a value in some places."""
+    """Diagonal matrix (size, size) of ones, but for one value in some places."""
     return np.diag(np.where(np.isin(np.arange(size), where), value, 1.0))
 
 
@@ -266,7 +266,7 @@ _USUAL: dict[tuple[int, tuple[int, ...]], str] = {(6, (0, 3, 5)): " (as a KUKA's
 
 
 def _reversed(readings: Readings, several: bool) -> Iterator[tuple[str, Repair, frozenset[str]]]:
-    """Propose sets of joints, the smallest first; of many joints the small sets alone."""
+    """Candidates of joints with the opposite sign, small sets first; of many joints small sets alone."""
     count = readings.robot.n
     most = count if count <= settings.MOST_PATTERNS else settings.FEW_REVERSED
     for size in range(2, most + 1) if several else (1,):
@@ -278,7 +278,7 @@ def _reversed(readings: Readings, several: bool) -> Iterator[tuple[str, Repair, 
 
 
 def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
-    """Pendants that count a joint from the ground, not from the link before it, and wrists that turn together."""
+    """Candidates of coupled joints: joint angles counted from the ground, and wrists whose motors drive two joints."""
     names = readings.robot.joint_names
     for j, k in permutations(_turning(readings), 2):
         if abs(j - k) == 1:
@@ -290,7 +290,7 @@ def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 
 def _exchanged(column: str, names: Sequence[str] = "xyz") -> Iterator[tuple[str, Repair]]:
-    """Propose pairs of parts of a column that stand for each other."""
+    """Candidates in which two components of a column are exchanged."""
     for i, j in combinations(range(len(names)), 2):
         matrix = np.eye(len(names))
         matrix[[i, j]] = matrix[[j, i]]
@@ -338,7 +338,7 @@ JOINT_KINDS = (
 
 
 def _sizes(readings: Readings, steps: Sequence[float], ask: str = "") -> Iterator[tuple[str, Repair]]:
-    """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
+    """Candidates of wrong units: factors between units, and a conversion that was applied twice or needlessly."""
     read = LENGTH_UNITS[readings.length_unit]
     for by in (sign for step in steps for sign in (step, 1.0 / step)):
         size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
@@ -368,7 +368,7 @@ _ANGLES = {
 
 
 def _retold(taken: str, meant: str, factor: float = 1.0) -> Repair:
-    """Return a repair of orientations made of three numbers that mean others, or are to be multiplied."""
+    """Repair of orientations whose three numbers have another convention or another unit."""
 
     def change(wxyz: Array) -> Array:
         turn = Rotation.from_quat(wxyz, scalar_first=True)
@@ -381,7 +381,7 @@ def _retold(taken: str, meant: str, factor: float = 1.0) -> Repair:
 
 
 def _turn_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
-    """Return a kind of fault that only measured orientations can have."""
+    """Kind of fault of measured orientations."""
     found = tuple(proposals)
     return Kind(name, says, remedy, lambda readings: () if readings.orientation is None else found)
 
@@ -452,7 +452,7 @@ def _at_offset(style: Callable[..., Readings], by: float) -> tuple[str, Repair]:
 
 
 def _offsets(clock: Array) -> tuple[float, ...]:
-    """Return the offsets that are tried, s: linear where they are near, geometric beyond and below."""
+    """Time offsets of the trial grid, s: linear near zero, geometric beyond."""
     between = np.diff(np.sort(clock))
     unit, near = float(np.median(between[between > 0.0])), settings.NEAR_OFFSETS
 
@@ -466,8 +466,8 @@ def _offsets(clock: Array) -> tuple[float, ...]:
     return tuple(float(s) for s in np.concatenate([-sizes[::-1], sizes]))
 
 
-def _neighbours(clock: Array, by: float) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Rows]:
-    """(N,) each for each row at its time and an offset: row before, row after, part of the latter, what is known."""
+def _bracketing(clock: Array, by: float) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Rows]:
+    """Rows before and after each row's shifted time, weight of the latter, and whether inside the record; each (N,)."""
     order = np.argsort(clock, kind="stable")
     at, ordered = clock + by, clock[order]
     after = np.clip(np.searchsorted(ordered, at, "right"), 1, len(clock) - 1)
@@ -484,9 +484,9 @@ def _resampled(
     least: float | None = None,
     in_rows: bool = False,
 ) -> Readings:
-    """Interpolate joints at another time; with ``least`` they are of the next row from so large a part of the way."""
+    """Interpolate joint positions at shifted times; from weight ``least`` on take the next row."""
     clock = np.arange(len(struck), dtype=float) if in_rows else np.asarray(readings.clock)
-    first, second, part, inside = _neighbours(clock, by)
+    first, second, part, inside = _bracketing(clock, by)
     later = (part if least is None else part >= least)[:, None]
 
     def change(own: Array) -> Array:
@@ -496,8 +496,8 @@ def _resampled(
 
 
 def _unmixed(readings: Readings, struck: Rows, by: float, sign: float, columns: Sequence[str]) -> Readings:
-    """Undo an interpolation w = A u, of two entries a row of A: A⁺ w gives u back as far as it is determined."""
-    first, second, part, _ = _neighbours(np.asarray(readings.clock), sign * by)
+    """Invert a linear interpolation w = A u with two entries a row of A by its pseudo-inverse."""
+    first, second, part, _ = _bracketing(np.asarray(readings.clock), sign * by)
     own, matrix = np.arange(len(part)), np.zeros((len(part), len(part)))
     matrix[own, np.where(struck, first, own)] = np.where(struck, 1.0 - part, 1.0)
     matrix[own, second] += np.where(struck, part, 0.0)

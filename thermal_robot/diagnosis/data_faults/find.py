@@ -1,4 +1,4 @@
-"""Find the fault of the data that repairs a campaign, or the two: all candidates are judged in the same way.
+"""Search for the one or two data faults whose repair makes robot and table match; all candidates compete alike.
 
 A repair is worth how far it brings down the gap, its median over the rows, with the unknown frames fitted robustly and
 nothing else. Thousands of candidates are screened side by side: with an affine map in place of a rigid motion
@@ -44,17 +44,17 @@ from thermal_robot.inference.settings import LEVEL
 
 
 def evenly(rows: NDArray[np.int64], count: int = settings.SAMPLED) -> NDArray[np.int64]:
-    """Return so many of the rows, spread evenly; some are repeated where there are fewer."""
+    """Take that many rows, evenly spaced; rows repeat where there are fewer."""
     return np.asarray(rows[np.linspace(0, len(rows) - 1, count).round().astype(np.int64)])
 
 
 def spread(rows: NDArray[np.int64], most: int = settings.SAMPLED) -> NDArray[np.int64]:
-    """Return so many of the rows at most, spread evenly."""
+    """Take at most that many rows, evenly spaced."""
     return evenly(rows, min(len(rows), most))
 
 
 def window(readings: Readings) -> Readings:
-    """Return the rows in the middle of the campaign, one after the other in time, on which clocks are compared."""
+    """Consecutive rows in the middle of the campaign, on which clock offsets are compared."""
     rows = len(readings.q)
     order = np.arange(rows) if readings.clock is None else np.argsort(readings.clock, kind="stable")
     begin = max(rows - settings.WINDOW, 0) // 2
@@ -62,13 +62,13 @@ def window(readings: Readings) -> Readings:
 
 
 def geometric_mean(distance: Array) -> float:
-    """Geometric mean of distances, m: less the more rows are mended, and the better."""
+    """Geometric mean of distances, m: falls with every row that is repaired."""
     return float(np.exp(np.mean(np.log(np.maximum(distance, settings.LEAST_GAP)))))
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A fault with what is left once it is mended: the distance of each row of a sample that it determines, m."""
+    """One repaired fault and the distances of a sample of rows after the repair, m."""
 
     fault: Fault  # what was mended
     distance: Array  # (K,) m
@@ -77,7 +77,7 @@ class Tried:
 
     @property
     def median(self) -> float:
-        """The median distance, m: what the fall of the gap is told by."""
+        """Median distance, m, by which the reduction of the gap is judged."""
         return float(np.median(self.distance))
 
     @property
@@ -88,7 +88,7 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Struck:
-    """The rows that a fault may have struck, and how far they are from the prediction."""
+    """Rows that a data fault may concern, and their distances from the prediction."""
 
     readings: Readings  # all rows as they stand
     rows: Rows  # (N,) those in question
@@ -97,7 +97,7 @@ class Struck:
 
     @classmethod
     def whole(cls, readings: Readings) -> Struck:
-        """All rows; the frames are fitted to whatever is proposed."""
+        """All rows; the frames are fitted anew to each candidate."""
         sample = readings.take(spread(np.arange(len(readings.q))))
         distance = readings.distance(sample.align(coarse=True))
         if np.median(distance) > readings.tolerance:
@@ -116,29 +116,29 @@ class Struck:
 
     @property
     def count(self) -> int:
-        """How many rows candidates are compared on, less the three that fitted frames take up."""
+        """Number of rows on which candidates are compared, less three where frames are fitted."""
         return max(min(int(self.rows.sum()), settings.SAMPLED) - (3 if self.frames is None else 0), 0)
 
     def is_chance(self, fall: float, asked: int) -> bool:
-        """Tell whether one of so many candidates may bring the gap down so far by chance (Bonferroni)."""
+        """Bonferroni test: whether one of so many candidates may reduce the gap so far by chance."""
         return bool(self.count * np.log(fall) < np.log(asked / LEVEL))
 
     def mended(self, fault: Fault) -> Readings:
-        """Return the readings with one repair after the other in these rows."""
+        """Return the readings after the repairs of a fault, one after the other, in these rows."""
         readings = self.readings
         for proposal in fault:
             readings = proposal.repair(readings, self.rows)
         return readings
 
     def sketch(self, fault: Fault, most: int) -> Readings | None:
-        """Return so many of these rows, mended; ``None`` where the repair determines too few."""
+        """Sample of these rows after a repair; ``None`` where the repair determines too few."""
         mended = self.mended(fault)
         own, asked = np.flatnonzero(self.rows & mended.known), int(self.rows.sum())
         # fewer than three rows determine no frame
         return mended.take(evenly(own, min(most, asked))) if len(own) >= max(3, asked / 2) else None
 
     def tried(self, fault: Fault, begun: Array) -> Tried | None:
-        """Mend a fault in these rows; see what a sample of them leaves, aligned from a place and the declared one."""
+        """Repair a fault in these rows and register a sample, from ``begun`` and from the declared target."""
         part = self.sketch(fault, settings.SAMPLED)
         if part is None:
             return None
@@ -146,7 +146,7 @@ class Struck:
         return Tried(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
 
     def hit(self, found: Tried) -> Rows:
-        """(N,) those of these rows that a fault has struck: they fit better mended than as they stand.
+        """Rows (N,) that fit better with the repair than without.
 
         Rows that nothing mends, and those that are not determined, count as the others.
         """
@@ -158,7 +158,7 @@ class Struck:
 
 
 def part_of(readings: Readings, begun: Placed) -> Struck | None:
-    """Return the rows that stray from the others, which are many; ``None`` where few stray, or most."""
+    """Outlying rows where they are many but a minority; else ``None``."""
     frames, distance = begun, readings.distance(begun)
     for _ in range(settings.PART_ROUNDS):
         near = np.flatnonzero(~_strays(readings, distance))
@@ -172,7 +172,7 @@ def part_of(readings: Readings, begun: Placed) -> Struck | None:
 
 
 def _strays(readings: Readings, distance: Array) -> Rows:
-    """(N,) rows that are far off, for those whose gap is near enough."""
+    """Outliers (N,) relative to the quantile of distances that counts as near."""
     near = float(np.quantile(distance, settings.NEAREST))
     return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * readings.tolerance))
 
@@ -200,7 +200,7 @@ def consensus(sample: Readings) -> Placed:
 
 
 def mixture(struck: Struck) -> Struck | None:
-    """Fit mixtures of rows as they stand and rows mended, by each fault; return the rows mended by the best of them.
+    """Two-component mixtures of unrepaired and repaired rows, one for each fault; returns the best one's repaired rows.
 
     For a robot whose own errors are not small beside the fault: no row strays far. The rows are told anew in each
     round. Each row may choose, which counts against the fault as one bit.
@@ -236,13 +236,13 @@ Chosen = list[tuple[Fault, Array, float]]
 
 
 class Screen:
-    """The faults that may have struck some rows, and those of them that are worth a closer look."""
+    """Candidate faults of some rows, screened on few rows before the full comparison."""
 
     def __init__(self, struck: Struck) -> None:
         self.struck, self.asked = struck, 0
 
     def singly(self) -> list[Tried]:
-        """Return each fault by itself, where the frames are known: distances on a few rows."""
+        """Single faults with known frames: distances on a few rows."""
         parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(KINDS)]
         frames = self.struck.frames
         assert frames is not None
@@ -250,7 +250,7 @@ class Screen:
         return [Tried(own, part.distance(frames), frames.tool[:3, 3]) for own, part in parts if part is not None]
 
     def both_sides(self) -> list[Tried]:
-        """Return faults of the joints, of the measurements, and of both, one on each side: distances on a few rows."""
+        """Faults of the joints, of the measurements, and pairs with one of each: distances on a few rows."""
         joints = self._glanced([(), *((p,) for p in self._of_joints)])
         measured = [*self._proposals(MEASUREMENT_KINDS)]
         units, axes, turns = ([p for p in measured if p.kind in kinds] for kinds in (UNITS, AXES, TURNS))
@@ -267,7 +267,7 @@ class Screen:
         return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
 
     def two_of_joints(self) -> list[Tried]:
-        """Return pairs of faults of the joints, among them any number that are reversed beside another fault."""
+        """Pairs of faults of the joints, including sign reversals of any number of joints with another fault."""
         turned = [p for p in self._of_joints if p.joints][: settings.PAIRED_PATTERNS]
         others = [p for p in self._of_joints if not p.joints]
         scores: list[Array] = []
@@ -290,7 +290,7 @@ class Screen:
         return [*self._proposals((*JOINT_KINDS, *PAIRING_KINDS))]
 
     def _proposals(self, kinds: Sequence[Kind]) -> Iterator[Proposal]:
-        """Yield the faults of some kinds; of those that differ by a number the best of each family."""
+        """Yield the faults of some kinds, and the best of each family."""
         for kind in kinds:
             yield from kind.proposed(self.struck.readings)
             for family in kind.families(self.struck.readings):
@@ -299,7 +299,7 @@ class Screen:
                     yield best
 
     def _refined(self, family: Family) -> Proposal | None:
-        """Return the best of a family: the best of those that are tried, then between its neighbours."""
+        """Best fault of a family: best of the grid, then refined between its neighbours."""
         if len(family.tried) < 3:
             return None
         struck = self.struck
@@ -327,7 +327,7 @@ class Screen:
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
     def _glanced(self, faults: Sequence[Fault]) -> Chosen:
-        """Return the faults that leave least of an affine map, fitted once more without the rows that stray."""
+        """Faults with the smallest residual of an affine map, refitted once without outliers."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
         if not own:
@@ -341,7 +341,7 @@ class Screen:
         return [(own[k][0], place[k], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
-        """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion.
+        """Faults with their rigid-registration residual on a few rows, if measured points extend as far as the motion.
 
         Those of which even a map leaves more than a mend may are passed over.
         """
@@ -360,14 +360,14 @@ class Screen:
 
 
 def _extends(readings: Readings) -> bool:
-    """Tell whether measured and predicted points are about as far from each other."""
+    """Whether distances among measured points are about those among predicted points."""
     points = readings.poses[:, :3, 3] if readings.simulated_position is None else readings.simulated_position
     one, other = (float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points))
     return max(one, other) <= settings.EXTENT * min(one, other)
 
 
 def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> DataFault | None:
-    """Return the fault of the data without which robot and table fit; ``None`` where they fit, or none mends them.
+    """Return the data fault whose repair makes robot and table match; ``None`` where they match, or no repair does.
 
     ``progress`` is called with a few words where candidates are tried.
     """
@@ -389,7 +389,7 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
 
 
 def mending(struck: Struck) -> list[Tried]:
-    """Return the faults that mend the rows and cannot be told apart, in the order of their kinds; none if none does.
+    """Faults whose repair cannot be told apart by their residuals, in the order of their kinds; empty without any.
 
     Two faults at once are told where they leave so much less than one that it is no chance.
     """
@@ -409,7 +409,7 @@ def mending(struck: Struck) -> list[Tried]:
 
 
 def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
-    """Return the faults that bring the gap, m, down by far, and as far as the best of them."""
+    """Faults that reduce the gap, m, far enough, and nearly as far as the best of them."""
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
     full = [own for t in likely if (own := struck.tried(t.fault, t.place)) is not None]
@@ -427,7 +427,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
 
 
 def _says_more(one: Tried, other: Tried) -> bool:
-    """Tell whether a fault turns round joints that make no difference beside those of another one."""
+    """Whether a fault reverses further joints that do not improve the fit over another fault."""
     return (
         len(one.fault) == len(other.fault)
         and any(p.joints > o.joints for p, o in zip(one.fault, other.fault, strict=True))
@@ -437,7 +437,7 @@ def _says_more(one: Tried, other: Tried) -> bool:
 
 
 def _usual(tried: Tried) -> tuple[int, ...]:
-    """Order of the kinds, then the fewest joints."""
+    """Sort key: the order of the kinds, then the fewest joints."""
     return (*(KINDS.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
 
 
@@ -460,7 +460,7 @@ def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFau
 
 
 def _words(alike: Sequence[Tried]) -> str:
-    """Say what is wrong, in one kind of place or another, and what else is."""
+    """Describe a fault: what is wrong, in which place, and what else is."""
     parts = []
     for k, proposal in enumerate(alike[0].fault):
         *others, last = dict.fromkeys(t.fault[k].place for t in alike)

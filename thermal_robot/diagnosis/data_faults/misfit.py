@@ -1,4 +1,4 @@
-"""Say that robot and table do not belong together; then no effect is claimed.
+"""Mismatch of robot and table: tests after which no effect is reported.
 
 Lengths that no robot errs by are those of another model: every placement of a joint is calibrated as freely as the
 commands allow, and the robots at hand are tried.
@@ -51,7 +51,7 @@ from thermal_robot.urdf_text import shipped, urdf_text
 
 @dataclass(frozen=True, eq=False)
 class Recalibrated:
-    """Kinematic calibration: a robot whose joints sit where readings put them, with frames for each part of the rows.
+    """Kinematic calibration of all joint placements, with frames of their own for each part of the rows.
 
     The first joint's placement is the base's, and what lies behind the last joint the target's. What the readings do
     not determine stays as the URDF has it: each of the J joints behind the first has a normal prior of a size that no
@@ -68,7 +68,7 @@ class Recalibrated:
 
     @classmethod
     def of(cls, readings: Readings, parts: NDArray[np.int64], begun: Robot) -> Recalibrated:
-        """Calibrate, beginning with another robot of the same joints, such as one with longer links."""
+        """Calibrate from another start, such as a robot with longer links."""
         own = [replace(readings.take(np.flatnonzero(parts == part)), robot=begun).align() for part in np.unique(parts)]
         bases, tools = np.stack([frames.base for frames in own]), np.stack([frames.tool for frames in own])
         found = cls(readings, parts, begun, bases, tools[:, :3, 3], tools[:, :3, :3], _prior(readings.robot))
@@ -80,24 +80,24 @@ class Recalibrated:
 
     @cached_property
     def _segments(self) -> list[int]:
-        """(J,) segments of the joints behind the first."""
+        """Segment (J,) of each joint behind the first."""
         return [s for s, segment in enumerate(self.robot.segments) if segment.movable][1:]
 
     @cached_property
     def _elements(self) -> list[int]:
-        """(J,) elements of the chain of these joints."""
+        """Chain element (J,) of each joint behind the first."""
         return [self.robot.segments[s].index for s in self._segments]
 
     @cached_property
     def moved(self) -> tuple[Array, Array]:
-        """(J, 3) m and (J, 3) rad: shift and turn of each joint behind the first, in its own frame as in the URDF."""
+        """Translations (J, 3) m and rotations (J, 3) rad of each joint behind the first, in its own URDF frame."""
         was, own, index = self.readings.robot.chain, self.robot.chain, self._elements
         back = was.rotations[index].transpose(0, 2, 1)
         shift = (back @ (own.translations[index] - was.translations[index])[:, :, None])[:, :, 0]
         return shift, log3(back @ own.rotations[index])
 
     def farthest(self) -> tuple[str, float, float]:
-        """Return the joint that sits farthest from its place in the URDF, how far, m, and over the median of all.
+        """Joint that is displaced most from the URDF, by how much, m, and the ratio to the median joint.
 
         A slide's own way is its zero and does not count.
         """
@@ -108,7 +108,7 @@ class Recalibrated:
         return chain.names[index[j]], float(far[j]), float(far[j] / max(np.median(far), settings.LEAST_GAP))
 
     def left(self) -> tuple[float, float, float]:
-        """Return the rms distance, m, the rms turn, rad, and the rms of both, m, that so many unknowns leave of one.
+        """Robust residual size, corrected for the unknowns: distance, m, rotation, rad, and both, m.
 
         As medians tell them: few rows that nothing explains do not count.
         """
@@ -137,7 +137,7 @@ class Recalibrated:
         return frames, point, gap
 
     def _stepped(self) -> tuple[Recalibrated, bool]:
-        """Return the calibration after one step downhill, and whether it settled or there is none."""
+        """Calibration after one descent step, and whether it has converged or no step descends."""
         gap = self._seen[2]
         distance = np.linalg.norm(gap, axis=1)
         scale = max(float(middle(distance)) / settings.MEDIAN, settings.LEAST_GAP)
@@ -158,7 +158,7 @@ class Recalibrated:
         return self, True
 
     def _cost(self, scale: float) -> float:
-        """Return Cauchy's cost of the gap at a scale, and what the prior sizes cost."""
+        """Cauchy cost of the gap at a scale plus the penalty of the priors."""
         wide, state = (inference.CAUCHY_SCALE * settings.MEDIAN) ** 2, np.hstack(self.moved).ravel()
         away = (self._seen[2] ** 2).sum(axis=1) / scale**2
         return float(wide * np.log1p(away / wide).sum() + state @ self.prior @ state)
@@ -183,7 +183,7 @@ class Recalibrated:
         return np.concatenate(both, axis=2) * lever[:, None]
 
     def _ahead(self, step: Array, frames: int) -> Recalibrated:
-        """Move frames, by so many entries of a step, and joints."""
+        """Apply a step to frames and joints."""
         by_part, by_joint = step[:frames].reshape(len(self.bases), -1), step[frames:].reshape(-1, 6)
         index = self._elements
         chain = self.robot.chain
@@ -200,7 +200,7 @@ class Recalibrated:
 
 
 def _prior(robot: Robot) -> Array:
-    """(6 J, 6 J) precision of shifts, turns of the axes and zeros.
+    """Prior precision (6 J, 6 J) of translations, axis rotations and joint zeros.
 
     Where a joint is shifted along the axis before it that axis' own joint may as well be: the shift is that one's.
     """
@@ -218,12 +218,12 @@ def _prior(robot: Robot) -> Array:
 
 
 def arm_length(robot: Robot) -> float:
-    """Return the length of all segments together, m: as far as the tool can be from the root, slides drawn in."""
+    """Sum of all segment lengths, m, prismatic joints retracted: a bound on the reach."""
     return float(sum(segment.length for segment in robot.segments))
 
 
 def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
-    """Return the shipped robot that fits readings best, and the median distance, m, that it leaves with frames fitted.
+    """Shipped robot that fits the readings best, and its median distance, m, after registration.
 
     Those with the joints' names come first. None is returned where none fits within the distance ``near``, m.
     """
@@ -246,7 +246,7 @@ def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
 
 @cache
 def _movable(name: str) -> frozenset[str]:
-    """Return the movable joints of a shipped robot; none where it cannot be read."""
+    """Movable joints of a shipped robot; empty where it cannot be read."""
     try:
         joints = ElementTree.fromstring(urdf_text(name).text).iter("joint")
     except (RobotError, ElementTree.ParseError):
@@ -256,7 +256,7 @@ def _movable(name: str) -> frozenset[str]:
 
 @cache
 def _chain(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str, tool: str) -> Robot | None:
-    """Return the chain of a shipped robot that the joints may drive: that of the same ends, else one to a hand."""
+    """Chain of a shipped robot with the same end links, else one that ends at a hand."""
     alike = set(joints) <= _movable(name)
     if not alike and not len(joints) <= len(_movable(name)) <= len(joints) + settings.HAND_JOINTS:
         return None
@@ -266,7 +266,7 @@ def _chain(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str
 
 
 def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
-    """Yield chains of a robot: between links of these names, then from its root to each of its ends."""
+    """Yield chains of a robot: between links of these names, then from its root to each leaf."""
     ends: tuple[str, ...] = ()
     for tool_frame, root_frame in ((tool, root), (tool, None), ("", None)):
         try:
@@ -279,7 +279,7 @@ def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
 
 
 def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
-    """Tell whether it takes another robot, or another motion, to bring commands and measurements together.
+    """Mismatch if only another robot, or another motion, makes commands and measurements match; else ``None``.
 
     Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
     their order, may have frames of their own: a base that was moved is no other robot. The model that is meant is told
@@ -308,7 +308,7 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
 
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
-    """Return what a calibration says: another motion, another model, or ``None`` where a robot errs so."""
+    """Verdict of a calibration: another motion, another model, or ``None`` where a robot may err so much."""
     (away, turned, both), (joint, far, times) = found.left(), found.farthest()
     if turned > settings.ANOTHER_TURN:
         places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
@@ -321,7 +321,7 @@ def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
 
 
 def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(N,) the session of each row, or which quarter of them it belongs to."""
+    """Part (N,) of each row: its session, or its quarter of the campaign."""
     sessions = campaign.labels.get("session")
     if sessions is not None:
         _, parts, counts = np.unique(sessions[rows], return_inverse=True, return_counts=True)
@@ -332,12 +332,12 @@ def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _left(readings: Readings) -> float:
-    """Return the median distance, m, that frames alone leave."""
+    """Median distance, m, after registration alone."""
     return float(np.median(readings.distance(readings.align())))
 
 
 def _lengthened(readings: Readings) -> tuple[float, Robot]:
-    """Return the common factor by which the links fit best, and the robot with such links."""
+    """Return the common length factor that fits best, and the robot with its links scaled by it."""
     robot = readings.robot
     measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
     first = np.log(max(measured, settings.LEAST_GAP) / readings.spread)
@@ -356,10 +356,12 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
 
 
 def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
-    """Judge robot and table before any effect: the URDF's unit, faults of the table, another robot.
+    """Test before any effect whether robot and table match: unit of the URDF, data faults, another robot.
 
     A fault that leaves a gap no robot leaves is none where another robot leaves clearly less.
     """
+    if campaign.position is None:  # every question below is about the columns of an instrument
+        return None
     factor = another_unit(campaign)
     if factor is not None:
         return Misfit(model=AnotherModel(factor))
@@ -373,14 +375,14 @@ def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) 
 
 
 def _leaves(other: Misfit) -> float:
-    """Return what another robot leaves, m: the one at hand that fits, else one of such lengths."""
+    """Residual of another robot, m: of a shipped one that fits, else of this one with scaled links."""
     if other.model is None:
         return np.inf
     return other.model.remains if other.model.fits else other.away or 0.0
 
 
 def another_motion(fitted: Fit) -> Misfit | None:
-    """Tell whether a fit leaves more than any robot errs: robot and table then do not describe the same motion."""
+    """Mismatch if the residual of a fit exceeds what any robot errs: the motions differ; else ``None``."""
     left = fitted.corrected.gap[~fitted.explanation.outliers]
     away, turned = rms(left[:, :3]), rms(left[:, 3:])
     if away > settings.ANOTHER_MOTION * fitted.campaign.reach:
@@ -389,7 +391,7 @@ def another_motion(fitted: Fit) -> Misfit | None:
 
 
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
-    """Return a conclusion whose exact model is the one that was compared; else that of the frames alone, and why."""
+    """Conclusion if its exact model is the one that was compared; else the frames alone, with the reason."""
     note = unsettled(last.fit)
     return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
@@ -397,14 +399,14 @@ def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
 def frames_alone(
     campaign: Campaign, candidates: Sequence[Effect], needed: str = "a table that fits the robot"
 ) -> Conclusion:
-    """Conclude from the unknown frames and nothing else: no candidate can be tested, for want of what is ``needed``."""
+    """Conclusion with the unknown frames alone, where no effect can be tested without the columns in ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
 
 
 def unsettled(fit: Fit) -> str:
-    """Say in a sentence that the exact model of a fit is not the one that was compared and held out; empty if it is.
+    """Sentence if the exact model of a fit is not the one that was compared and held out; else empty.
 
     Combinations are compared, and rows held out, with the model linearised at the exact one. Where Gauss-Newton ends
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.

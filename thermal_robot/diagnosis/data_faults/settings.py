@@ -1,4 +1,4 @@
-"""Every number that was chosen to find faults of the data: its value, its unit, and why that one."""
+"""Chosen numbers of the search for data faults, each with its unit and reason."""
 
 MISFIT = 0.003
 """Of the volume over which the arm moved: a gap after registration above it asks for the search. Six public and 22

@@ -1,0 +1,119 @@
+"""Planes and distances: one component a row, its derivatives, its aliases, and rows of several kinds together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import thermal_robot as tr
+from thermal_robot.effects import library
+from thermal_robot.effects.gate import checked
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
+from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.fit import fit_named
+from thermal_robot.inference.registration import moved, register
+from thermal_robot.observables import seen_components
+from thermal_robot.observations import observe
+
+ANCHORS = np.array([[1.5, 0.2, 0.1], [-0.3, 1.6, 0.2], [0.1, -0.2, 1.8], [-1.4, -0.6, 0.6]])
+ZERO = 0.12
+
+
+@pytest.fixture(scope="module")
+def ur10():
+    return tr.load_robot("example-robot-data:ur10", "tool0")
+
+
+def read_as(campaign, kinds):
+    """The same rows of a tracker as rows of other kinds, one after the other."""
+    points, kind = campaign.position, np.resize(kinds, campaign.samples)
+    number = np.arange(campaign.samples) // len(kinds) % len(ANCHORS)
+    normals, plane = np.eye(3), number % 3
+    height = (points * normals[plane]).sum(axis=1) - 0.1 * plane
+    figures = {
+        "distance": np.linalg.norm(points - ANCHORS[number], axis=1) + ZERO,
+        "height": height,
+        **dict(zip("xyz", points.T, strict=True)),
+    }
+    of = {"distance": "distance", "height": "plane", "x": "position", "y": "position", "z": "position"}
+    readings = {name: np.where(kind == of[name], values, 0.0) for name, values in figures.items() if of[name] in kinds}
+    labels = {"kind": kind, "anchor": number.astype(str), "plane": plane.astype(str)}
+    known = "position" not in kinds
+    return replace(campaign, position=None, readings=readings, labels=labels, base_known=known, noise_position=2e-5)
+
+
+TRUE = np.array([0.0, 3e-3, -2e-3, 2e-3, -3e-3, 0.0])
+KINDS = (("distance",), ("plane",), ("distance", "plane"), ("distance", "position"))
+
+
+def measured(robot, noise=0.0, rows=120, **known):
+    named = dict(zip(robot.joint_names, TRUE, strict=True))
+    return tr.simulate(robot, {"joint_offset": named}, rows=rows, noise=noise, tool=[0.0, 0.0, 0.1], **known)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_columns_are_derivatives_of_the_gap(ur10, kinds):
+    campaign = read_as(measured(ur10), kinds)
+    seen = observe(campaign, register(campaign))
+    columns, names = frame_columns(seen)
+    size = np.abs(seen.gap).max()
+    assert 1e-4 < size < 0.02
+    for k in range(len(names)):
+        step = np.zeros(len(names))
+        step[k] = 1e-6
+        there, back = (observe(campaign, moved(seen.frames, s, names)).gap for s in (step, -step))
+        # lines turn with what is left of a row: slopes hold to its size over the distance
+        assert np.allclose((back - there) / 2e-6, columns[:, :, k], atol=8.0 * size)
+
+
+@pytest.mark.parametrize("kinds", KINDS[:3])
+def test_a_rigid_motion_of_all_is_an_alias(ur10, kinds):
+    campaign = read_as(measured(ur10), kinds)
+    seen = observe(campaign, register(campaign))
+    basis = orthonormal(equations_of(frame_columns(seen)[0]))
+    rigid = equations_of(seen.base_sensitivity[:, :3])
+    assert np.abs(without(rigid, basis)).max() < 1e-9
+    scale = seen.sight.sees(np.concatenate([seen.position, 0.0 * seen.position], axis=1)[:, :, None])
+    assert np.abs(without(equations_of(scale[:, :3]), basis)).max() > 1e-3
+
+
+def test_a_plane_that_is_touched_has_no_length(ur10):
+    campaign = read_as(measured(ur10), ("plane",))
+    touched = replace(campaign, readings={})
+    seen = observe(touched)
+    assert seen.sight.size is not None
+    assert observe(campaign).sight.size is None
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_what_was_wrong_is_found(ur10, kinds):
+    campaign = read_as(measured(ur10, noise=2e-5, rows=200), kinds)
+    fit = fit_named(campaign, [library()["joint_offset"]])
+    ((effect, values),) = fit.effects
+    found = {p.place: v for p, v in zip(checked(effect, fit.nominal), values, strict=True)}
+    for joint, value in zip(ur10.joint_names[1:5], TRUE[1:5], strict=True):
+        assert found[joint] == pytest.approx(value, abs=1e-4)
+
+
+def test_rows_count_by_what_they_see(ur10):
+    campaign = read_as(measured(ur10), ("distance", "position"))
+    assert set(seen_components(campaign).ravel().tolist()) == {1, 3}
+    assert seen_components(measured(ur10)) is None
+
+
+def test_kinds_are_read_from_files(ur10, tmp_path):
+    campaign = read_as(measured(ur10, rows=12), ("distance", "position"))
+    again = tr.read_campaign(tr.write_campaign(campaign, tmp_path / "mixed"))
+    assert again.kinds == ("distance", "position")
+    assert not again.base_known
+    for name, values in campaign.readings.items():
+        assert np.allclose(again.readings[name], values, atol=1e-12)
+
+
+def test_an_unknown_kind_and_an_empty_cell_are_refused(ur10, tmp_path):
+    file = tr.write_campaign(read_as(measured(ur10, rows=12), ("distance", "position")), tmp_path / "mixed")
+    table = file.parent / "measurements.csv"
+    text = table.read_text()
+    table.write_text(text.replace(",distance,", ",distanse,", 2))
+    with pytest.raises(tr.CampaignError, match="unknown kind of measurement"):
+        tr.read_campaign(file)

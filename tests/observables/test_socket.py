@@ -1,0 +1,115 @@
+"""A ball in sockets: what its rows see, what they do not, and what is found from them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import thermal_robot as tr
+from thermal_robot.effects import library
+from thermal_robot.effects.gate import checked
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
+from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.fit import fit_named
+from thermal_robot.inference.registration import moved, register
+from thermal_robot.observables.socket import Stand
+from thermal_robot.observations import Frames, observe
+
+
+@pytest.fixture(scope="module")
+def ur10():
+    return tr.load_robot("example-robot-data:ur10", "tool0")
+
+
+def offsets(robot, values):
+    return {"joint_offset": dict(zip(robot.joint_names, values, strict=True))}
+
+
+def sockets(robot, effects=None, rows=10, noise=0.0, tool=(0.0, 0.0, 0.0), seed=0):
+    """Two sockets on each of three stands, so many rows in each; it is not known where the ball sits."""
+    at = np.eye(4)
+    at[:3, 3] = tool
+    made = tr.simulate(robot, effects, rows=6 * rows, measures="socket", noise=noise, tool=at, seed=seed)
+    return replace(made, covariates={}, target=np.zeros(3))
+
+
+def test_a_sound_robot_spreads_about_no_socket(ur10):
+    seen = observe(sockets(ur10, rows=6))
+    assert np.abs(seen.gap).max() < 1e-9
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_columns_are_derivatives_of_the_gap(ur10, known):
+    campaign = sockets(ur10, offsets(ur10, [0, 2e-3, -1e-3, 2e-3, 1e-3, 0]), rows=5, tool=(0.0, 0.01, 0.05))
+    if known:
+        campaign = replace(campaign, facts={"socket": {"distances": (("0", "1", 0.05),)}})
+    frames = register(campaign)
+    seen = observe(campaign, frames)
+    columns, names = frame_columns(seen)
+    assert np.abs(seen.gap).max() > 1e-5
+    for k in range(len(names)):
+        step = np.zeros(len(names))
+        step[k] = 1e-6
+        there, back = (observe(campaign, moved(seen.frames, s, names)).gap for s in (step, -step))
+        slope = (back - there) / 2e-6
+        # the twist is taken about the socket: columns differ from the slope by a turn of what is left of the row
+        assert np.allclose(slope, columns[:, :, k], atol=3.0 * np.abs(seen.gap).max())
+
+
+def test_a_stand_keeps_its_known_distance_and_the_others_move():
+    rng = np.random.default_rng(3)
+    stand = Stand(("0", "1", "2"), rng.normal(size=(3, 3)), ((0, 1, 0.05), (1, 2, 0.07))).held()
+    assert stand.width == 7
+    there = stand.moved(0.3 * rng.normal(size=7))
+    assert np.linalg.norm(there.points[0] - there.points[1]) == pytest.approx(0.05, abs=1e-12)
+    assert np.linalg.norm(there.points[1] - there.points[2]) == pytest.approx(0.07, abs=1e-12)
+    assert np.abs(there.points - stand.points).max() > 0.01
+
+
+def test_what_moves_all_stands_is_an_alias_of_them(ur10):
+    campaign = sockets(ur10, offsets(ur10, [0, 3e-3, -2e-3, 1e-3, 1e-3, 0]), rows=8)
+    seen = observe(campaign, register(campaign))
+    basis = orthonormal(equations_of(frame_columns(seen)[0]))
+    first = seen.joint_sensitivity[:, :3, :1]
+    scale = np.concatenate([seen.position, 0.0 * seen.position], axis=1)[:, :, None]
+    for columns in (seen.base_sensitivity[:, :3], first, seen.sight.sees(scale)[:, :3]):
+        left = without(equations_of(columns), basis)
+        assert np.abs(left).max() < 1e-9
+    assert np.abs(without(equations_of(seen.joint_sensitivity[:, :3, 1:5]), basis)).max() > 0.01
+
+
+def test_what_was_wrong_is_found_wherever_the_stands_stand(ur10):
+    true = np.array([0.0, 4e-3, -3e-3, 2e-3, 3e-3, 0.0])
+    campaign = sockets(ur10, offsets(ur10, true), rows=15, noise=5e-5, tool=(0.02, 0.0, 0.1), seed=1)
+    fit = fit_named(campaign, [library()["joint_offset"]])
+    ((effect, values),) = fit.effects
+    seen = {p.place: v for p, v in zip(checked(effect, fit.nominal), values, strict=True)}
+    for joint, value in zip(ur10.joint_names[1:5], true[1:5], strict=True):
+        assert seen[joint] == pytest.approx(value, abs=1e-4)
+    assert fit.corrected.frames.tool[:3, 3] == pytest.approx([0.02, 0.0, 0.1], abs=1e-4)
+
+
+def test_labels_of_stands_are_names_and_no_numbers(ur10):
+    campaign = sockets(ur10, offsets(ur10, [0, 3e-3, 0, 1e-3, 0, 0]), rows=6, noise=5e-5)
+    renamed = {"place 0": "z", "place 1": "a", "place 2": "m"}
+    other = np.array([renamed[label] for label in campaign.labels["stand"]])
+    again = replace(campaign, labels={**campaign.labels, "stand": other})
+    one, two = (observe(c, register(c)).gap for c in (campaign, again))
+    assert np.allclose(one, two, atol=1e-9)
+
+
+def test_a_campaign_of_sockets_is_written_and_read_again(ur10, tmp_path):
+    campaign = replace(sockets(ur10, rows=4), facts={"socket": {"distances": (("0", "1", 0.05),)}})
+    again = tr.read_campaign(tr.write_campaign(campaign, tmp_path / "written"))
+    assert again.kinds == ("socket",)
+    assert again.base_known
+    assert again.facts == campaign.facts
+    assert np.array_equal(again.q, campaign.q)
+    for label in ("stand", "socket", "kind"):
+        assert (again.labels[label] == campaign.labels[label]).all()
+
+
+def test_frames_hold_what_is_shared(ur10):
+    campaign = sockets(ur10, rows=4)
+    seen = observe(campaign, Frames.declared(campaign))
+    assert sorted(seen.frames.artefacts) == ["stand place 0", "stand place 1", "stand place 2"]

@@ -1,0 +1,57 @@
+"""Gauge freedom: what no reading of a campaign can see, found by the rank of the columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.names import listed
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
+from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.fit import Fit
+
+
+def unseen(fit: Fit) -> Iterator[str]:
+    """Yield in sentences which rigid motion of the root, which size and which zeros the readings do not see.
+
+    A direction is not seen where its column lies, to rounding, in the span of the frames and of what rows share.
+    Where an instrument measured in a frame of its own its frames are told elsewhere, and nothing is yielded.
+    """
+    campaign, seen = fit.campaign, fit.nominal  # corrected, what varies may part what is alike
+    if campaign.position is not None:
+        return
+    basis = orthonormal(equations_of(frame_columns(seen)[0]))
+    measures = seen.gap.shape[1]
+
+    def hidden(columns: Array, size: Array) -> list[int]:
+        left = np.linalg.norm(without(equations_of(columns[:, :measures]), basis), axis=0)
+        return [k for k in range(len(size)) if left[k] <= settings.ALIAS * size[k]]
+
+    twists = np.linalg.norm(_told(fit), axis=(0, 1))
+    if campaign.base_known and hidden(seen.base_sensitivity, twists):
+        yield (
+            "nothing but the arm says where its root stands: place and direction of the base are not observable, and "
+            "predictions are in the frame of the commands"
+        )
+    zeros = np.linalg.norm(seen.joint_sensitivity[:, :3], axis=(0, 1))
+    alike = [fit.campaign.robot.joint_names[j] for j in hidden(seen.joint_sensitivity, zeros)]
+    if alike:
+        yield f"the zero of {listed(alike)} is not observable: what rows share, or the tool, takes it up"
+    places = np.concatenate([seen.position, np.zeros_like(seen.position)], axis=1)[:, :, None]
+    if hidden(seen.sight.sees(places), np.array([np.linalg.norm(seen.position)])):
+        yield (
+            "no length was measured: the scale of the robot is not observable, and lengths hold relative to those of "
+            "the URDF; a known distance of two sockets, or a draw wire, would tell it"
+        )
+
+
+def _told(fit: Fit) -> Array:
+    """(N, 3, 6) what a twist of the base does to the place of the target, whether a row sees it or not."""
+    point = fit.nominal.position
+    moved = np.zeros((len(point), 3, 6))
+    moved[:, :, :3] = np.eye(3)
+    moved[:, :, 3:] = np.cross(np.eye(3)[None], point[:, None, :]).transpose(0, 2, 1)
+    return moved

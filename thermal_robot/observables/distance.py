@@ -1,0 +1,61 @@
+"""Distance to a point: a draw wire, a ballbar; the point and the zero of the instrument are unknown.
+
+Of a row one component is read, along the line to the point (Driels and Swayze, *IEEE Transactions on Robotics and
+Automation* 10, 1994, on a ballbar).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.observables.observable import Along, Artefact, Seen
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """Where a wire leaves its box, ``place`` (3,) m, measurement frame, and what it reads of no length, ``zero`` m."""
+
+    place: Array
+    zero: float = 0.0
+
+    width: ClassVar[int] = 4
+
+    def moved(self, step: Array) -> Anchor:
+        """Return the anchor after a step of its place and its zero."""
+        return replace(self, place=self.place + step[:3], zero=self.zero + float(step[3]))
+
+
+class Distance(Along):
+    """Distance of the target from a point that nobody measured, m."""
+
+    kind: ClassVar[str] = "distance"
+    says: ClassVar[str] = "distance to a point"
+    label: ClassVar[str] = "anchor"
+
+    def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
+        """Return the anchor by trilateration: |p|² − L² = 2 p·a − 2 z L − (|a|² − z²), linear but for the last term."""
+        places, lengths = seen.where[here], seen.readings("distance")[here, 0]
+        middle = places.mean(axis=0)
+        off = places - middle
+        design = np.column_stack([2.0 * off, -2.0 * lengths, -np.ones(len(off))])
+        told = (off**2).sum(axis=1) - lengths**2
+        found = np.linalg.lstsq(design, told, rcond=None)[0]
+        return Anchor(found[:3] + middle, float(found[3]))
+
+    def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
+        """(n,) how much farther the target is predicted than read, m, and (n, 3) the line to it, measurement frame."""
+        names, number = seen.shared(self.label)
+        lines = seen.where - np.array([artefacts[name].place for name in names])[number]
+        far = np.linalg.norm(lines, axis=1)
+        zeros = np.array([artefacts[name].zero for name in names])[number]
+        return far + zeros - seen.readings("distance")[:, 0], lines / far[:, None]
+
+    def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
+        """(n, 4) derivative of what is read by the anchor's place and zero."""
+        return np.column_stack([-self.read(seen, artefacts)[1], np.ones(len(seen.position))])

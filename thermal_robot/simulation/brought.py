@@ -1,0 +1,141 @@
+"""Closed loops: a robot with effects at work is brought to where a reading says that its target is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.names import KIND
+from thermal_robot.effects import Effect
+from thermal_robot.errors import CampaignError
+from thermal_robot.inference.exact import corrected_observations
+from thermal_robot.observables.plane import Plane
+from thermal_robot.observables.socket import Stand
+from thermal_robot.observations import Frames, observe
+
+ROUNDS, STARTS, CLOSED = 40, 6, 1e-11
+"""Newton steps at most; how often a row is begun nearer, by half the way; and the distance in m at which a loop is
+closed: rounding of a metre is a thousandth of it."""
+LEAST = 1e-3  # share of a Jacobian's largest singular value below which a joint is no way to close a loop
+SWAY, BETWEEN, LED = 1.0, 0.05, 2.0
+"""By how much, rad or m, postures at one socket differ at most; m from one socket of a stand to the next;
+rad at most to which a joint is led."""
+
+
+def brought(
+    plan: Campaign,
+    frames: Frames,
+    effects: Sequence[tuple[Effect, Array]] = (),
+    away: Array | None = None,
+    near: Array | None = None,
+) -> Campaign:
+    """Inverse kinematics by Newton's method: commands with which each row reads what it says.
+
+    Parameters
+    ----------
+    plan
+        Rows near where they are to be.
+    frames
+        The true frames and artefacts.
+    effects
+        What is at work, with the (P,) values of each.
+    away
+        (N, m) by how much each row is to miss what it says, root frame axes, m and rad: play and noise.
+    near
+        (N, n) postures that are nearer to it, from which rows begin that are not reached otherwise.
+
+    Raises
+    ------
+    CampaignError
+        Rows that the robot cannot bring there.
+    """
+    begun, starts = plan.q, STARTS if near is not None else 1
+    for number in range(ROUNDS * starts):
+        seen = corrected_observations(plan, frames, effects)
+        left = seen.gap / (seen.sight.size.relative if seen.sight.size else 1.0)
+        left = np.nan_to_num(left if away is None else left - away, nan=1.0)
+        if np.abs(left).max() < CLOSED:
+            return plan
+        slopes = seen.joint_sensitivity[:, : left.shape[1]]
+        step = np.linalg.pinv(slopes, rcond=LEAST) @ left[:, :, None]
+        plan = replace(plan, q=plan.q + np.clip(step[:, :, 0], -SWAY, SWAY))
+        if near is not None and number % ROUNDS == ROUNDS - 1:  # what is not reached is begun nearer
+            begun = 0.5 * (begun + near)
+            lost = np.abs(left).max(axis=1) >= CLOSED
+            plan = replace(plan, q=np.where(lost[:, None], begun, plan.q))
+    raise CampaignError(plan.name, "the robot does not reach what it is to touch", expected="another place or seed")
+
+
+TOUCHED = ("socket", "plane")
+"""Kinds of which the robot is led to what a row says."""
+STANDS, SOCKETS, PLANES, ANCHORS = 3, 2, 3, 4
+"""Of a campaign that is simulated: the fewest of which one can be held out; as printed; a corner; the fewest that see
+every direction twice."""
+ABOUT = 1.2  # of the extent of the places: how far from their middle a draw wire stands
+
+
+def touched(
+    kind: str,
+    plan: Campaign,
+    frames: Frames,
+    effects: Sequence[tuple[Effect, Array]],
+    noise: float,
+    rng: np.random.Generator,
+) -> Campaign:
+    """Return the campaign of a robot that is led into sockets, or onto planes, from the postures of a plan.
+
+    ``noise`` is one sigma per axis of the play, m.
+    """
+    labels, artefacts, q, near = _stands(plan, rng) if kind == "socket" else _planes(plan, frames)
+    labels = {**plan.labels, KIND: np.full(plan.samples, kind), **labels}
+    rows = replace(plan, q=q, labels=labels, base_known=True, moves="unknown", orientation=None)
+    away = noise * rng.normal(size=(plan.samples, 3))
+    if kind == "plane":  # play across a plane shows nothing
+        normals = np.array([artefacts[f"plane {own}"].normal for own in labels["plane"]])
+        away = normals * (away * normals).sum(axis=1, keepdims=True)
+    true = Frames(np.eye(4), frames.tool, artefacts)
+    return replace(brought(rows, true, effects, away, near), noise_position=noise or None)
+
+
+def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any], Array, Array | None]:
+    """Return the labels of sockets, the stands, postures near them, and nearer ones."""
+    robot, each = plan.robot, -(-plan.samples // (STANDS * SOCKETS))
+    low, high = np.maximum(robot.lower, -LED), np.minimum(robot.upper, LED)
+    middles = rng.uniform(low + 0.25 * (high - low), high - 0.25 * (high - low), (STANDS, robot.n))
+    stand = (np.arange(plan.samples) // (SOCKETS * each)).clip(max=STANDS - 1)
+    socket = np.arange(plan.samples) // each % SOCKETS
+    q = np.clip(middles[stand] + rng.uniform(-SWAY, SWAY, plan.q.shape), low, high)
+    places = observe(Campaign("middles", robot, middles, target=plan.target, base_known=True)).position
+    apart = BETWEEN * np.arange(SOCKETS)[:, None] * np.array([0.0, 1.0, 0.0])
+    sockets = tuple(str(k) for k in range(SOCKETS))
+    artefacts = {f"stand place {k}": Stand(sockets, place + apart) for k, place in enumerate(places)}
+    labels = {"stand": np.char.add("place ", stand.astype(str)), "socket": socket.astype(str)}
+    return labels, artefacts, q, middles[stand]
+
+
+def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, Any], Array, Array | None]:
+    """Return the labels of planes, the planes through the middle of all places, and the plan's postures."""
+    middle = np.median(observe(plan, frames).position, axis=0)
+    number = np.arange(plan.samples) % PLANES
+    planes = {f"plane {k}": Plane(normal, float(normal @ middle)) for k, normal in enumerate(np.eye(PLANES))}
+    return {"plane": number.astype(str)}, planes, plan.q, None
+
+
+def as_kind(kind: str, campaign: Campaign) -> Campaign:
+    """Return the rows that an instrument measured as those of another kind."""
+    if kind == "controller":
+        labels = {**campaign.labels, KIND: np.full(campaign.samples, kind)}
+        return replace(campaign, labels=labels, base_known=True, tool_known=True)
+    if kind != "distance":
+        return campaign
+    points, number = np.asarray(campaign.position), np.arange(campaign.samples) % ANCHORS
+    corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+    anchors = points.mean(axis=0) + ABOUT * np.ptp(points, axis=0).max() * corners / np.sqrt(3.0)
+    read = {"distance": np.linalg.norm(points - anchors[number], axis=1)}
+    labels = {**campaign.labels, KIND: np.full(campaign.samples, kind), "anchor": number.astype(str)}
+    return replace(campaign, position=None, readings=read, labels=labels, base_known=True)
