@@ -130,7 +130,9 @@ def test_a_line_that_is_not_printed_is_noticed():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "texts"), [("tutorial", 8), ("tracker", 7), ("add_an_effect", 4), ("motion_tutorial", 1)])
+@pytest.mark.parametrize(
+    ("name", "texts"), [("tutorial", 8), ("tracker", 7), ("add_an_effect", 4), ("motion_tutorial", 1)]
+)
 def test_a_page_runs_and_prints_what_it_shows(name, texts, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
