@@ -95,6 +95,16 @@ class MotionLog:
         What an output must move by to be shown, rad, by joint.
     notes
         What was odd about the log and was accepted, a sentence each.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> import thermal_robot as tr
+    >>> t = np.arange(0.0, 10.0, 0.02)
+    >>> moved = {"time": t, "cmd.joint_1": np.sin(t), "q.joint_1": 0.98 * np.sin(t - 0.06)}
+    >>> log = tr.motion_from_table(tr.load_robot("builtin:rv_m2", "tool0"), pd.DataFrame(moved))
+    >>> log.joints, log.motions[0].position.values.shape
+    (('joint_1',), (500, 1))
     """
 
     name: str
