@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ from thermal_robot.motion.refuse import fed_forward
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
 from thermal_robot.motion.torque import TorqueModel
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Mask = NDArray[np.bool_]
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
@@ -152,16 +149,9 @@ def _answer(
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, _probability(model, choice),
         _unexplained(model, choice, noise), values,
-        {name: _curves(model, j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
+        {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
         shares=shares,
     )  # fmt: skip
-
-
-def _curves(model: JointModel, joint: int, values: Array) -> pd.DataFrame:
-    """Return what is drawn of a joint as a table."""
-    import pandas as pd
-
-    return pd.DataFrame(model.drawn(joint, values))
 
 
 def _by_motion(model: JointModel, residuals: list[Array], weights: Array) -> Array:

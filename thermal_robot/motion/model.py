@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from thermal_robot.motion.effects import EFFECTS, size
 from thermal_robot.motion.loads import Dynamics
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHARED = -1
 """Joint of a parameter that all joints share."""
@@ -122,6 +125,12 @@ class JointModel(ABC):
     @abstractmethod
     def drawn(self, joint: int, values: Array) -> dict[str, Array]:
         """(N,) what is drawn of a joint, by name."""
+
+    def curves(self, joint: int, values: Array) -> pd.DataFrame:
+        """Table of what is drawn of a joint: motion, time, command, measured, nominal, simulated and load."""
+        import pandas as pd
+
+        return pd.DataFrame(self.drawn(joint, values))
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
