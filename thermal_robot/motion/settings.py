@@ -85,7 +85,7 @@ STRUCTURE, LEVELS = 0.1, 10
 AGREE = 0.1
 """Share by which the shrinkage of a simulator's own rollout may differ from the one that was told."""
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-"""MuJoCo's impedance of friction that is written: at its usual 0.9 a joint that should stick creeps to its place within a
-second; here a thousand times more slowly."""
+"""MuJoCo's impedance of friction that is written: at its usual 0.9 a joint that should stick creeps to its place within
+a second; here a thousand times more slowly."""
 STIFFEST = 2.0
 """Time steps: shortest time constant that MuJoCo lets a constraint have."""
