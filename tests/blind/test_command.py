@@ -131,6 +131,25 @@ def test_cases_that_were_not_asked_are_told_and_not_scored(run, asked):
     assert "thermal-robot: note: c2 (null) was not asked: no draw shows the fault" in err
 
 
+def test_motions_are_asked_in_the_place_of_poses(run, tmp_path, monkeypatch):
+    from thermal_robot.blind.motions import trial
+
+    def answered(cases, workers, progress):
+        return [trial.Answer(case, verdict=("delay",), groups=((),), places=((),)) for case in cases]
+
+    monkeypatch.setattr(trial, "run", answered)
+    status, out, err = run("--motion", 1, "--seed", 3, "--json", tmp_path / "s.json")
+    assert status == 0
+    assert "nothing: silent 0%" in out
+    assert "unlisted: blamed on an effect 100%" in out
+    assert "Seed 3: 16 arms" in err
+    assert len(json.loads((tmp_path / "s.json").read_text())) == 16
+    for wrong in (("--motion", 0), ("--motion", 1, "--markdown"), ("--motion", 1, "--effect", "drift")):
+        status, out, err = run(*wrong)
+        assert (status, out) == (2, "")
+        assert "--motion: cannot be run so" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
