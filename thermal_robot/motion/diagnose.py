@@ -88,13 +88,20 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     if model.pieces > 1:  # what one motion leaves has no others to be compared with
         return {}
     kinds = np.array([m.kind or m.name for m in model.log.motions])
-    each = np.zeros((len(kinds), len(choice.point.rows)))
+    each, nominal = np.zeros((2, len(kinds), len(choice.point.rows)))
+    before = _nothing(model)
     for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
         count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
         each[:, j] = np.bincount(one.motion, (one.residual / noise) ** 2, len(kinds)) / count
+        nominal[:, j] = np.bincount(one.motion, (before[j] / noise) ** 2, len(kinds)) / count
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
     usual = float(np.median(list(square.values())))
-    far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}
+    was = {kind: float(nominal[kinds == kind].max(axis=1).mean()) for kind in square}
+    far = {
+        kind: float(np.sqrt(value / usual))
+        for kind, value in square.items()
+        if value > settings.GATE**2 * usual and value > (1.0 - settings.MOST) * was[kind]
+    }
     return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
@@ -140,7 +147,9 @@ def _answer(
     folds = min(settings.FOLDS, model.clusters)
     held_out = HeldOut("motion", folds, total[0], total[1], shrinkage, (float(low), float(high)))
     findings, shares = _findings(model, choice, before, weights)
-    verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
+    left = _unexplained(model, choice, noise)
+    told = not left.flagged or shrinkage >= settings.MOST
+    verdict = tuple(one.name for one in findings if told and one.status in ("found", "confounded"))
     values = {
         (one.effect, "" if one.joint == SHARED else log.joints[one.joint]): float(point.values[p])
         for p, one in enumerate(model.parameters)
@@ -148,7 +157,7 @@ def _answer(
     }
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, _probability(model, choice),
-        _unexplained(model, choice, noise), values,
+        left, values,
         {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
         shares=shares,
     )  # fmt: skip

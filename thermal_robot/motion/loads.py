@@ -27,6 +27,11 @@ class Loads:
     inertia: Array
     slope: Array
 
+    def towards(self, other: Loads, share: float) -> Loads:
+        """Return loads a share of the way to others."""
+        pairs = ((self.torque, other.torque), (self.inertia, other.inertia), (self.slope, other.slope))
+        return Loads(*(one + share * (two - one) for one, two in pairs))
+
 
 class Dynamics:
     """Rigid-body dynamics of the joints of a log, the others held at zero."""

@@ -16,7 +16,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
-from thermal_robot.motion.loads import Dynamics
+from thermal_robot.motion.loads import Dynamics, Loads
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
@@ -161,6 +161,7 @@ class ServoModel(JointModel):
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
         self.about = np.stack([np.clip(self.commanded[:, j], *self._range(j)) for j in self.joints], axis=1)
         self.loads = self.dynamics.along(self.about)
+        self.moving = False
         self.touching, self.pressing = 0.0, np.zeros_like(self.about)
         self.contact = np.zeros_like(self.about)
         self.up = -np.asarray(log.robot.gravity) / max(float(np.linalg.norm(log.robot.gravity)), 1e-12)
@@ -171,6 +172,8 @@ class ServoModel(JointModel):
         motions = self.log.motions
         spacing = np.concatenate([np.diff(m.position.time) for m in motions])
         self.step = float(np.median(spacing))
+        if self.coupled:
+            self.step /= max(1, int(np.ceil(self.step / settings.STEP)))
         self.substeps = max(1, int(np.ceil(self.step / settings.STEP)))
         counts = [int(np.ceil((m.position.time[-1] - m.position.time[0]) / self.step - 1e-9)) + 1 for m in motions]
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
@@ -267,7 +270,7 @@ class ServoModel(JointModel):
                 weights[:, 2] = values[:, p] - self.touching
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.maximum(1.0 + x["kp"], settings.LEAST_STIFFNESS)
-            x["droop"], x["lag"] = 1.0 / stiffness, x["lag"] + (servo.kd or 0.0) / stiffness
+            x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
             x["saturation"] = x["saturation"] + (stiffness / servo.limit if servo.limit else 0.0)
         x["dead_zone"] = x["dead_zone"] + (servo.dead_band or 0.0)
         reach = self.commanded[:, joint].min(), self.commanded[:, joint].max()
@@ -338,8 +341,26 @@ class ServoModel(JointModel):
         }  # fmt: skip
 
     def refreshed(self, values: Array) -> None:
-        """Take the loads where the joints go in place of where they are sent; those of their motion where coupled."""
-        about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
+        """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.
+
+        Joints wait for each other's accelerations: Jacobi's iteration, relaxed by 2/(J + 1), as the eigenvalues of a
+        positive mass matrix that is scaled by its diagonal lie between 0 and J.
+        """
+        share, rounds = (2.0 / (len(self.joints) + 1), settings.WAVES) if self.coupled else (1.0, 1)
+        self._touch(None)
+        for _ in range(rounds):
+            about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
+            loads = self._loads(about)
+            if self.moving:
+                about, loads = self.about + share * (about - self.about), self.loads.towards(loads, share)
+            self.moving, moved = self.coupled, float(np.abs(about - self.about).max())
+            self.about, self.loads = about, loads
+            if moved < min(self.noise(joint) for joint in self.joints):
+                break
+        self._touch(values)
+
+    def _loads(self, about: Array) -> Loads:
+        """Loads along positions (n, J) on the grid; with their velocities and accelerations where coupled."""
         speed = rate = None
         if self.coupled:
             speed, rate = np.zeros_like(about), np.zeros_like(about)
@@ -347,10 +368,12 @@ class ServoModel(JointModel):
                 if b - a > 2:
                     speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
                     rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
-        self.about, self.loads = about, self.dynamics.along(about, speed, rate)
+        return self.dynamics.along(about, speed, rate)
+
+    def _touch(self, values: Array | None) -> None:
         p = self.index("contact")
-        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(about), np.zeros_like(about)
-        if p is not None and values[p] > 0.0:
+        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
+        if p is not None and values is not None and values[p] > 0.0:
             self._press(values)
 
     def _press(self, values: Array) -> None:

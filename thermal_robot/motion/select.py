@@ -146,18 +146,18 @@ def _pruned(model: JointModel, choice: Choice, allowed: Mask, values: Array) -> 
     What stays is fitted exactly, and judged again there.
     """
     for _ in range(settings.SELECTIONS):
-        kept = _kept(choice)
+        kept = _kept(model, choice)
         allowed = allowed & (kept | ~choice.active)
         values = fit(model, np.where(kept, values, 0.0), kept, choice.sizes)
         choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, kept, final=True)
-        if (_kept(choice) == kept).all():
+        if (_kept(model, choice) == kept).all():
             break
     return choice
 
 
-def _kept(choice: Choice) -> Mask:
+def _kept(model: JointModel, choice: Choice) -> Mask:
     """Return which parameters of a choice stay, by the linear problem at its fit."""
-    active, search = choice.active.copy(), choice.search
+    active, search = choice.active & seen(model, choice.point), choice.search
     while active.any():
         best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)
         whole, worst = held_out_loss(choice.point, active, choice.sizes).sum(), None
@@ -172,3 +172,13 @@ def _kept(choice: Choice) -> Mask:
             break
         active[worst[1]] = False
     return active
+
+
+def seen(model: JointModel, point: Point) -> Mask:
+    """(P,) whether a parameter moves a joint's output by twice its noise, root mean square, or by what is tolerated."""
+    found = np.zeros(len(point.values), dtype=bool)
+    for joint, one in zip(model.joints, point.rows, strict=True):
+        least = max(settings.VISIBLE * model.noise(joint), model.log.tolerance.get(model.log.joints[joint], 0.0))
+        moved = np.sqrt(np.mean(one.derivative**2, axis=0)) * np.abs(point.values[one.columns])
+        found[one.columns] |= moved >= least
+    return found

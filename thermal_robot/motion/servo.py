@@ -3,7 +3,7 @@
 Per joint, everything over the servo's stiffness K (rad for N·m), with the command u, Coulomb and load friction exact in
 sticking,
 
-    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q], ±L) − c load(q) ,   |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
+    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q] − τ_d q̇, ±L) − c load(q) ,   |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
 D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of
 gravity and of the other joints. One step of the
@@ -36,12 +36,17 @@ PARAMETERS = (
     "saturation",
     "low",
     "high",
+    "derivative",
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad."""
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s."""
 STRIBECK_VELOCITY = 0.1
 """rad/s: v_s, at which sliding has begun: BAM's measured servos, 0.05 to 0.2."""
-NEWTON_STEPS = 12
-"""Of the piecewise linear equation of a step: it has five pieces, and each step finds another one."""
+
+
+NEAR = 0.5
+"""rad: farther from where it was taken a load grows no more; it is a sine."""
+FASTEST = 1e3
+"""rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
 
 def _simulate(  # type: ignore[no-untyped-def]
@@ -53,7 +58,7 @@ def _simulate(  # type: ignore[no-untyped-def]
     half = 0.5 * h
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
-        coulomb, load_friction, stribeck, dead, saturation, low, high = numbers[s, 6:]
+        coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
             q, v = start[m], 0.0
@@ -67,10 +72,10 @@ def _simulate(  # type: ignore[no-untyped-def]
                 for i in range(weights.shape[1]):
                     load0 += weights[s, i] * loads[i, n]
                     mass += weights[s, i] * inertias[i, n]
-                accelerating = 2.0 * (droop * mass + inertia) / h
+                accelerating = 2.0 * max(droop * mass + inertia, 0.0) / h
                 bend = droop * slope[n]
                 # without inertia the midpoint rule would ring about a command that is followed at once
-                drag = max(lag, half) if accelerating < half else lag
+                drag = max(lag, half - derivative) if accelerating < half else lag
                 force = droop * load0
                 if n > begins[m]:
                     for _ in range(substeps):
@@ -80,7 +85,7 @@ def _simulate(  # type: ignore[no-untyped-def]
                         late = integral[k, 0] + integral[k, 1] * (t - times[k])
                         u = (1.0 + gain) * (late - before) / h + zero
                         before = late
-                        load = force + bend * (q - about[n])
+                        load = force + bend * max(min(q - about[n], NEAR), -NEAR)
                         most = coulomb + load_friction * abs(load)
                         if stribeck > 0.0:
                             most += stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
@@ -98,25 +103,20 @@ def _simulate(  # type: ignore[no-untyped-def]
                             pull += most
                         middle = 0.0
                         if abs(at_rest) > most:
-                            damping = accelerating + drag + bend * half
-                            w, piece = 0.0, -1
-                            for _ in range(NEWTON_STEPS):
-                                e = u - q - half * w
-                                drive, stiff, now = 0.0, 0.0, 0
-                                if e > dead:
-                                    if e - dead < limit:
-                                        drive, stiff, now = e - dead, half, 1
-                                    else:
-                                        drive, now = limit, 2
-                                elif e < -dead:
-                                    if e + dead > -limit:
-                                        drive, stiff, now = e + dead, half, 3
-                                    else:
-                                        drive, now = -limit, 4
-                                if now == piece:
-                                    break
-                                piece = now
-                                w -= (damping * w - pull - drive) / (damping + stiff + 1e-12)
+                            damping = max(accelerating + drag + bend * half, 1e-12)
+                            # unclipped, in the piece of D that holds; where that asks for too much, the limit
+                            e, free = u - q, damping + derivative
+                            w = pull / free
+                            if e - half * w > dead:
+                                w = (pull + e - dead) / (free + half)
+                            elif e - half * w < -dead:
+                                w = (pull + e + dead) / (free + half)
+                            asked = damping * w - pull
+                            if asked > limit:
+                                w = (pull + limit) / damping
+                            elif asked < -limit:
+                                w = (pull - limit) / damping
+                            w = max(min(w, FASTEST), -FASTEST)
                             middle = w if w * at_rest > 0.0 else 0.0
                         then = q + h * middle
                         if then < low or then > high:
