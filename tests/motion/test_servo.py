@@ -58,8 +58,8 @@ def test_friction_stops_the_joint_within_its_width_and_holds_it(inertia):
 def test_a_joint_hangs_below_its_command_by_compliance_times_load():
     q, _ = moved(lag=0.05, droop=0.07, load=2.0)
     assert q[-1] == pytest.approx(1.0 - 0.07 * 2.0, abs=1e-9)
-    q, _ = moved(lag=0.05, droop=0.07, load=2.0, slope=3.0)  # the load grows with the position
-    assert q[-1] == pytest.approx((1.0 - 0.07 * 2.0) / (1.0 + 0.07 * 3.0), abs=1e-9)
+    q, _ = moved(command=0.4, lag=0.05, droop=0.07, load=2.0, slope=3.0)  # the load grows with the position
+    assert q[-1] == pytest.approx((0.4 - 0.07 * 2.0) / (1.0 + 0.07 * 3.0), abs=1e-9)
 
 
 def test_delay_shifts_the_answer_and_no_more():

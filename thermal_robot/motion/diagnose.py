@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import SHARED, JointModel, ServoModel
+from thermal_robot.motion.moves import moves
 from thermal_robot.motion.refuse import fed_forward
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
@@ -159,7 +160,7 @@ def _answer(
         log, joints, held_out, findings, verdict, _probability(model, choice),
         left, values,
         {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
-        shares=shares,
+        shares=shares, unit=model.unit, moves=moves(model, point.values),
     )  # fmt: skip
 
 
@@ -195,42 +196,7 @@ def _findings(
         less = choice.active.copy()
         less[block] = False
         share[block] = (held_out_loss(point, less, choice.sizes) - base).sum(axis=1) * scale
-    found = []
-    for name in ALL:
-        own = [p for p, one in enumerate(model.parameters) if one.effect == name]
-        title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
-        if not own:
-            found.append(Finding(name, "not_testable", title=title, needs=_needs(name)))
-            continue
-        active = [p for p in own if choice.active[p]]
-        probability = max(choice.probability([p]) for p in own)
-        if not active:
-            found.append(Finding(name, "not_found", probability, 0.0, title=title))
-            continue
-        rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
-        sums = {p: float(share[p].sum()) for p in active}
-        places = [
-            Location("joint", log.joints[model.parameters[p].joint], sums[p])
-            for p in active
-            if model.parameters[p].joint != SHARED
-        ]
-        total = sum(sums.values())
-        estimates = tuple(
-            Estimate(
-                ", ".join(
-                    (one.label, *([log.joints[one.joint]] if one.joint != SHARED else []))
-                ), float(point.values[p]), float(deviations[p]), one.unit, True,
-            )
-            for p in active
-            for one in (model.parameters[p],)
-        )  # fmt: skip
-        status: Status = "confounded" if rivals and probability < settings.SURE else "found"
-        found.append(
-            Finding(
-                name, status, probability, total, None, (), tuple(sorted(rivals)) if status == "confounded" else (),
-                tuple(sorted(places, key=lambda one: -one.share)), estimates, title=title,
-            )
-        )  # fmt: skip
+    found = [_finding(model, choice, name, share, deviations) for name in ALL]
     found.sort(key=lambda one: (-(one.shrinkage or 0.0), one.status not in ("found", "confounded")))
     joints = {
         name: float(weights[j] * ((before[j] ** 2).sum() - (point.rows[j].residual ** 2).sum()) / max(whole, 1e-300))
@@ -239,10 +205,42 @@ def _findings(
     return tuple(found), joints
 
 
+def _finding(model: JointModel, choice: Choice, name: str, share: Mapping[int, Array], deviations: Array) -> Finding:
+    """Return the finding of one effect: held-out shares (J,) by parameter are those without it."""
+    own = [p for p, one in enumerate(model.parameters) if one.effect == name]
+    title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
+    if not own:
+        return Finding(name, "not_testable", title=title, needs=_needs(name))
+    active = [p for p in own if choice.active[p]]
+    probability = max(choice.probability([p]) for p in own)
+    if not active:
+        return Finding(name, "not_found", probability, 0.0, title=title)
+    rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
+    names, parameters = model.log.joints, [model.parameters[p] for p in active]
+    places = [
+        Location("joint", names[one.joint], float(share[p].sum()))
+        for p, one in zip(active, parameters, strict=True)
+        if one.joint != SHARED
+    ]
+    estimates = tuple(
+        Estimate(
+            ", ".join((one.label, *([names[one.joint]] if one.joint != SHARED else []))),
+            float(choice.point.values[p]), float(deviations[p]), one.unit, True,
+        )
+        for p, one in zip(active, parameters, strict=True)
+    )  # fmt: skip
+    status: Status = "confounded" if rivals and probability < settings.SURE else "found"
+    alike = tuple(sorted(rivals)) if status == "confounded" else ()
+    total, sorted_places = float(sum(share[p].sum() for p in active)), sorted(places, key=lambda one: -one.share)
+    return Finding(name, status, probability, total, None, (), alike, tuple(sorted_places), estimates, title=title)
+
+
 def _needs(name: str) -> tuple[str, ...]:
-    if name == "kp":
-        return ("servo.kp",)
-    return () if name == "droop" else ("masses in the URDF",)
+    if name in TORQUE_TITLES or name == "masses":
+        return ("tau",)
+    return {"kp": ("servo.kp",), "payload": ("masses in the URDF",), "contact": ("masses in the URDF",)}.get(
+        name, ("cmd",)
+    )
 
 
 def _unexplained(model: JointModel, choice: Choice, noise: list[float]) -> Unexplained:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,42 +81,44 @@ def fit(
         shared = bool(common.any()) and number % 2 == 1
         now = active if shared else active & ~common
         own = np.flatnonzero(now)
-        lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
         if not len(own):
             continue
         point = Point.at(model, values, now)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        tight = np.diag(sizes[own] ** -2.0)
         before = np.array(
             [(one.residual[u] ** 2).sum() / n**2 for one, u, n in zip(point.rows, used, point.noise, strict=True)]
         )
-        ahead = []
-        for damping in settings.DAMPINGS:
-            whole = matrix[np.ix_(own, own)]
-            whole = whole + damping * np.diag(np.diag(whole)) + tight
-            pull = vector[own] + damping * np.diag(matrix)[own] * values[own]
-            root = np.linalg.cholesky(whole)
-            step = lsq_linear(root.T, np.linalg.solve(root, pull), bounds=(lower, np.inf)).x
-            ahead.append(values.copy())
-            ahead[-1][own] = step
+        sets = _ahead(model, values, own, matrix, vector, sizes)
         best, gained = values.copy(), 0.0
-        sets = np.array(ahead)
         costs = _costs(model, sets, used, point.noise)
         if shared:
             k = int(np.argmin(costs.sum(axis=0)))
             gained = float(before.sum() - costs[:, k].sum())
-            best = ahead[k] if gained > 0.0 else values
+            best = sets[k] if gained > 0.0 else values
         else:
             for j, cost in enumerate(costs):
                 k = int(np.argmin(cost))
                 if cost[k] < before[j]:
-                    best[joint_of == j] = ahead[k][joint_of == j]
+                    best[joint_of == j] = sets[k][joint_of == j]
                     gained += before[j] - cost[k]
         values = best
         quiet = quiet + 1 if gained < settings.SETTLED * before.sum() else 0
         if quiet > common.any():
             break
     return values
+
+
+def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Array, sizes: Array) -> Array:
+    """(S, P) values after steps of all dampings, by least squares with the parameters' bounds."""
+    lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
+    found = np.tile(values, (len(settings.DAMPINGS), 1))
+    inside = matrix[np.ix_(own, own)]
+    for one, damping in zip(found, settings.DAMPINGS, strict=True):
+        whole = inside + np.diag(damping * np.diag(inside) + sizes[own] ** -2.0)
+        root = np.linalg.cholesky(whole)
+        pull = np.linalg.solve(root, vector[own] + damping * np.diag(inside) * values[own])
+        one[own] = lsq_linear(root.T, pull, bounds=(lower, np.inf)).x
+    return found
 
 
 def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
+from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
-from thermal_robot.motion.loads import Dynamics, Loads
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
@@ -81,6 +81,11 @@ class JointModel(ABC):
         """Return the place of a parameter, ``None`` where the model has none of it."""
         found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
         return found[0] if found else None
+
+    def dynamics_of(self, log: MotionLog, masses: bool) -> Dynamics:
+        """Rigid-body dynamics of the log's joints."""
+        payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
+        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.gravity, payload, masses)
 
     def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
@@ -154,7 +159,7 @@ class ServoModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        self.dynamics = Dynamics(log)
+        self.dynamics = self.dynamics_of(log, masses=False)
         self.servos = [log.servos.get(name, Servo()) for name in log.joints]
         self.coupled = all(servo.kp for servo in self.servos)
         self._grids()
@@ -336,7 +341,8 @@ class ServoModel(JointModel):
         left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
         return {
             "motion": motion, "time": self.grid[at] + beyond * self.step - self.first[motion],
-            "command": self.commanded[at, joint], "measured": measured, "nominal": measured - left[0],
+            "command": self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
+            "measured": measured, "nominal": measured - left[0],
             "simulated": measured - left[1], "load": self.loads.torque[0, at, joint],
         }  # fmt: skip
 
@@ -360,7 +366,7 @@ class ServoModel(JointModel):
         self._touch(values)
 
     def _loads(self, about: Array) -> Loads:
-        """Loads along positions (n, J) on the grid; with their velocities and accelerations where coupled."""
+        """Return the loads along positions (n, J) on the grid; those of their motion where coupled."""
         speed = rate = None
         if self.coupled:
             speed, rate = np.zeros_like(about), np.zeros_like(about)

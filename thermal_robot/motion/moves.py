@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.model import SHARED, JointModel
 
 
-def moves(model: ServoModel, values: Array) -> Mapping[tuple[str, str], float]:
+def moves(model: JointModel, values: Array) -> Mapping[tuple[str, str], float]:
     """Root mean square of the change of each joint's simulation without one effect, all others as they were fitted.
 
     Parameters

@@ -3,7 +3,8 @@
 Per joint, everything over the servo's stiffness K (rad for N·m), with the command u, Coulomb and load friction exact in
 sticking,
 
-    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q] − τ_d q̇, ±L) − c load(q) ,   |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
+    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q] − τ_d q̇, ±L) − c load(q) ,
+    |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
 D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of
 gravity and of the other joints. One step of the
@@ -15,6 +16,7 @@ command that is held between its stamps is averaged over the step, so that the a
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -49,84 +51,82 @@ FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
 
+def _middle(q, v, u, load, most, inertia, drag, derivative, bend, half, dead, limit):  # type: ignore[no-untyped-def]
+    """Velocity at the middle of a step: zero where friction holds the joint, else the root of a monotone function."""
+    e, pull, drive = u - q, inertia * v - load, 0.0
+    if e > dead:
+        drive = min(e - dead, limit)
+    elif e < -dead:
+        drive = max(e + dead, -limit)
+    at_rest = pull + drive
+    if abs(at_rest) <= most:
+        return 0.0
+    pull += -most if at_rest > 0.0 else most
+    damping = max(inertia + drag + bend * half, 1e-12)
+    # unclipped, in the piece of D that holds; where that asks for too much, the limit
+    free = damping + derivative
+    w = pull / free
+    if e - half * w > dead:
+        w = (pull + e - dead) / (free + half)
+    elif e - half * w < -dead:
+        w = (pull + e + dead) / (free + half)
+    asked = damping * w - pull
+    if asked > limit:
+        w = (pull + limit) / damping
+    elif asked < -limit:
+        w = (pull - limit) / damping
+    w = max(min(w, FASTEST), -FASTEST)
+    return w if w * at_rest > 0.0 else 0.0
+
+
 def _simulate(  # type: ignore[no-untyped-def]
     numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about, inertias,
     start, out,
 ):  # fmt: skip
     """Integrate all motions for each set of numbers; ``out`` (S, n) is q on the grid."""
-    h = step / substeps
-    half = 0.5 * h
+    h, half = step / substeps, 0.5 * step / substeps
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
         coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
-            q, v = start[m], 0.0
+            q, v, t = start[m], 0.0, first[m] - delay
             k, last = command_begins[m], command_begins[m + 1] - 1
-            late, t = 0.0, first[m] - delay
             while k < last and times[k + 1] <= t:
                 k += 1
             before = integral[k, 0] + integral[k, 1] * (t - times[k])
             for n in range(begins[m], begins[m + 1]):
-                load0, mass = 0.0, 0.0
+                force, mass = 0.0, 0.0
                 for i in range(weights.shape[1]):
-                    load0 += weights[s, i] * loads[i, n]
-                    mass += weights[s, i] * inertias[i, n]
-                accelerating = 2.0 * max(droop * mass + inertia, 0.0) / h
-                bend = droop * slope[n]
+                    force += droop * weights[s, i] * loads[i, n]
+                    mass += droop * weights[s, i] * inertias[i, n]
+                heavy, bend = 2.0 * max(mass + inertia, 0.0) / h, droop * slope[n]
                 # without inertia the midpoint rule would ring about a command that is followed at once
-                drag = max(lag, half - derivative) if accelerating < half else lag
-                force = droop * load0
-                if n > begins[m]:
-                    for _ in range(substeps):
-                        t += h
-                        while k < last and times[k + 1] <= t:
-                            k += 1
-                        late = integral[k, 0] + integral[k, 1] * (t - times[k])
-                        u = (1.0 + gain) * (late - before) / h + zero
-                        before = late
-                        load = force + bend * max(min(q - about[n], NEAR), -NEAR)
-                        most = coulomb + load_friction * abs(load)
-                        if stribeck > 0.0:
-                            most += stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
-                        e = u - q
-                        pull = accelerating * v - load
-                        drive = 0.0
-                        if e > dead:
-                            drive = min(e - dead, limit)
-                        elif e < -dead:
-                            drive = max(e + dead, -limit)
-                        at_rest = pull + drive
-                        if at_rest > most:
-                            pull -= most
-                        elif at_rest < -most:
-                            pull += most
-                        middle = 0.0
-                        if abs(at_rest) > most:
-                            damping = max(accelerating + drag + bend * half, 1e-12)
-                            # unclipped, in the piece of D that holds; where that asks for too much, the limit
-                            e, free = u - q, damping + derivative
-                            w = pull / free
-                            if e - half * w > dead:
-                                w = (pull + e - dead) / (free + half)
-                            elif e - half * w < -dead:
-                                w = (pull + e + dead) / (free + half)
-                            asked = damping * w - pull
-                            if asked > limit:
-                                w = (pull + limit) / damping
-                            elif asked < -limit:
-                                w = (pull - limit) / damping
-                            w = max(min(w, FASTEST), -FASTEST)
-                            middle = w if w * at_rest > 0.0 else 0.0
-                        then = q + h * middle
-                        if then < low or then > high:
-                            then, middle = max(min(then, high), low), 0.0
-                        v = 2.0 * middle - v if middle != 0.0 else 0.0
-                        q = then
+                drag = max(lag, half - derivative) if heavy < half else lag
+                for _ in range(substeps if n > begins[m] else 0):
+                    t += h
+                    while k < last and times[k + 1] <= t:
+                        k += 1
+                    late = integral[k, 0] + integral[k, 1] * (t - times[k])
+                    u, before = (1.0 + gain) * (late - before) / h + zero, late
+                    load = force + bend * max(min(q - about[n], NEAR), -NEAR)
+                    most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
+                    middle = _middle(  # type: ignore[no-untyped-call]
+                        q, v, u, load, most, heavy, drag, derivative, bend, half, dead, limit
+                    )
+                    then = q + h * middle
+                    if then < low or then > high:
+                        then, middle = max(min(then, high), low), 0.0
+                    v, q = 2.0 * middle - v if middle != 0.0 else 0.0, then
                 out[s, n] = q
 
 
-_compiled = None
+@cache
+def _kernel() -> Any:
+    """Compile the loops when they are first asked for."""
+    global _middle
+    _middle = compiled(_middle)
+    return compiled(_simulate)
 
 
 def simulate(
@@ -141,17 +141,14 @@ def simulate(
 ) -> Array:
     """Time stepping of one joint in all motions, for S sets of numbers: (S, n) rad on the grid.
 
-    ``numbers`` (S, 13) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
+    ``numbers`` (S, 14) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
     kg·m²; ``grid`` begins of motions and their first instants; ``command`` stamps, integral with slope and begins;
     ``around`` loads, their slope (n,), N·m/rad, the position (n,) at which they hold, and inertias; ``start`` (M,) rad.
     """
-    global _compiled
-    if _compiled is None:
-        _compiled = compiled(_simulate)
     begins, first = grid
     times, integral, command_begins = command
     loads, slope, about, inertias = around
     out = np.empty((len(numbers), begins[-1]))
-    _compiled(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
+    _kernel()(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
               inertias, start, out)  # fmt: skip
     return out

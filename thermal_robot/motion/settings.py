@@ -79,10 +79,6 @@ SETTLED = 1e-3
 """Of the sum of squares: a smaller gain ends the fit."""
 DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 """Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
-ANGLE_STEP = 1e-4
-"""rad: step by which a load's slope is told; a load is linear over it, and rounding stays below 1e-10 of it."""
-LOAD_STEP = 0.02
-"""rad along the way: loads are linear between configurations so near, to 5e-5 of themselves."""
 LEAST_NOISE = 1e-5
 """rad: no encoder of a joint is finer; a simulated log may leave nothing."""
 WIDE = 10.0

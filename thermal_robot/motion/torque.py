@@ -18,7 +18,6 @@ from scipy.signal import savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
-from thermal_robot.motion.loads import Dynamics
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
@@ -33,7 +32,7 @@ class TorqueModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        dynamics = Dynamics(log)
+        dynamics = self.dynamics_of(log, masses=True)
         parts = [_derivatives(m.position.time, m.position.values) for m in log.motions]
         self._q, self._v, self._a = (np.concatenate([one[k] for one in parts]) for k in range(3))
         self._loads = dynamics.along(self._q, self._v, self._a, whole=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,17 +11,16 @@ import pinocchio as pin
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
+from thermal_robot.kinematics import settings
 from thermal_robot.kinematics.model import held_at
-from thermal_robot.motion import settings
-from thermal_robot.motion.log import MotionLog
 
 
 @dataclass(frozen=True, eq=False)
 class Loads:
     """Joint torques and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
 
-    The first of the k is that of the model; then that of 1 kg of payload, and of each link that of its
-    whole mass and of 1 kg·m along each of its axes.
+    The first of the k is that of the model; then that of 1 kg of payload; then, where asked for, of each link that of
+    its whole mass and of 1 kg·m along each of its axes.
     """
 
     torque: Array
@@ -34,24 +34,29 @@ class Loads:
 
 
 class Dynamics:
-    """Rigid-body dynamics of the joints of a log, the others held at zero."""
+    """Rigid-body dynamics of some joints of a URDF, the others held at zero.
 
-    def __init__(self, log: MotionLog) -> None:
-        model = pin.buildModelFromXML(log.robot.urdf)
-        others = [j for j, name in enumerate(model.names) if j and name not in log.joints]
+    ``payload`` (3,) m is the centre of mass of a payload in the tool frame; with ``masses`` those of links count, too.
+    """
+
+    def __init__(
+        self, urdf: str, joints: Sequence[str], tool_frame: str, gravity: Array, payload: Array, masses: bool
+    ) -> None:
+        model = pin.buildModelFromXML(urdf)
+        others = [j for j, name in enumerate(model.names) if j and name not in joints]
         model = held_at(model, others, pin.neutral(model))
-        model.gravity.linear = np.asarray(log.robot.gravity)
+        model.gravity.linear = np.asarray(gravity)
         self.model, self.data = model, model.createData()
-        ids = [model.getJointId(name) for name in log.joints]
+        ids = [model.getJointId(name) for name in joints]
         self.at = [model.joints[j].idx_v for j in ids]
         self._q = [(model.joints[j].idx_q, model.joints[j].nq) for j in ids]
-        self.frame = model.getFrameId(log.robot.tool_frame, pin.FrameType.BODY)
+        self.frame = model.getFrameId(tool_frame, pin.FrameType.BODY)
         frame = model.frames[self.frame]
-        com = frame.placement.act(log.payload[1] if log.payload else np.zeros(3))
+        com = frame.placement.act(payload)
         self.bodies = [model.names[j] for j in range(1, model.njoints) if model.inertias[j].mass > 0.0]
         models = [model, model.copy()]
         models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
-        for name in self.bodies:
+        for name in self.bodies if masses else ():
             j = model.getJointId(name)
             heavier = model.copy()
             heavier.inertias[j] += model.inertias[j]
