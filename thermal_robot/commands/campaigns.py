@@ -69,6 +69,10 @@ def diagnose(options: argparse.Namespace) -> None:
 
     if declares_motion(Path(options.campaign)):
         return _diagnose_motion(options)
+    for name in ("mjcf", "urdf", "from_mjcf", "unseen"):
+        if getattr(options, name):
+            column = f"--{name.replace('_', '-')}"
+            raise CampaignError("diagnose", "is for logs of motion", column=column, expected="`correct` with a model")
     files = read_from(options.campaign, Path() if options.piped else None)
     require_free((options.json, options.model, options.report), files)
     found = diagnosed(options)
@@ -84,6 +88,7 @@ def diagnose(options: argparse.Namespace) -> None:
 
 
 def _diagnose_motion(options: argparse.Namespace) -> None:
+    from thermal_robot.commands.motion_files import motion_files
     from thermal_robot.motion.read import files_of
     from thermal_robot.report import motion_html
 
@@ -92,10 +97,10 @@ def _diagnose_motion(options: argparse.Namespace) -> None:
             "diagnose", "no model of poses comes of a log of motion", column="--model", expected="no such option"
         )
     files = files_of(options.campaign, Path() if options.piped else None)
-    require_free((options.json, options.report), files)
+    require_free((options.json, options.report, options.mjcf, options.urdf), files)
     found = diagnosed(options)
     page = as_page(options.report, motion_html, found, files, lambda file: file.name)
-    deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
+    deliver(options, [(options.json, found.to_json), page, *motion_files(options, found)], str(found), found.summary)
 
 
 def demo(options: argparse.Namespace) -> None:
