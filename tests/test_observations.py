@@ -127,7 +127,7 @@ def test_what_was_forgotten_is_computed_again(rv_m2):
     before = seen.segment_sensitivity
     held = set(vars(seen))
     seen.forget()
-    assert held - set(vars(seen)) == {"chain", "segment_sensitivity"}
+    assert held - set(vars(seen)) == {"chain", "segment_sensitivity", "sight"}
     assert seen.segment_sensitivity is not before
     np.testing.assert_array_equal(seen.segment_sensitivity, before)
 

@@ -1,6 +1,6 @@
 """Hand-eye data: joint states and samples of MoveIt's calibration; corners that OpenCV found in images.
 
-MoveIt: github.com/moveit/moveit_calibration, ``handeye_control_widget.cpp``: joint states are a map of ``joint_names``
+Source of MoveIt's: github.com/moveit/moveit_calibration, ``handeye_control_widget.cpp``: joint states are a map of ``joint_names``
 and ``joint_values``, a list for each sample; samples a list of maps with ``effector_wrt_world`` and
 ``object_wrt_sensor``, 4 × 4 each as sixteen figures; rad and m. What the camera says of the board is its pose in the
 camera's frame: with the camera in the room it is an instrument that measures the pose of a target on the tool. With the
