@@ -1,7 +1,7 @@
 """Hand-eye data: joint states and samples of MoveIt's calibration; corners that OpenCV found in images.
 
-Source of MoveIt's: github.com/moveit/moveit_calibration, ``handeye_control_widget.cpp``: joint states are a map of ``joint_names``
-and ``joint_values``, a list for each sample; samples a list of maps with ``effector_wrt_world`` and
+Source of MoveIt's: github.com/moveit/moveit_calibration, ``handeye_control_widget.cpp``: joint states are a map of
+``joint_names`` and ``joint_values``, a list for each sample; samples a list of maps with ``effector_wrt_world`` and
 ``object_wrt_sensor``, 4 × 4 each as sixteen figures; rad and m. What the camera says of the board is its pose in the
 camera's frame: with the camera in the room it is an instrument that measures the pose of a target on the tool. With the
 camera on the hand the inverse is the camera's pose in the board's frame. Which of the two it is follows from the poses
