@@ -5,6 +5,8 @@ import pytest
 
 pytest.importorskip("numba", reason="the extra fast is not installed")
 
+from thermal_robot.errors import EstimationError
+from thermal_robot.motion import servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
 STEP = 0.02
@@ -115,3 +117,10 @@ def test_breakaway_is_above_sliding_friction():
     free, _ = moved(command=0.05, lag=0.05, coulomb=0.03)
     assert np.ptp(held) == 0.0
     assert np.ptp(free) > 0.01
+
+
+def test_without_numba_the_extra_is_named(monkeypatch):
+    monkeypatch.setattr(servo, "find_spec", lambda name: None)
+    servo._kernel.cache_clear()
+    with pytest.raises(EstimationError, match=r"thermal-robot\[fast\]"):
+        moved(lag=0.05)

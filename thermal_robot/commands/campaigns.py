@@ -7,7 +7,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from thermal_robot.campaign import describe, write_predictions
 from thermal_robot.commands.shared import as_json, as_page, deliver, read, read_from, tell
@@ -18,6 +18,7 @@ from thermal_robot.files import require_free, write_one
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis import Diagnosis
+    from thermal_robot.motion.result import MotionDiagnosis
 
 
 def check(options: argparse.Namespace) -> None:
@@ -100,7 +101,8 @@ def _diagnose_motion(options: argparse.Namespace) -> None:
     require_free((options.json, options.report, options.mjcf, options.urdf), files)
     found = diagnosed(options)
     page = as_page(options.report, motion_html, found, files, lambda file: file.name)
-    deliver(options, [(options.json, found.to_json), page, *motion_files(options, found)], str(found), found.summary)
+    robot_files = motion_files(options, cast("MotionDiagnosis", found))
+    deliver(options, [(options.json, found.to_json), page, *robot_files], str(found), found.summary)
 
 
 def demo(options: argparse.Namespace) -> None:

@@ -30,7 +30,7 @@ def unseen(fit: Fit) -> Iterator[str]:
         left = np.linalg.norm(without(equations_of(columns[:, :measures]), basis), axis=0)
         return [k for k in range(len(size)) if left[k] <= settings.ALIAS * size[k]]
 
-    twists = np.linalg.norm(_told(fit), axis=(0, 1))
+    twists = np.linalg.norm(_base_moves(fit), axis=(0, 1))
     if campaign.base_known and hidden(seen.base_sensitivity, twists):
         yield (
             "nothing but the arm says where its root stands: place and direction of the base are not observable, and "
@@ -48,8 +48,8 @@ def unseen(fit: Fit) -> Iterator[str]:
         )
 
 
-def _told(fit: Fit) -> Array:
-    """(N, 3, 6) what a twist of the base does to the place of the target, whether a row sees it or not."""
+def _base_moves(fit: Fit) -> Array:
+    """Return the derivative (N, 3, 6) of the target's place by a twist of the base, whether a row sees it or not."""
     point = fit.nominal.position
     moved = np.zeros((len(point), 3, 6))
     moved[:, :, :3] = np.eye(3)

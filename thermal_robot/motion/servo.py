@@ -17,12 +17,14 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
+from thermal_robot.errors import EstimationError
 
 PARAMETERS = (
     "zero",
@@ -123,9 +125,12 @@ def _simulate(  # type: ignore[no-untyped-def]
 
 @cache
 def _kernel() -> Any:
-    """Compile the loops when they are first asked for."""
+    """Compile the loops when they are first asked for; :class:`EstimationError` where numba is not installed."""
     global _middle
-    _middle = compiled(_middle)
+    if find_spec("numba") is None:
+        raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
+    if not hasattr(_middle, "py_func"):
+        _middle = compiled(_middle)
     return compiled(_simulate)
 
 
