@@ -89,20 +89,13 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     if model.pieces > 1:  # what one motion leaves has no others to be compared with
         return {}
     kinds = np.array([m.kind or m.name for m in model.log.motions])
-    each, nominal = np.zeros((2, len(kinds), len(choice.point.rows)))
-    before = _nothing(model)
+    each = np.zeros((len(kinds), len(choice.point.rows)))
     for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
         count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
         each[:, j] = np.bincount(one.motion, (one.residual / noise) ** 2, len(kinds)) / count
-        nominal[:, j] = np.bincount(one.motion, (before[j] / noise) ** 2, len(kinds)) / count
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
     usual = float(np.median(list(square.values())))
-    was = {kind: float(nominal[kinds == kind].max(axis=1).mean()) for kind in square}
-    far = {
-        kind: float(np.sqrt(value / usual))
-        for kind, value in square.items()
-        if value > settings.GATE**2 * usual and value > (1.0 - settings.MOST) * was[kind]
-    }
+    far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}
     return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
