@@ -167,13 +167,11 @@ def compare(
     if not all(motion) or len(motion) != 2 or len(names) not in (0, 2):
         found = f"{sum(motion)} of motion, {len(motion) - sum(motion)} of poses, {len(names)} names"
         raise CampaignError("compare()", "motion is compared in pairs", found=found, expected="two logs of motion")
-    done: list[MotionDiagnosis] = []
-    for one in campaigns:
-        given = (
-            one if isinstance(one, MotionDiagnosis) else diagnose(one, only=only, without=without, progress=progress)
-        )
-        done.append(given)
-    return compare_motions(done[0], done[1], names)
+    first, second = (
+        one if isinstance(one, MotionDiagnosis) else diagnose(one, only=only, without=without, progress=progress)
+        for one in campaigns
+    )
+    return compare_motions(first, second, names)
 
 
 def is_motion(given: Any) -> bool:

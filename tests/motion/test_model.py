@@ -83,13 +83,13 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     ratio = ratios(point)
     assert (ratio >= 1.0).all()
     assert ratio.max() > 1.5  # rounded readings of a slow joint err together
-    gram, blocks = deflated(model, point, ratio)
-    white, _ = deflated(model, point, np.ones(len(ratio)))
+    gram = deflated(model, point, ratio)
+    white = deflated(model, point, np.ones(len(ratio)))
     np.testing.assert_allclose(np.diag(gram.matrix) * ratio, np.diag(white.matrix), rtol=1e-9)
     found = np.linalg.lstsq(white.matrix, white.vector, rcond=1e-13)[0]
     near = 1e-3 * np.abs(gram.vector).max()
     np.testing.assert_allclose(gram.matrix @ found, gram.vector, atol=near)
-    assert [effect for effect, joint in blocks if joint == SHARED] == ["payload", "contact"]
+    assert [one.effect for one in model.parameters if one.joint == SHARED] == ["payload", "contact"]
 
 
 def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(known):

@@ -99,10 +99,6 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
-def _nothing(model: JointModel) -> list[Array]:
-    return model.all_residuals(np.zeros(len(model.parameters)))
-
-
 def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
     count, found = model.clusters, [one.residual.copy() for one in choice.point.rows]
@@ -123,7 +119,7 @@ def _answer(
     model: JointModel, choice: Choice, refused: dict[str, float], left_out: tuple[str, ...], progress: Any
 ) -> MotionDiagnosis:
     log, point = model.log, choice.point
-    before, held = _nothing(model), _folds(model, choice, progress)
+    before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(model, choice, progress)
     noise = [model.noise(j) for j in model.joints]
     joints = {
         name: JointGap(rms(before[j]), rms(point.rows[j].residual), rms(held[j]), noise[j])

@@ -150,10 +150,10 @@ def ratios(point: Point) -> Array:
     return found
 
 
-def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, list[tuple[str, int]]]:
-    """Return normal equations, in units of prior sizes, with the information that motions bring, and the blocks.
+def deflated(model: JointModel, point: Point, deflation: Array) -> Gram:
+    """Return normal equations, in units of prior sizes, with the information that motions bring.
 
-    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. A block is an effect of a joint.
+    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
     """
     matrix, vector = (one.sum(axis=(0, 1)) for one in point.products[:2])
     sizes = np.array([one.size for one in model.parameters])
@@ -164,8 +164,7 @@ def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, l
     along = whole @ (found / sizes)
     each = [float(np.median(deflation[one.columns])) for one in point.rows]
     equations = sum(len(one.residual) / ratio for one, ratio in zip(point.rows, each, strict=True))
-    blocks: list[tuple[str, int]] = [(one.effect, one.joint) for one in model.parameters]
-    k = range(len(blocks))
+    k = range(len(sizes))
     return Gram(
         whole,
         along,
@@ -177,4 +176,4 @@ def deflated(model: JointModel, point: Point, deflation: Array) -> tuple[Gram, l
         np.array([one.spread for one in model.parameters]),
         equations,
         0.0,
-    ), blocks
+    )

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 from lxml import etree
 
 from thermal_robot.arrays import Array
+from thermal_robot.motion.settings import VISIBLE
 from thermal_robot.robot import Robot
 
 
@@ -26,6 +28,12 @@ class Channel:
 
     time: Array
     values: Array
+
+    def of(self, joint: int) -> tuple[Array, Array]:
+        """Return stamps and values of a joint, those that are no number left out unless all are."""
+        column = self.values[:, joint]
+        kept = np.isfinite(column) if np.isfinite(column).any() else np.ones(len(column), dtype=bool)
+        return self.time[kept], column[kept]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +133,10 @@ class MotionLog:
     def commanded(self) -> bool:
         """Whether commands were recorded; where none were, they are the encoder's readings, and torques tell."""
         return any(motion.command is not motion.position for motion in self.motions)
+
+    def visible_from(self, joint: str, noise: float) -> float:
+        """Return by what a joint's output must move to be told: twice its noise, and what is tolerated of it."""
+        return max(VISIBLE * noise, self.tolerance.get(joint, 0.0))
 
     def with_joints(self, joints: Sequence[str]) -> MotionLog:
         """Return the log of some of its joints."""

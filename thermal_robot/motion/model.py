@@ -85,7 +85,7 @@ class JointModel(ABC):
     def dynamics_of(self, log: MotionLog, masses: bool) -> Dynamics:
         """Rigid-body dynamics of the log's joints."""
         payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
-        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.gravity, payload, masses)
+        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload, masses)
 
     def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
@@ -169,7 +169,8 @@ class ServoModel(JointModel):
         self.moving = False
         self.touching, self.pressing = 0.0, np.zeros_like(self.about)
         self.contact = np.zeros_like(self.about)
-        self.up = -np.asarray(log.robot.gravity) / max(float(np.linalg.norm(log.robot.gravity)), 1e-12)
+        gravity = np.asarray(log.robot.model.gravity.linear)  # in the frame of the URDF's root, as Pinocchio's
+        self.up = -gravity / max(float(np.linalg.norm(gravity)), 1e-12)
         self.lowest = float(self.dynamics.heights(self.commanded, self.up)[0].min())
         self.parameters = self._parameters()
 
@@ -184,7 +185,6 @@ class ServoModel(JointModel):
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first = np.array([m.position.time[0] for m in motions])
         self.grid = np.concatenate([t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)])
-        self.motion_of_grid = np.repeat(np.arange(len(motions)), counts)
 
     def _range(self, joint: int) -> tuple[float, float]:
         measured = np.concatenate([m.position.values[:, joint] for m in self.log.motions])
@@ -195,22 +195,19 @@ class ServoModel(JointModel):
         parts = []
         for k, motion in enumerate(self.log.motions):
             grid = self.grid[self.begins[k] : self.begins[k + 1]]
-            at = np.clip(np.searchsorted(motion.command.time, grid + 1e-9, side="right") - 1, 0, None)
-            parts.append(motion.command.values[at, joint])
+            time, command = motion.command.of(joint)
+            parts.append(command[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, None)])
         return np.concatenate(parts)
 
     @cached_property
     def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
         """Of each joint the stamps of all motions, the command's integral there and its slope, and their begins."""
         found = []
-        begins = np.concatenate([[0], np.cumsum([len(m.command.time) for m in self.log.motions])]).astype(np.int64)
-        for j in range(len(self.log.joints)):
-            parts = []
-            for motion in self.log.motions:
-                t, u = motion.command.time, motion.command.values[:, j]
-                before = np.concatenate([[0.0], np.cumsum(u[:-1] * np.diff(t))])
-                parts.append(np.column_stack([before, u]))
-            times = np.concatenate([m.command.time for m in self.log.motions])
+        for j in self.joints:
+            each = [motion.command.of(j) for motion in self.log.motions]
+            parts = [np.column_stack([np.concatenate([[0.0], np.cumsum(u[:-1] * np.diff(t))]), u]) for t, u in each]
+            begins = np.concatenate([[0], np.cumsum([len(t) for t, _ in each])]).astype(np.int64)
+            times = np.concatenate([t for t, _ in each])
             found.append((times, np.ascontiguousarray(np.concatenate(parts)), begins))
         return found
 
@@ -262,7 +259,7 @@ class ServoModel(JointModel):
         return values
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 13) numbers of the kernel and (S, 3) weights of the loads, for sets (S, P) of all parameters."""
+        """(S, 14) numbers of the kernel and (S, 3) weights of the loads, for sets (S, P) of all parameters."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
         weights = np.zeros((len(values), 3))
         weights[:, 0] = 1.0

@@ -144,10 +144,7 @@ class MotionDiagnosis:
         """
         if not self.moves:
             return tuple(one.name for one in self.finding(effect).locations) or tuple(self.joints)
-        least = {
-            name: max(settings.VISIBLE * one.noise, self.log.tolerance.get(name, 0.0))
-            for name, one in self.joints.items()
-        }
+        least = {name: self.log.visible_from(name, one.noise) for name, one in self.joints.items()}
         return tuple(name for name, size in least.items() if self.moves.get((effect, name), 0.0) >= size)
 
     @property

@@ -117,7 +117,7 @@ def _weighed(
     """Search by evidence at some values; where ``final`` the choice is the start, and the search tells its rivals."""
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
-    gram, _ = deflated(model, point, deflation)
+    gram = deflated(model, point, deflation)
     barred = frozenset(np.flatnonzero(~allowed).tolist())
     prior = float(np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY)))
     search = Search(gram, [prior] * len(values), out=barred)
@@ -178,7 +178,7 @@ def seen(model: JointModel, point: Point) -> Mask:
     """(P,) whether a parameter moves a joint's output by twice its noise, root mean square, or by what is tolerated."""
     found = np.zeros(len(point.values), dtype=bool)
     for joint, one in zip(model.joints, point.rows, strict=True):
-        least = max(settings.VISIBLE * model.noise(joint), model.log.tolerance.get(model.log.joints[joint], 0.0))
+        least = model.log.visible_from(model.log.joints[joint], model.noise(joint))
         moved = np.sqrt(np.mean(one.derivative**2, axis=0)) * np.abs(point.values[one.columns])
         found[one.columns] |= moved >= least
     return found

@@ -18,6 +18,7 @@ from scipy.signal import savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
+from thermal_robot.motion.following import at
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
@@ -41,7 +42,7 @@ class TorqueModel(JointModel):
         lengths = [len(m.position.time) for m in log.motions]
         self._motion = np.repeat(np.arange(len(log.motions)), lengths)
         self._time = np.concatenate([m.position.time - m.position.time[0] for m in log.motions])
-        self._measured = np.concatenate([_at(m.position.time, m.torque) for m in log.motions])
+        self._measured = np.concatenate([at(m.torque, m.position.time) for m in log.motions if m.torque])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
         self.parameters = self._parameters()
 
@@ -189,12 +190,6 @@ def _derivatives(time: Array, q: Array) -> tuple[Array, Array, Array]:
     if len(q) <= width:
         return q, np.gradient(q, time, axis=0), np.zeros_like(q)
     return tuple(savgol_filter(q, width, 3, deriv=k, delta=step, axis=0) for k in range(3))
-
-
-def _at(time: Array, channel: object) -> Array:
-    """(N, J) a channel at other stamps, linear between its own."""
-    values = channel.values  # type: ignore[attr-defined]
-    return np.stack([np.interp(time, channel.time, one) for one in values.T], axis=1)  # type: ignore[attr-defined]
 
 
 def _prandtl(q: Array, motion: NDArray[np.int64]) -> Array:
