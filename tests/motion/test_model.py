@@ -57,6 +57,25 @@ def known():
     return log, model, values
 
 
+def test_cells_that_are_empty_are_no_command_and_no_reading(known):
+    """A stale row is left out: the command before it holds on, and a motion without a reading begins at its command."""
+    log, whole, values = known
+    first, second = log.motions[:2]
+    command, position = first.command.values.copy(), second.position.values.copy()
+    command[40:43, 1], position[:, 0] = np.nan, np.nan
+    motions = (
+        replace(first, command=Channel(first.command.time, command)),
+        replace(second, position=Channel(second.position.time, position)),
+        *log.motions[2:],
+    )
+    model = ServoModel(replace(log, motions=motions))
+    model.refreshed(values)
+    assert all(np.isfinite(model.positions(j, values[None])).all() for j in model.joints)
+    assert len(model.residuals(0, values[None])[0]) == len(whole.residuals(0, values[None])[0]) - len(position)
+    held = model.commanded[model.begins[0] : model.begins[1], 1]
+    assert set(np.unique(held)) <= set(first.command.values[:, 1])
+
+
 def test_derivatives_are_those_of_a_step_a_tenth_as_long(known, monkeypatch):
     _, model, values = known
     coarse = model.rows(1, values)

@@ -289,9 +289,8 @@ class ServoModel(JointModel):
         loads = np.stack([parts[0] + pressing, parts[1], contact[:, joint]])
         inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
         around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
-        start = np.array(
-            [m.position.values[np.isfinite(m.position.values[:, joint]), joint][0] for m in self.log.motions]
-        )
+        begun = [motion.position.of(joint)[1][0] for motion in self.log.motions]
+        start = np.where(np.isfinite(begun), begun, self.commanded[self.begins[:-1], joint])
         return simulate(
             numbers, weights, (self.begins, self.first), self._commands[joint], around, start, self.step, self.substeps
         )

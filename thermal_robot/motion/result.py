@@ -125,8 +125,7 @@ class MotionDiagnosis:
 
     def unit_of(self, joint: str) -> str:
         """Return the SI unit of a joint's gap."""
-        robot = self.log.robot
-        slides = joint in robot.joint_names and robot.joint_types[robot.joint_names.index(joint)] == "prismatic"
+        slides = self.log.kinds.get(joint) == "prismatic"
         return {"rad": "m", "N·m": "N"}[self.unit] if slides else self.unit
 
     def title(self, effect: str, joint: str = "") -> str:
