@@ -209,6 +209,15 @@ def test_approach_follows_from_the_order_where_it_was_not_recorded(tmp_path: Pat
     assert (unknown.derived, unknown.settings.moves) == ((), "unknown")
 
 
+@pytest.mark.parametrize(
+    ("cells", "read_as"), [("0 1 0 1", [0, 1, 2, 3]), ("2 3 0 1", [2, 3, 0, 1]), ("7 7 8 8", [7, 7, 8, 8])]
+)
+def test_an_order_that_starts_anew_is_no_clock(tmp_path, cells, read_as):
+    campaign = read_campaign(put(tmp_path / "c", add(ROWS + "20,20,30,40,990,0,500\n", order=cells)))
+    assert campaign.covariates["order"].tolist() == read_as
+    assert any("starts anew" in warning for warning in campaign.warnings) == (cells == "0 1 0 1")
+
+
 def test_the_noise_of_each_row_takes_the_place_of_that_of_all(tmp_path: Path) -> None:
     campaign = read(tmp_path, table=with_column("noise", "0.03", "0.04", "0.05"))
     np.testing.assert_allclose(campaign.noise_of_rows, [3e-5, 4e-5, 5e-5], rtol=1e-12)

@@ -57,8 +57,8 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     if columns.targets:
         table, told, left_out = of_targets(table, columns, settings)
         settings = replace(settings, tool_known=False)
-    covariates, missing, gaps = _covariates(table, columns, robot, units)
     q = _commands(table, robot, units)
+    covariates, missing, gaps = _covariates(table, columns, robot, units, q)
     settings, columns = framed(settings, columns)
     plain = measured and not told and columns.kinds in ((), ("controller",))
     poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
@@ -153,7 +153,7 @@ def _commands(table: Table, robot: Robot, units: Units) -> Array:
 
 
 def _covariates(
-    table: Table, columns: Columns, robot: Robot, units: Units
+    table: Table, columns: Columns, robot: Robot, units: Units, commands: Array
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_]], list[str]]:
     """Covariates in SI with gaps imputed, masks of the gaps, and sentences on the imputation."""
     covariates: dict[str, Array] = {}
@@ -169,8 +169,20 @@ def _covariates(
             values, how = fill(column, values, None if column in CLOCK else clock)
             missing[column] = gaps
             warnings.append(f"column {column!r} is empty in {int(gaps.sum())} of {len(gaps)} rows: {how}")
+        if column == "order" and _restarts(values, commands):
+            values = np.arange(float(len(values)))
+            warnings.append("column 'order' starts anew within the table: rows count as measured in the table's order")
         covariates[column] = values * covariate_scale(column, robot, units)
     return covariates, missing, warnings
+
+
+def _restarts(order: Array, commands: Array) -> bool:
+    """Whether a sequence begins again at its first number, with other commands at the same numbers: it is no clock."""
+    falls = np.flatnonzero(np.diff(order) < 0.0) + 1
+    if not len(falls) or (order[falls] != order[0]).any():
+        return False
+    same = order == order[0]
+    return bool((commands[same] != commands[0]).any())
 
 
 def _vectors(table: Table, group: Sequence[str], units: Units) -> Array:
