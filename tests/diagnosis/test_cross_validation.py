@@ -27,7 +27,7 @@ from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.grouping import each
-from thermal_robot.inference.kernels import Form, Smooth, Spectrum
+from thermal_robot.inference.kernels import Kernel, KernelCovariance, SmoothKernel
 from thermal_robot.inference.problem import Linear
 from thermal_robot.kinematics import exp6
 
@@ -89,12 +89,12 @@ def test_rows_that_are_alike_count_by_their_own_covariance():
     """Generalised least squares on some rows: their covariance is that part of the whole one."""
     known = model()
     rng = np.random.default_rng(2)
-    form = Form("some", rng.normal(size=(ROWS, 4)), rng.normal(size=(3, 2)))
+    kernel = Kernel("some", rng.normal(size=(ROWS, 4)), rng.normal(size=(3, 2)))
     weights, noise = np.where(np.arange(ROWS) == 5, 0.0, 1.0), np.full(3, 2.0)
-    smooth = Smooth(Spectrum.of(form, weights, noise), 3.0)
+    smooth = KernelCovariance(SmoothKernel.of(kernel, weights, noise), 3.0)
     alike = replace(known, whitening=replace(known.whitening, weights=weights, noise=noise, smooth=smooth))
     # K of mean one on the diagonal, in units of the noise
-    likeness = np.kron(form.functions @ form.functions.T, form.moves @ form.moves.T)
+    likeness = np.kron(kernel.functions @ kernel.functions.T, kernel.moves @ kernel.moves.T)
     covariance = np.eye(3 * ROWS) + 3.0**2 * likeness / np.diag(likeness).mean()
     for rows in (known.block != 3, known.block < 10, np.ones(ROWS, dtype=bool)):
         own = np.repeat(rows & (weights > 0), 3)

@@ -91,7 +91,7 @@ def test_a_diagnosis_that_leaves_noise_alone_and_a_fit_of_nothing_keep_them(rv_m
     assert effect.name == "joint_gain"
     # A smooth discrepancy and no effect, as where frames are known and no candidate is worth its place.
     known = fit(warped(rv_m2, 0, 2e-4), [])
-    assert known.explanation.discrepancy.form is not None
+    assert known.explanation.discrepancy.kernel is not None
     assert as_remainder_says(known) is known
 
 

@@ -22,7 +22,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.generate import Discovery, discovered
-from thermal_robot.inference.kernels import Form
+from thermal_robot.inference.kernels import Kernel
 from thermal_robot.inference.scatter import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
@@ -237,8 +237,8 @@ def test_laws_say_where_the_remainder_enters_and_what_it_follows():
 
 def beside(anew, place):
     """A discrepancy of one form that has three quarters of the probability."""
-    form = Form("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
-    return Discrepancy(form, 4.0, 0.9, {form.name: 0.75})
+    kernel = Kernel("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
+    return Discrepancy(kernel, 4.0, 0.9, {kernel.name: 0.75})
 
 
 def test_what_errs_anew_in_every_pose_has_a_place_and_follows_nothing():

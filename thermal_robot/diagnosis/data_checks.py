@@ -34,7 +34,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.exact import heard
-from thermal_robot.inference.explain import Explanation, explain, log_priors, settings_of_one
+from thermal_robot.inference.explain import Explanation, exclusive_settings, explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_order
 from thermal_robot.inference.problem import Linear, contained, gram
@@ -250,7 +250,7 @@ def _keeping_signs(linear: Linear, free: Explanation) -> Combination:
     """Most probable combination whose parameters keep their signs; rows set aside count with their weights."""
     problem = gram(linear, replace(heard(free), smooth=None))
     effects = [item.effect for item in linear.blocks]
-    apart = contained(problem) | settings_of_one([effect.name for effect in effects])
+    apart = contained(problem) | exclusive_settings([effect.name for effect in effects])
     search = Search(problem, log_priors(effects), apart)
     return search.climb(free.best.blocks if search.allowed(free.best.blocks) else ())
 

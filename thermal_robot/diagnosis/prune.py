@@ -64,9 +64,9 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
 
     Without laws, the place is that of a per-pose or per-visit discrepancy, if any.
     """
-    form = discrepancy.form
-    if not found and left.flagged and form is not None and form.anew and form.place[0]:
-        return replace(left, locations=(Location(*form.place, discrepancy.forms[form.name]),), depends_on=())
+    kernel = discrepancy.kernel
+    if not found and left.flagged and kernel is not None and kernel.grouped and kernel.place[0]:
+        return replace(left, locations=(Location(*kernel.place, discrepancy.kernels[kernel.name]),), depends_on=())
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}

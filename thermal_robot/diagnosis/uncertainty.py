@@ -38,7 +38,7 @@ from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import blocks, each, neighbourhoods
-from thermal_robot.inference.kernels import Form, Spectrum
+from thermal_robot.inference.kernels import Kernel, SmoothKernel
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
@@ -78,16 +78,16 @@ def _said(fit: Fit, model: Model) -> list[Array]:
         rows = [~group for group in each(labels) if model.determines(~group)]
         if len(rows) > 1:
             found.append(jackknife(model.fits(rows, range(len(model.spans)))[:, model.flat : -1]))
-    if form := _smooth(e):
+    if kernel := _smooth(e):
         stack = _independent(model)
         columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
-        found.append(_sandwich(e, form, columns, model.tight))
+        found.append(_sandwich(e, kernel, columns, model.tight))
     return found
 
 
-def _smooth(e: Explanation) -> Form | None:
+def _smooth(e: Explanation) -> Kernel | None:
     """Smooth discrepancy of an explanation; ``None`` without one, or if it is drawn anew in every pose or visit."""
-    return None if e.discrepancy.form is None or e.discrepancy.form.anew else e.discrepancy.form
+    return None if e.discrepancy.kernel is None or e.discrepancy.kernel.grouped else e.discrepancy.kernel
 
 
 def _independent(model: Model) -> Array:
@@ -95,10 +95,10 @@ def _independent(model: Model) -> Array:
     return whitened(model.linear, replace(model.whitening, smooth=None))[:, :-1]
 
 
-def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array:
+def _sandwich(e: Explanation, kernel: Kernel, columns: Array, tight: Array) -> Array:
     """Sandwich covariance (K, K) A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K), prior precisions Λ⁻¹ (K,)."""
     variance = e.best.noise**2
-    spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
+    spectrum = SmoothKernel.of(kernel.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
     alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
     inner = _posterior(columns.T @ columns / variance, tight)
     return _symmetric(inner @ (alike + np.diag(tight)) @ inner)
@@ -173,8 +173,8 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.tight])
     moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
     own = np.ix_(moving, moving)
-    form = _smooth(e)
-    wider = None if form is None else _sandwich(e, form, _independent(model), tight)[own]
+    kernel = _smooth(e)
+    wider = None if kernel is None else _sandwich(e, kernel, _independent(model), tight)[own]
     return _posterior(model.whole[0][:-1, :-1] / e.best.noise**2, tight)[own], wider
 
 

@@ -20,7 +20,7 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, whitener,
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, explain, log_odds
-from thermal_robot.inference.kernels import forms
+from thermal_robot.inference.kernels import discrepancy_kernels
 from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values, whitened
 from thermal_robot.inference.registration import moved
 from thermal_robot.inference.search import Search
@@ -172,8 +172,8 @@ def heard(explanation: Explanation) -> Whitening:
 
     A per-pose discrepancy is left out of it, as it would absorb the residual of a slightly wrong constant.
     """
-    whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
-    if form is not None and form.anew:
+    whitening, aside, kernel = explanation.whitening, explanation.outliers, explanation.discrepancy.kernel
+    if kernel is not None and kernel.grouped:
         whitening = replace(whitening, smooth=None)
     if whitening.smooth is not None or not aside.any():
         return whitening
@@ -266,7 +266,9 @@ def settle(
         chosen = [candidates.index(effect) for effect in listed]
         seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
         linear = at_exact_model(observations, blocks, held)
-        explanation = explain(linear, noise, families=families, starts=seeds, before=before, forms=forms(observations))
+        explanation = explain(
+            linear, noise, families=families, starts=seeds, before=before, kernels=discrepancy_kernels(observations)
+        )
         factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held

@@ -21,7 +21,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns, unknown_frames
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.exact import Settled, at_exact_model, constants_moved, gauss_newton, settle, weighed
-from thermal_robot.inference.explain import Discrepancy, Explanation, left_of
+from thermal_robot.inference.explain import Discrepancy, Explanation, residual_of
 from thermal_robot.inference.grouping import near_repeats
 from thermal_robot.inference.problem import Linear, Products, frame_step, gram, parameter_values
 from thermal_robot.inference.registration import found_frames, frames_known, moved, refined_frames, register
@@ -244,7 +244,7 @@ def _explained(
         problem, rounds = gram(linear, whitening), rounds + 1
         best = Search(problem, [0.0] * len(effects)).evaluate(range(len(effects)), best)
         values = parameter_values(linear, problem, best)
-        left = left_of(linear, whitening, values)
+        left = residual_of(linear, whitening, values)
         # the share of the equations that effects and frames take up
         leverage = float(min((best.effective + flat) / max(problem.equations + flat, 1), settings.MOST_LEVERAGE))
         then, later = reweigh(left, noise, use, leverage, linear.measures)

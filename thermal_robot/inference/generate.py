@@ -568,7 +568,9 @@ def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discove
         ]
     worth = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
     worth.sort(key=lambda entry: -entry[0])
-    return [replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.RUNG_REACH]
+    return [
+        replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.AMPLITUDE_REACH
+    ]
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:

@@ -767,11 +767,11 @@ def _stands(
 
 def _in_joints(fit: Fit) -> list[Component]:
     """Kind and joints of a per-pose or per-visit discrepancy."""
-    form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
-    if form is None or not form.anew:
+    kernel, names = fit.explanation.discrepancy.kernel, fit.campaign.robot.joint_names
+    if kernel is None or not kernel.grouped:
         return []
-    kind = "visit" if form.name.startswith("visits") else "pose"
-    return [(kind, names.index(joint)) for joint in form.joints]
+    kind = "visit" if kernel.name.startswith("visits") else "pose"
+    return [(kind, names.index(joint)) for joint in kernel.joints]
 
 
 def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None) -> Array:

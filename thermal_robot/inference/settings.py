@@ -46,15 +46,15 @@ ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
 LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
 STARTS = 3
-"""Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+"""Combinations, the best of those that a search starts from, beside which each kernel of a discrepancy is tried."""
 SCATTERING = 3
 """Joints at most that err anew in every pose or visit beside each other."""
 PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
 """Rms of a further joint over that of those before it, in halves of an octave."""
-FORM_REACH = 20.0
-"""Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
-RUNG_REACH = 5.4
-"""The same at which a size of one still counts: 1 in 200, four sizes an octave."""
+KERNEL_REACH = 20.0
+"""Log evidence below the best at which a kernel of the discrepancy is given up while a fit iterates."""
+AMPLITUDE_REACH = 5.4
+"""The same at which an amplitude of one still counts: 1 in 200, four amplitudes an octave."""
 
 # --- rounding ---
 
