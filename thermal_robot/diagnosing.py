@@ -19,7 +19,7 @@ from thermal_robot.motion.compare import compare_motions
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.read import declares_motion, read_motion
-from thermal_robot.motion.result import MotionDiagnosis, told
+from thermal_robot.motion.result import MotionDiagnosis, with_summary
 
 Progress = Callable[[str], None]
 
@@ -112,7 +112,7 @@ def diagnose(
         raise EffectError("effects of your own are of poses; a log of motion knows its servos' alone")
     require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
     only, without = asked_for(only, without)
-    return told(diagnose_motion(campaign, only=only, without=without, progress=progress))
+    return with_summary(diagnose_motion(campaign, only=only, without=without, progress=progress))
 
 
 def compare(

@@ -11,8 +11,8 @@ from simulate import simulate
 from thermal_robot import EstimationError, diagnose
 from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.cross_validation import (
+    CrossValidation,
     Model,
-    Walk,
     hardest,
     harmed,
     held_out,
@@ -53,13 +53,13 @@ def fitted(linear, blocks, weights, rows):
 
 def test_rows_held_out_are_predicted_by_a_fit_to_the_others():
     known = model()
-    walk = Walk.over(known, each(known.block))
+    validation = CrossValidation.over(known, each(known.block))
     for chosen in ((), (1,), (0, 1, 2)):
-        left = walk.residuals(chosen)
+        left = validation.residuals(chosen)
         for test in each(known.block):
             right = fitted(known.linear, chosen, known.whitening.weights, ~test)[test]
-            np.testing.assert_allclose(left[test[walk.numbers]], right, atol=1e-6)
-        assert walk.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
+            np.testing.assert_allclose(left[test[validation.numbers]], right, atol=1e-6)
+        assert validation.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("tests", ["blocks", "regions"])
@@ -67,7 +67,7 @@ def test_the_walk_without_a_block_is_that_of_a_campaign_without_it(tests):
     known = model(rows=120)
     folds = each(known.block) if tests == "blocks" else each(np.random.default_rng(0).integers(0, 4, 120))
     chosen = (0, 1, 2)
-    found = Walk.over(known, folds).squares(chosen)
+    found = CrossValidation.over(known, folds).squares(chosen)
     literal = []
     for b in range(20):
         rows = known.block != b
@@ -79,7 +79,7 @@ def test_the_walk_without_a_block_is_that_of_a_campaign_without_it(tests):
         whitening = replace(known.whitening, weights=known.whitening.weights[rows])
         less = replace(known, linear=some, whitening=whitening, kept=known.kept[rows], block=np.arange(rows.sum()))
         own = [fold[rows] for fold in folds if fold[rows].any()]
-        literal.append(sum((Walk.over(less, [f]).residuals(chosen) ** 2).sum() for f in own))
+        literal.append(sum((CrossValidation.over(less, [f]).residuals(chosen) ** 2).sum() for f in own))
     # to first order: a twentieth of the rows is left out twice
     np.testing.assert_allclose(found[1:], literal, rtol=0.02)
     assert np.sqrt(jackknife(found[1:])) == pytest.approx(np.sqrt(jackknife(np.array(literal))), rel=0.15)
@@ -108,10 +108,10 @@ def test_a_fold_that_leaves_the_frames_open_is_left_out():
     alone = known.linear.frames.copy()
     alone[known.block != 4, :, 0] = alone[known.block != 4, :, 1]
     short = replace(known, linear=replace(known.linear, frames=alone))
-    walk = Walk.over(short, each(short.block))
-    assert len(walk.tests) == 19
-    assert not (walk.numbers == np.flatnonzero(short.block == 4)[0]).any()
-    assert list(walk.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
+    validation = CrossValidation.over(short, each(short.block))
+    assert len(validation.tests) == 19
+    assert not (validation.numbers == np.flatnonzero(short.block == 4)[0]).any()
+    assert list(validation.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
 
 
 def test_what_a_model_leaves_out_counts_as_noise_against_priors():

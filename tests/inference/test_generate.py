@@ -13,9 +13,9 @@ from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.generate import HeldOut, candidates, discovered, events, gathered, listed, where
+from thermal_robot.inference.generate import HeldOut, candidates, clustered_outliers, discovered, events, listed, where
 from thermal_robot.inference.grouping import each
-from thermal_robot.inference.screening import Thin
+from thermal_robot.inference.screening import RowSample
 from thermal_robot.kinematics import exp6
 
 LISTED = ("joint_offset", "joint_gain", "backlash")
@@ -133,12 +133,12 @@ def test_what_a_known_effect_and_a_zero_do_is_no_law(rv_m2):
     levels = Discovered(
         place="joint_3", quantity="approach.joint_3", shape="levels", marks=(-1.0, 1.0), origin=-1.0, span=2.0
     )
-    thin = Thin.of(known(campaign))
-    assert listed(thin, levels)
-    assert not listed(thin, replace(levels, place="joint_2"))
-    assert not listed(thin, replace(STEP, span=3600.0))
+    sample = RowSample.of(known(campaign))
+    assert listed(sample, levels)
+    assert not listed(sample, replace(levels, place="joint_2"))
+    assert not listed(sample, replace(STEP, span=3600.0))
     for fewer in (("joint_offset", "joint_gain"), ("joint_gain", "backlash")):
-        assert not listed(Thin.of(known(campaign, fewer)), levels)
+        assert not listed(RowSample.of(known(campaign, fewer)), levels)
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow), 4])
@@ -279,7 +279,7 @@ def test_rows_set_aside_near_each_other_are_told_from_single_ones():
     known = fit(data, choose(("backlash",), (), ()))
     aside = np.zeros(ROWS, dtype=bool)
     aside[[3, 30, 33, 34, 36, 80]] = True
-    assert np.flatnonzero(gathered(known, aside)).tolist() == [30, 33, 34, 36]
+    assert np.flatnonzero(clustered_outliers(known, aside)).tolist() == [30, 33, 34, 36]
 
 
 @pytest.mark.parametrize(

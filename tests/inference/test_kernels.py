@@ -164,11 +164,11 @@ def test_what_some_rows_have_in_common_is_that_of_their_own_covariance(name, tau
     some, covariance = case.stack[own], case.covariance(tau)[np.ix_(own, own)]
     expected = some.T @ some - some.T @ np.linalg.solve(covariance, some)
     for spectrum in case.spectra:
-        close(KernelCovariance(spectrum, tau).taken(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
-        assert not KernelCovariance(spectrum, tau).taken(rows, lambda which: columns[which], 1e9).any()
+        close(KernelCovariance(spectrum, tau).reduction(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
+        assert not KernelCovariance(spectrum, tau).reduction(rows, lambda which: columns[which], 1e9).any()
     # what lies below a floor is left out of both alike
     floor = float(np.median(np.linalg.eigvalsh(tau**2 * case.inside)[-4:]))
-    close(*(KernelCovariance(s, tau).taken(rows, lambda which: columns[which], floor) for s in case.spectra))
+    close(*(KernelCovariance(s, tau).reduction(rows, lambda which: columns[which], floor) for s in case.spectra))
 
 
 def test_of_a_group_that_no_row_in_use_has_nothing_is_known():

@@ -6,9 +6,9 @@ import pytest
 from thermal_robot.inference.weights import (
     Noise,
     distance_limit,
+    noise_estimate,
     reweigh,
     robust_noise,
-    settled_noise,
 )
 
 SIGMA = np.repeat([2e-5, 3e-5], 3)  # m, rad
@@ -63,13 +63,13 @@ def test_a_stated_noise_counts_whatever_is_left():
     """What is more in the remainder is something else, and has a form of its own."""
     position, orientation = 2e-5, 3e-5
     for left in ([2.2e-5, 1e-5], [5e-5, 3e-5], [1e-3, 1e-3]):
-        same, held = settled_noise(np.array(left), STATED, 6)
+        same, held = noise_estimate(np.array(left), STATED, 6)
         np.testing.assert_array_equal(same, SIGMA)
         assert held > 0.0
-    half, free = settled_noise(np.array([5e-5, 4e-5]), Noise(position), 6)
+    half, free = noise_estimate(np.array([5e-5, 4e-5]), Noise(position), 6)
     np.testing.assert_array_equal(half, np.repeat([position, 4e-5], 3))
     assert free == 0.0
-    own, free = settled_noise(np.array([1e-5]), Noise(), 3)
+    own, free = noise_estimate(np.array([1e-5]), Noise(), 3)
     np.testing.assert_array_equal(own, [1e-5] * 3)
     assert free == 0.0
     assert STATED.parts(3) == (position,)

@@ -23,7 +23,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.campaign import GRAVITY, turned_round
 from thermal_robot.campaign.plausible import copies, marks
-from thermal_robot.campaign.table import told_rows
+from thermal_robot.campaign.table import listed_rows
 from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.faults import Readings
@@ -33,12 +33,12 @@ from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.exact import heard
+from thermal_robot.inference.exact import downweighted
 from thermal_robot.inference.explain import Explanation, exclusive_settings, explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_order
 from thermal_robot.inference.problem import Linear, contained, gram
-from thermal_robot.inference.registration import Placed, register
+from thermal_robot.inference.registration import BaseAndTarget, register
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.weights import Noise
 from thermal_robot.kinematics import gravity_torques
@@ -98,7 +98,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
         k += stays + 1
 
 
-def _behind(readings: Readings, far: Flags, near: float, frames: Placed) -> Iterator[tuple[Rows, str]]:
+def _behind(readings: Readings, far: Flags, near: float, frames: BaseAndTarget) -> Iterator[tuple[Rows, str]]:
     """Yield short runs in which the measured pose belongs to the command of a row up to some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)
@@ -121,10 +121,10 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     notes += contradicted(campaign)
     again, (lost, _) = copies(campaign), marks(campaign)
     if again.any():
-        rows = told_rows(campaign.rows[again])
+        rows = listed_rows(campaign.rows[again])
         notes.append(f"{rows} repeat another one to the last digit: these copies are left out")
     if lost.any():
-        rows = told_rows(campaign.rows[lost])
+        rows = listed_rows(campaign.rows[lost])
         what = "a mark of a missing value, or a robot that stood still"
         notes.append(f"{rows} measured one place or figure to the last digit, {what}: they are left out")
     out = again | lost
@@ -248,7 +248,7 @@ def _agree(z: Array) -> bool:
 
 def _keeping_signs(linear: Linear, free: Explanation) -> Combination:
     """Most probable combination whose parameters keep their signs; rows set aside count with their weights."""
-    problem = gram(linear, replace(heard(free), smooth=None))
+    problem = gram(linear, replace(downweighted(free), smooth=None))
     effects = [item.effect for item in linear.blocks]
     apart = contained(problem) | exclusive_settings([effect.name for effect in effects])
     search = Search(problem, log_priors(effects), apart)

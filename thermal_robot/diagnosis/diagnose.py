@@ -16,11 +16,11 @@ from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
-from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.prune import beside_scatter, concluded, grown, pruned
+from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, mismatch
+from thermal_robot.diagnosis.prune import concluded, grown, pruned, selected_with_scatter
 from thermal_robot.diagnosis.residual_tests import examine
-from thermal_robot.diagnosis.result import Diagnosis, told
-from thermal_robot.diagnosis.uncertainty import as_remainder_says
+from thermal_robot.diagnosis.result import Diagnosis, with_summary
+from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.diagnosis.updated import prepare
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
@@ -110,7 +110,7 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-        prepare(diagnosis := told(found))
+        prepare(diagnosis := with_summary(found))
         return diagnosis
 
 
@@ -152,7 +152,7 @@ def _concluded(
     campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
 ) -> Conclusion:
     """Explain the gap, unless robot and table do not match: data faults are tested before faults of the robot."""
-    misfit = unfit(campaign, progress)
+    misfit = mismatch(campaign, progress)
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
         last = _explained(fit(as_counted(campaign, own), candidates, progress), progress)
@@ -175,10 +175,10 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     fit, refused = pruned(fit, progress)
     chance = random_gap(fit)
     if chance.explains_size:
-        return beside_scatter(fit, chance, refused, progress)
+        return selected_with_scatter(fit, chance, refused, progress)
     left = examine(fit, progress)
     if left.unexplained.flagged:
-        fit = as_remainder_says(fit)
+        fit = inflated_for_structure(fit)
     return concluded(fit, left, chance, refused)
 
 

@@ -12,8 +12,8 @@ from scipy.special import expit, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.attribution import without_laws
-from thermal_robot.diagnosis.cross_validation import Model, Walk, schemes
-from thermal_robot.diagnosis.residual_tests import Examined, examine
+from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, schemes
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, examine
 from thermal_robot.diagnosis.values import Dependence, Location, Refused, Unexplained
 from thermal_robot.effects import Effect, JointRipple
 from thermal_robot.effects.law import PREFIX
@@ -59,7 +59,7 @@ def _ripple(fit: Fit) -> JointRipple | None:
     return None if not found.orders or alike(found, ripple_of(fit)) else found
 
 
-def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
+def attributed_to_laws(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
     """Residual of the known effects, with the places and quantities of the laws that explain it.
 
     Without laws, the place is that of a per-pose or per-visit discrepancy, if any.
@@ -87,7 +87,7 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
     )
 
 
-def beside_scatter(
+def selected_with_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
     """Repeat the model selection with the joints' scatter (``chance``) in the covariance of the noise.
@@ -117,18 +117,18 @@ def beside_scatter(
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
         left = examine(fit, progress).unexplained
-    return concluded(fit, Examined(left, floor, "scatter"), chance, refused)
+    return concluded(fit, ResidualAnalysis(left, floor, "scatter"), chance, refused)
 
 
-def concluded(fit: Fit, left: Examined, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
+def concluded(fit: Fit, left: ResidualAnalysis, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
     """Conclusion of a fit: discovered laws are separated from what known effects explain."""
     laws = discovered(fit)
-    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
+    unexplained = attributed_to_laws(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
 @dataclass(frozen=True)
-class Gained:
+class DensityGain:
     """Held-out log predictive density of one effect under one cross-validation scheme.
 
     ``nats`` is its gain over all rows held out, with its 95 % ``interval``; ``share`` is 1 − (rms with it / rms without
@@ -141,18 +141,18 @@ class Gained:
     interval: tuple[float, float]
 
 
-_NOT_ASKED = Gained("time", 0.0, 0.0, (-np.inf, np.inf))
+_NOT_ASKED = DensityGain("time", 0.0, 0.0, (-np.inf, np.inf))
 
 
 @dataclass(frozen=True)
-class Earned:
+class HeldOutTest:
     """Cross-validation of one effect against the refitted model without it.
 
     ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme with the smallest upper bound.
     """
 
-    blocked: Gained
-    hardest: Gained
+    blocked: DensityGain
+    hardest: DensityGain
 
     @property
     def clearly(self) -> bool:
@@ -170,7 +170,7 @@ class Earned:
         return self.blocked.interval[0] > 0.0 and not self.harms
 
 
-def earned(fit: Fit) -> dict[str, Earned]:
+def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
     """Cross-validate every effect and law of a fit: paired differences of held-out log predictive densities.
 
     The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
@@ -184,30 +184,30 @@ def earned(fit: Fit) -> dict[str, Earned]:
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
-    walks = [(name, Walk.over(model, tests)) for name, _, tests in schemes(fit)]
+    walks = [(name, CrossValidation.over(model, tests)) for name, _, tests in schemes(fit)]
     every = range(len(model.spans))
-    found: dict[str, list[Gained]] = {effect.name: [] for effect, _ in fit.effects}
-    for name, walk in walks:
-        if not walk.tests:
+    found: dict[str, list[DensityGain]] = {effect.name: [] for effect, _ in fit.effects}
+    for name, validation in walks:
+        if not validation.tests:
             continue
-        judged = model.kept[walk.numbers]
-        number = walk.numbers[judged]
+        judged = model.kept[validation.numbers]
+        number = validation.numbers[judged]
         noise = model.whitening.sigma(number) * fit.explanation.best.noise
-        left = walk.residuals(every)[judged] / noise
+        left = validation.residuals(every)[judged] / noise
         for k, (effect, _) in enumerate(fit.effects):
             if name != "time" and is_event(effect):
                 continue
-            without = walk.residuals([b for b in every if b != k])[judged] / noise
-            found[effect.name].append(_gained(name, left, without, block[number]))
-    return {name: _earned(own) for name, own in found.items()}
+            without = validation.residuals([b for b in every if b != k])[judged] / noise
+            found[effect.name].append(_density_gain(name, left, without, block[number]))
+    return {name: _held_out_test(own) for name, own in found.items()}
 
 
-def _earned(found: Sequence[Gained]) -> Earned:
+def _held_out_test(found: Sequence[DensityGain]) -> HeldOutTest:
     blocked = next((gained for gained in found if gained.scheme == "time"), _NOT_ASKED)
-    return Earned(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
+    return HeldOutTest(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
 
 
-def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> Gained:
+def _density_gain(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> DensityGain:
     after, before = (left**2).sum(axis=1), (without**2).sum(axis=1)
     total = float(before.sum())
     share = 1.0 - float(after.sum()) / total if total > 0.0 else 0.0
@@ -215,9 +215,9 @@ def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) 
     parts = np.bincount(block, density)[np.unique(block)]
     nats, count = float(parts.sum()), len(parts)
     if count < 2:
-        return Gained(scheme, share, nats, (-np.inf, np.inf))
+        return DensityGain(scheme, share, nats, (-np.inf, np.inf))
     half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(count * parts.var(ddof=1)))
-    return Gained(scheme, share, nats, (nats - half, nats + half))
+    return DensityGain(scheme, share, nats, (nats - half, nats + half))
 
 
 def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
@@ -243,7 +243,7 @@ def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Re
 
 def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     """Terms to remove next, which do not obey the rule, with the reason for each."""
-    table = earned(fit)
+    table = held_out_tests(fit)
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
         return harmful
@@ -287,7 +287,7 @@ def determined(fit: Fit) -> set[str]:
     return found
 
 
-def _refused(judged: Earned) -> Refused:
+def _refused(judged: HeldOutTest) -> Refused:
     """Cross-validation result of a removed effect: probability from its prior and held-out densities, and share.
 
     The probability is at most the prior's, whatever other blocks of rows gain.

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings as diagnosis_settings
-from thermal_robot.diagnosis.cross_validation import Model, Walk, jackknife
+from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, jackknife
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
@@ -43,7 +43,7 @@ from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
-def as_remainder_says(fit: Fit) -> Fit:
+def inflated_for_structure(fit: Fit) -> Fit:
     """Inflate the parameter covariances of a fit for structure in its residual; the values stay."""
     e = fit.explanation
     if not e.best.blocks:
@@ -58,7 +58,7 @@ def as_remainder_says(fit: Fit) -> Fit:
     return replace(fit, explanation=replace(e, values=wider))
 
 
-def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
+def variance_inflation(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
     """Variance inflation factor (K,) of parameters over independent rows, by which their information is divided.
 
     ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
@@ -81,7 +81,7 @@ def _said(fit: Fit, model: Model) -> list[Array]:
     if kernel := _smooth(e):
         stack = _independent(model)
         columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
-        found.append(_sandwich(e, kernel, columns, model.tight))
+        found.append(_sandwich(e, kernel, columns, model.prior_precision))
     return found
 
 
@@ -170,8 +170,8 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     The second is the sandwich; ``None`` without a smooth discrepancy.
     """
     e = fit.explanation
-    tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.tight])
-    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
+    tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.prior_precision])
+    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.prior_precision), dtype=bool)])
     own = np.ix_(moving, moving)
     kernel = _smooth(e)
     wider = None if kernel is None else _sandwich(e, kernel, _independent(model), tight)[own]
@@ -180,10 +180,10 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
     """Held-out residuals (H, 3), m, measurement frame, with their row numbers; residuals of all rows without folds."""
-    walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
-    if not walk.tests:
+    validation, base = CrossValidation.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
+    if not validation.tests:
         return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
-    return walk.residuals(range(len(model.spans)))[:, :3] @ base.T, walk.numbers
+    return validation.residuals(range(len(model.spans)))[:, :3] @ base.T, validation.numbers
 
 
 def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:

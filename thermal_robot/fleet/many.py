@@ -41,7 +41,7 @@ from thermal_robot.fleet import settings
 from thermal_robot.fleet.listed import Listed, campaigns
 from thermal_robot.fleet.rows import CAMPAIGN, Plain, failed, needed, rows_of, write_rows
 from thermal_robot.fleet.summary import Summary, summarise
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,7 +87,7 @@ class Fleet:
         return pd.read_parquet(self.table, columns=None if columns is None else list(columns))
 
     def __str__(self) -> str:
-        return str(registered().fleet_text(self.summary.to_dict()))
+        return str(registered_renderer().fleet_text(self.summary.to_dict()))
 
     def __repr__(self) -> str:
         s = self.summary

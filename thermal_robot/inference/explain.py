@@ -307,7 +307,7 @@ class ModelSearch:
             return [own[:, kept] for own in known]
         key = self._spectra[kernel], kept.tobytes()
         if self._last[0] != key:  # one after another its sizes are tried
-            self._last = key, self._spectra[kernel].along(self._stack.differing(kept))
+            self._last = key, self._spectra[kernel].along(self._stack.some_columns(kept))
         return self._last[1]
 
     def plausible_kernels(self, best: Combination) -> tuple[Kernel, ...]:
@@ -332,7 +332,7 @@ class ModelSearch:
         ]
         for other in dict.fromkeys((PLAIN, *near)):
             if self._is_near(self.search_at(other).evaluate(best.blocks).log_evidence, best):
-                nearby = self.search_at(other).weigh(best.blocks)
+                nearby = self.search_at(other).evaluate_neighbours(best.blocks)
                 if nearby.log_evidence > best.log_evidence + settings.BETTER:
                     return self._better(other, nearby.blocks, best)
         return None
@@ -427,8 +427,8 @@ NOTHING = np.zeros(0)
 class Discrepancy:
     """Posterior of a correlated discrepancy: the probability of any, and of each kernel by its name.
 
-    Beside the best combination: ``kernel`` and ``tau``, its rms over the noise (``None`` and 0 where there is none), and
-    ``noise`` in units of the whitening noise.
+    Beside the best combination: ``kernel`` and ``tau``, its rms over the noise (``None`` and 0 where there is none),
+    and ``noise`` in units of the whitening noise.
     """
 
     kernel: Kernel | None

@@ -48,7 +48,7 @@ def in_order(campaign: Campaign) -> Labels:
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 
-def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def consecutive_outliers(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Outliers (N,) in runs of three or more consecutive rows: a change, not gross errors."""
     order = in_order(campaign)
     own = aside[order]
@@ -98,7 +98,7 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
 STAND = "stand"  # Label of what stays in one place while the robot is brought to it
 
 
-def held_together(campaign: Campaign) -> tuple[Labels, str]:
+def held_out_groups(campaign: Campaign) -> tuple[Labels, str]:
     """(N,) label of the rows that are held out at a time, and what they are: stands, or blocks where these are few."""
     stands = campaign.labels.get(STAND)
     if stands is not None and campaign.position is None:

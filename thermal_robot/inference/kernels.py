@@ -66,7 +66,7 @@ class DesignMatrix:
         return cls(tuple(different), np.array(number), np.arange(len(different[0])), np.ones(different[0].shape))
 
     @classmethod
-    def around(cls, array: Array, measures: int) -> DesignMatrix:
+    def from_array(cls, array: Array, measures: int) -> DesignMatrix:
         """Stack of the columns (E, K) of an array."""
         different = tuple(column.reshape(-1, measures) for column in array.T)
         rows = len(array) // measures
@@ -81,7 +81,7 @@ class DesignMatrix:
         """Number of equations E."""
         return self.root.size
 
-    def differing(self, kept: Numbers) -> DesignMatrix:
+    def some_columns(self, kept: Numbers) -> DesignMatrix:
         """Stack of some of the distinct columns."""
         return replace(self, different=tuple(self.different[k] for k in kept), number=np.arange(len(kept)))
 
@@ -114,7 +114,7 @@ def chunks(rows: int) -> Iterator[slice]:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class KernelFactor:
     """Factor of a kernel: B = functions (N, k) × displacements (N, m, c), times ``root`` (n,) of the rows' weights.
 
     Moves are in units of the noise; (m, c) where all rows have the same.
@@ -204,7 +204,7 @@ class GroupKernel:
 
     def along(self, stack: Array | DesignMatrix) -> list[Array]:
         """Product BᵀS (G c, U) in the eigenvectors of every group, S the distinct columns."""
-        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.around(stack, self.moves.shape[1])
+        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, self.moves.shape[1])
         found = np.zeros((*self.value.shape, len(stack.different)))
         for groups, rows, starts in _in_chunks(self.group):
             each = self.moves[rows].transpose(0, 2, 1) @ stack.rows(rows)
@@ -242,11 +242,11 @@ class GroupKernel:
         rows = len(self.groups), self.everywhere.shape[1]
         return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
 
-    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.taken`."""
-        heard = tau**2 * self.value > floor
-        unit = self.vector * np.where(heard, 1.0 / np.sqrt(np.where(heard, self.value, 1.0)), 0.0)[:, None, :]
-        tight = 1.0 / np.where(heard, tau**2 * self.value, 1.0)
+    def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
+        above = tau**2 * self.value > floor
+        unit = self.vector * np.where(above, 1.0 / np.sqrt(np.where(above, self.value, 1.0)), 0.0)[:, None, :]
+        tight = 1.0 / np.where(above, tau**2 * self.value, 1.0)
         numbers, found = np.flatnonzero(rows), np.zeros((1, 1))
         for groups, which, starts in _in_chunks(self.group[numbers]):
             own = self.moves[numbers[which]] @ unit[self.group[numbers[which]]]
@@ -348,12 +348,12 @@ class KernelCovariance:
         """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K); slower than :meth:`products`."""
         return self.spectrum.whitened(self.tau, stack)
 
-    def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+    def reduction(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
         """Reduction SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
 
         ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
         """
-        return self.spectrum.taken(self.tau, rows, white, floor)
+        return self.spectrum.reduction(self.tau, rows, white, floor)
 
     @property
     def log_det(self) -> float:
@@ -381,8 +381,8 @@ class SmoothKernel:
     """
 
     axes: Array
-    parts: tuple[Part, ...]
-    everywhere: tuple[Part, ...]
+    parts: tuple[KernelFactor, ...]
+    everywhere: tuple[KernelFactor, ...]
     own: tuple[Array, ...]
     factors: dict[tuple[float, int], Array] = field(default_factory=dict)
     vectors: dict[int, tuple[Array, Array]] = field(default_factory=dict)
@@ -401,14 +401,14 @@ class SmoothKernel:
         else:
             value, axes = np.linalg.eigh(moves @ moves.T)
             each = list(np.sqrt(np.maximum(value, 0.0))[:, None, None])
-        parts = tuple(Part(kernel.functions, own, used, np.sqrt(weights[used])) for own in each)
+        parts = tuple(KernelFactor(kernel.functions, own, used, np.sqrt(weights[used])) for own in each)
         every = np.arange(len(weights))
-        everywhere = tuple(Part(kernel.functions, own, every, np.ones(len(every))) for own in each)
+        everywhere = tuple(KernelFactor(kernel.functions, own, every, np.ones(len(every))) for own in each)
         return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
 
     def along(self, stack: Array | DesignMatrix) -> list[Array]:
         """Product BᵀS of each part, or, where B is wide, the part's rows of S; S the distinct columns."""
-        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.around(stack, len(self.axes))
+        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, len(self.axes))
         found = [np.zeros((len(own), len(stack.different))) for own in self.own]
         for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
@@ -431,7 +431,7 @@ class SmoothKernel:
             return rows[0]
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
 
-    def back(self, parts: Sequence[Part], inner: Sequence[Array]) -> Array:
+    def back(self, parts: Sequence[KernelFactor], inner: Sequence[Array]) -> Array:
         """Product (n, m, K) of B with (c k, K) of each part."""
         found = np.empty((len(parts[0].used), len(self.axes), inner[0].shape[1]))
         for chunk in chunks(len(found)):
@@ -496,20 +496,20 @@ class SmoothKernel:
         m = len(self.axes)
         for k, part in enumerate(self.parts):
             value, vector = self.decomposed(k)
-            heard = tau**2 * value > floor
-            own = vector[:, heard]
+            above = tau**2 * value > floor
+            own = vector[:, above]
             if not part.wide:
-                inner = own / np.sqrt(value[heard])
+                inner = own / np.sqrt(value[above])
                 rows = [part.times(inner, chunk) for chunk in chunks(len(part.used))]
                 own = np.concatenate(rows).reshape(len(part.used) * rows[0].shape[1], inner.shape[1])
             if len(self.parts) > 1:
                 own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
             found.append(own)
-            variance.append(tau**2 * value[heard])
+            variance.append(tau**2 * value[above])
         return np.concatenate(found, axis=1), np.concatenate(variance)
 
-    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.taken`."""
+    def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
         basis, variance = self.eigen(tau, floor)
         columns = white(np.flatnonzero(rows))
         own = basis[np.repeat(rows, len(self.axes))]

@@ -376,5 +376,5 @@ CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
 """rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
-UNHEARD = 1e-2
+KERNEL_FLOOR = 1e-2
 """Of the noise's variance: what rows have in common below it is left out where rows are held out."""

@@ -252,11 +252,11 @@ def require_numbers(urdf: str, source: str) -> None:
         raise RobotError(f"{source} has {freedoms} joints that move, expected at most {MOST_MOVING}: cut it to the arm")
 
 
-def _walk(element: Element, place: str) -> Iterator[tuple[str, Element]]:
+def _descendants(element: Element, place: str) -> Iterator[tuple[str, Element]]:
     """Yield an element and its descendants with their paths below the robot."""
     yield place, element
     for child in element.iterchildren("*"):
-        yield from _walk(child, f"{place}/{element.tag}".lstrip("/"))
+        yield from _descendants(child, f"{place}/{element.tag}".lstrip("/"))
 
 
 def _problems(owner: Element) -> Iterator[str]:
@@ -264,7 +264,7 @@ def _problems(owner: Element) -> Iterator[str]:
     seen, name = set(), owner.get("name", "")
     if owner.tag == "joint" and (not name or name != name.strip()):
         yield ": expected a name without blanks around it"  # a table's column has none
-    for place, element in _walk(owner, ""):
+    for place, element in _descendants(owner, ""):
         path = f"{place}/{element.tag}".lstrip("/")
         if path in _ONCE and path in seen:
             yield f": there are two <{element.tag}>, expected one"

@@ -268,7 +268,7 @@ def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Ge
 
 
 def _named(spot: Spot, day: Day, values: Array) -> dict[str, Any]:
-    name, _ = spot.told(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
+    name, _ = spot.parameter_change(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
     return {**spot.named(day.setting), "parameter": name}
 
 
@@ -333,7 +333,7 @@ def _moving(
     by = times * _tells(several, days, spot, values, others)
     by *= 1.0 if fault.name in GROWS_ONLY else float(rng.choice([-1.0, 1.0]))
     at_work = [[*done[:own], (fault, spot.moved(values, by * share)), *done[own + 1 :]] for share in shape.tolist()]
-    name, amount = spot.told(setting, values, by)
+    name, amount = spot.parameter_change(setting, values, by)
     how = {"parameter": name, "how": several.how, "after": after, "amount": amount, "deviations": times}
     return at_work, {**spot.named(setting), **how}
 

@@ -289,7 +289,7 @@ class Spot:
         [place] = _named([self.fault.places(setting)[self.number]])
         return {"effect": self.fault.name, "place": place}
 
-    def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
+    def parameter_change(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
         """Name of the corresponding parameter, and its change."""
         before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
         [name] = [key for key in after if after[key] != before[key]]
