@@ -487,26 +487,21 @@ def explain(
     linear: Linear,
     noise: Noise,
     *,
-    rows: NDArray[np.bool_] | None = None,
     families: Sequence[str] = (),
     starts: Sequence[Sequence[int]] = (),
-    outliers: NDArray[np.bool_] | None = None,
     before: Explanation | None = None,
     kernels: Sequence[Kernel] = (),
     log_prior: Sequence[float] | None = None,
 ) -> Explanation:
     """Bayesian model selection of blocks together with outliers, noise and a correlated discrepancy.
 
-    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
-    (N,) are ignored. Blocks of one family are settings that exclude each other and share its prior probability.
-    ``starts`` and ``outliers`` are where the search starts. With an explanation of a similar problem ``before``, its
-    weights, noise and plausible kernels are reused; if the first of the starts is found again with the same kernel, the
-    iteration ends. ``log_prior`` is by default that of the blocks' effects.
+    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Blocks of one
+    family are settings that exclude each other and share its prior probability. The search starts from ``starts``. With
+    an explanation of a similar problem ``before``, its weights, noise and plausible kernels are reused; if the first of
+    the starts is found again with the same kernel, the iteration ends. ``log_prior`` is by default that of
+    the blocks' effects.
     """
-    samples = len(linear.gap)
-    use = np.ones(samples, dtype=bool) if rows is None else rows
-    outliers = before.outliers if before and outliers is None else outliers
-    aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
+    aside = np.zeros(len(linear.gap), dtype=bool) if before is None else before.outliers
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
     inputs = _Inputs(
@@ -517,7 +512,7 @@ def explain(
     beside: Sequence[Kernel] = ()
     if before is None:
         # effects that are far off, and gross errors, are settled first, beside a noise that is free
-        whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
+        whitening = first_whitening(linear, noise)
     else:
         whitening, alive = replace(before.whitening, smooth=None), {kernel.name for kernel in before.kernels}
         beside, kernel = [kernel for kernel in kernels if kernel.name in alive], before.discrepancy.kernel
@@ -533,7 +528,7 @@ def explain(
             if settled(found):
                 return found.explanation(aside)
         history.append(found.state)
-        whitening, aside = reweigh(found.rough_residual, noise, use, found.leverage, linear.measures)
+        whitening, aside = reweigh(found.rough_residual, noise, found.leverage, linear.measures)
         seeds = [found.best.blocks]
         beside = kernels if first else found.models.plausible_kernels(found.best)
         first = False

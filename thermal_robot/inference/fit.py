@@ -241,11 +241,12 @@ def _explained(
 
     Starts at the weights and scales of a nearby explanation ``before``, if any.
     """
-    noise, use = Noise.of(observations.campaign), np.ones(observations.campaign.samples, dtype=bool)
+    noise = Noise.of(observations.campaign)
     linear = at_exact_model(observations, [block(observations, effect).held for effect in effects], held)
     # effects that are far off, and gross errors, are settled first, beside a noise that is free
-    whitening = before.whitening if before else replace(first_whitening(linear, noise, use), held=0.0)
-    aside, rounds, known = before.outliers if before else ~use, 0, before is not None
+    whitening = before.whitening if before else first_whitening(linear, noise)
+    aside = before.outliers if before else np.zeros(len(linear.gap), dtype=bool)
+    rounds, known = 0, before is not None
     best, flat = before.best if before else None, linear.frames.shape[2]
     while True:
         problem, rounds = gram(linear, whitening), rounds + 1
@@ -254,7 +255,7 @@ def _explained(
         left = residual_of(linear, whitening, values)
         # the share of the equations that effects and frames take up
         leverage = float(min((best.effective + flat) / max(problem.equations + flat, 1), settings.MOST_LEVERAGE))
-        then, later = reweigh(left, noise, use, leverage, linear.measures)
+        then, later = reweigh(left, noise, leverage, linear.measures)
         if (known and (later == aside).all()) or rounds > settings.FIRST_ROUNDS:
             none = Discrepancy(None, 0.0, 0.0, {}, best.noise)
             sure = (best,), np.ones(1)

@@ -205,9 +205,6 @@ class _Figures(NamedTuple):
     most: float = _LARGEST
 
 
-_INERTIA = {
-    name: _Figures(f"inertia {name}", "a number of kg·m²") for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-}
 _LIMIT = {name: _Figures(f"limit {name}", "a number", most=_NO_LIMIT) for name in ("lower", "upper")}
 _ATTRIBUTES: dict[str, dict[str, _Figures | None]] = {
     "origin": {"xyz": _Figures("origin", "three numbers, m", 3), "rpy": _Figures("origin", "three numbers, rad", 3)},
