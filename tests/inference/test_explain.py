@@ -175,7 +175,7 @@ def test_the_discrepancy_is_what_poses_share_and_part_of_the_remainder():
 
 
 def test_where_the_search_starts_does_not_matter():
-    linear, _, spoilt = problem(6, (0, 2), 6)
+    linear, _, _ = problem(6, (0, 2), 6)
     plain = explained(linear)
     begun = explained(linear, starts=[(1,), (0, 1)])
     assert begun.best.blocks == plain.best.blocks
