@@ -21,7 +21,7 @@ from thermal_robot.diagnosis.cross_validation import (
     shrinkage,
     worst_folds,
 )
-from thermal_robot.diagnosis.prune import grown
+from thermal_robot.diagnosis.prune import forward_selection
 from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
@@ -406,7 +406,7 @@ def test_a_target_mounted_anew_for_a_session_does_not_count_against_what_carries
     there = campaign.labels["session"] == "day 2"
     moved = np.where(there[:, None], other.position, campaign.position)
     alone = {s.name: s for s in worst_folds(fit(campaign, choose(("backlash",), (), ())))}
-    known = grown(fit(replace(campaign, position=moved), choose(("backlash",), (), ())), 1, lambda _: None)
+    known = forward_selection(fit(replace(campaign, position=moved), choose(("backlash",), (), ())), 1, lambda _: None)
     (event,) = [law for law, _ in known.effects if law.name == "discovered.1"]
     assert (event.kind, event.quantity, event.labels[int(event.marks[0])]) == ("tool", "session", "day 2")
     for name, scheme in {s.name: s for s in worst_folds(known)}.items():

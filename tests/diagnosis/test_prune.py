@@ -16,7 +16,7 @@ from thermal_robot.diagnosis.prune import (
     HeldOutTest,
     determined,
     held_out_tests,
-    in_place,
+    odds_in_place,
     pruned,
     selected_with_scatter,
 )
@@ -142,7 +142,7 @@ def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
     for seed in range(12):
         data = simulate(rv_m2, ["joint_gain"], seed=seed, samples=75, ratio=(0.35, 0.35))[0]
         known = fit(data, choose(("joint_gain",), (), ()))
-        odds, downweighted = in_place(known), []
+        odds, downweighted = odds_in_place(known), []
         left, refused = pruned(known, downweighted.append)
         if not known.effects:
             assert odds == {}
@@ -165,7 +165,7 @@ def test_two_that_one_of_is_at_work_are_not_in_question(rv_m2):
     data = simulate(rv_m2, ["joint_compliance"], seed=4, samples=75, ratio=(4.0, 4.0))[0]
     known = fit(data, choose(("joint_compliance", "link_compliance"), (), ()))
     assert len(known.effects) == 1
-    assert in_place(known) == {names(known)[0]: MANY}
+    assert odds_in_place(known) == {names(known)[0]: MANY}
     both = known.explanation.probability(range(len(known.families)))
     assert both == pytest.approx(1.0, abs=1e-6)
 
@@ -175,7 +175,7 @@ def test_a_law_far_less_probable_than_its_rivals_is_not_found(rv_m2, monkeypatch
     law = SPURIOUS[1]
     known = refit(fit(with_law(rv_m2, law, [-2e-4, 2e-4], seed=0)[0], ()), {law.name: (law,)}, [[law]])
     monkeypatch.setattr(word, "discovered", lambda _: [SimpleNamespace(law=law, probability=probability)])
-    assert (in_place(known)[law.name] >= settings.NAMING_ODDS) == stays
+    assert (odds_in_place(known)[law.name] >= settings.NAMING_ODDS) == stays
     assert (names(pruned(known, lambda _: None)[0]) == [law.name]) == stays
 
 
@@ -188,7 +188,7 @@ def test_what_stays_obeys_the_rule_and_is_not_asked_again(rv_m2, seed):
     left, refused = pruned(beside, lambda _: None)
     assert "backlash" in names(left)
     assert not set(refused) & set(names(left))
-    table, odds, sure = held_out_tests(left), in_place(left), determined(left)
+    table, odds, sure = held_out_tests(left), odds_in_place(left), determined(left)
     for effect, _ in left.effects:
         assert not table[effect.name].harms
         assert table[effect.name].helps or not effect.name.startswith("discovered.")

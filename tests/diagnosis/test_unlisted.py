@@ -11,8 +11,8 @@ from helpers import NOISE, disturbed, erring, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
-from thermal_robot.diagnosis.prune import attributed_to_laws, grown
-from thermal_robot.diagnosis.residual_tests import examine
+from thermal_robot.diagnosis.prune import attributed_to_laws, forward_selection
+from thermal_robot.diagnosis.residual_tests import analyse_residual
 from thermal_robot.diagnosis.values import Dependence, Location, Unexplained
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
@@ -180,15 +180,15 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
 def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     law, values = CASES["step"]
     known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
-    before = examine(known).unexplained
+    before = analyse_residual(known).unexplained
     assert before.flagged
     downweighted = []
-    after = grown(known, 2, downweighted.append)
+    after = forward_selection(known, 2, downweighted.append)
     assert downweighted[0] == "causes that nobody listed: scan 2"
     (own,) = [effect for effect, _ in after.effects if isinstance(effect, Discovered)]
     assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
     assert "discovered.2" in after.families
-    assert not examine(after).unexplained.flagged
+    assert not analyse_residual(after).unexplained.flagged
     said = attributed_to_laws(before, discovered(after), after.explanation.discrepancy)
     assert (said.rms, said.p_value, said.reasons) == (before.rms, before.p_value, before.reasons)
     assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
@@ -202,8 +202,8 @@ def test_a_second_law_is_looked_for_beside_the_first(rv_m2):
     (first, one), (second, two) = CASES["step"], CASES["hinge"]
     data = disturbed(with_law(rv_m2, first, one, seed=5)[0], [(second, np.array(two))])
     known = fit(data, choose(("joint_offset",), (), ()))
-    alone = grown(known, 1, lambda _: None)
-    both = grown(alone, 2, lambda _: None)
+    alone = forward_selection(known, 1, lambda _: None)
+    both = forward_selection(alone, 2, lambda _: None)
     laws = {effect.name: effect.place for effect, _ in both.effects if isinstance(effect, Discovered)}
     assert set(laws) == {"discovered.1", "discovered.2"}
     assert set(laws.values()) == {first.place, second.place}

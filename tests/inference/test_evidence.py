@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Columns, Posterior, beside, evidence
+from thermal_robot.inference.evidence import Columns, Posterior, conditional_scales, evidence
 from thermal_robot.inference.problem import gram
 from thermal_robot.inference.search import Search
 
@@ -189,7 +189,7 @@ def test_a_further_scale_is_expected_as_known_ones_and_their_common_factor_say(k
     rng = np.random.default_rng(len(known))
     spread, own = rng.uniform(0.3, 1.5, 3), rng.uniform(0.3, 1.5, 4)
     held, log_scale = spread[list(known)], rng.normal(size=len(known))
-    mean, deviation = beside(held, log_scale, own)
+    mean, deviation = conditional_scales(held, log_scale, own)
     for further, found in zip(own, deviation, strict=True):
         whole = np.diag([*held, further]) ** 2 + settings.COARSENESS**2
         gain = np.linalg.solve(whole[:-1, :-1], whole[:-1, -1])

@@ -14,10 +14,10 @@ from threadpoolctl import ThreadpoolController
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.answer import model_of
-from thermal_robot.diagnosis.data_checks import as_counted, usable
+from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
 from thermal_robot.diagnosis.findings import divided_effects, estimates
-from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, examine
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, analyse_residual
 from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
@@ -98,7 +98,7 @@ class Calibration:
 
     @cached_property
     def _examined(self) -> ResidualAnalysis:
-        return examine(self.fit)
+        return analyse_residual(self.fit)
 
     @property
     def unexplained(self) -> bool:
@@ -209,7 +209,7 @@ def calibrate(
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
-        fit = fit_named(as_counted(campaign), chosen, progress)
+        fit = fit_named(with_corrected_signs(campaign), chosen, progress)
     campaign, e = fit.campaign, fit.explanation
     before, after = (seen.gap[~e.outliers] for seen in (fit.nominal, fit.corrected))
     poses = components(campaign) == 6

@@ -97,7 +97,7 @@ class Model:
         return np.concatenate([*own, np.zeros(0)])
 
     @cached_property
-    def _known(self) -> dict[bytes, Array]:
+    def _cached_products(self) -> dict[bytes, Array]:
         return {}
 
     @cached_property
@@ -111,7 +111,7 @@ class Model:
         V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
         """
         key = rows.tobytes()
-        if key not in self._known:
+        if key not in self._cached_products:
             used, smooth = rows & self._used, self.whitening.smooth
             # the sums over most rows are those over all less those over the others
             most = 2 * used.sum() > self._used.sum()
@@ -123,8 +123,8 @@ class Model:
                 )
             hidden = np.flatnonzero(~self._touched[used].any(axis=0))  # a difference of sums leaves rounding there
             products[:, hidden], products[:, :, hidden] = 0.0, 0.0
-            self._known[key] = products
-        return self._known[key]
+            self._cached_products[key] = products
+        return self._cached_products[key]
 
     @cached_property
     def _touched(self) -> Rows:

@@ -74,7 +74,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     if not far.any():
         return campaign, ()
     out, notes = np.zeros(len(order), dtype=bool), []
-    found = [*_still(readings, far, near), *_behind(readings, far, near, frames)]
+    found = [*_frozen_runs(readings, far, near), *_lagging_runs(readings, far, near, frames)]
     for rows, words in sorted(found, key=lambda run: -len(run[0])):
         if not out[rows].any():
             out[rows] = True
@@ -85,7 +85,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     return campaign.take(np.sort(order[~out])) if notes else campaign, tuple(notes)
 
 
-def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
+def _frozen_runs(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
     """Yield runs in which the measured position stays the same while the commands change."""
     k, rows = 0, len(far)
     while k < rows - 1:
@@ -98,7 +98,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
         k += stays + 1
 
 
-def _behind(readings: Readings, far: Flags, near: float, frames: BaseAndTarget) -> Iterator[tuple[Rows, str]]:
+def _lagging_runs(readings: Readings, far: Flags, near: float, frames: BaseAndTarget) -> Iterator[tuple[Rows, str]]:
     """Yield short runs in which the measured pose belongs to the command of a row up to some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)
@@ -152,7 +152,7 @@ def contradicted(campaign: Campaign) -> list[str]:
     return found
 
 
-def as_counted(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
+def with_corrected_signs(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
     """Reverse quantities that were recorded with the opposite sign, with a note; ``own`` are the user's effects."""
     tried: set[str] = set()
     while (quantity := _against(campaign, own, tried)) is not None:
@@ -192,7 +192,7 @@ def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str 
     either = tuple(replace(b, bare=tuple(replace(p, positive=False) for p in b.bare)) for b in blocks)
     families = [b.effect.name for b in blocks]
     free = explain(replace(linear, blocks=either), Noise.of(campaign), families=families)
-    against = [q for q, z in _votes(free, sides).items() if q not in tried and _agree(z)]
+    against = [q for q, z in _sign_scores(free, sides).items() if q not in tried and _agree(z)]
     if not against:
         return None
     read, clear = _keeping_signs(linear, free), {}
@@ -228,7 +228,7 @@ def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDA
     return Linear(seen.gap, frame_columns(seen)[0], tuple(blocks)), sides
 
 
-def _votes(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
+def _sign_scores(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
     """Z scores, by quantity, of the parameters whose sign that quantity decides."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():

@@ -13,7 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.attribution import without_laws
 from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, schemes
-from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, examine
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, analyse_residual
 from thermal_robot.diagnosis.values import Dependence, Location, Refused, Unexplained
 from thermal_robot.effects import Effect, JointRipple
 from thermal_robot.effects.law import PREFIX
@@ -28,7 +28,7 @@ from thermal_robot.inference.scatter import RandomGap, random_gap
 from thermal_robot.inference.weights import Noise
 
 
-def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
+def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: add unlisted terms in competition with all known effects; ``None`` if none is selected.
 
     Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. One
@@ -116,7 +116,7 @@ def selected_with_scatter(
     floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
-        left = examine(fit, progress).unexplained
+        left = analyse_residual(fit, progress).unexplained
     return concluded(fit, ResidualAnalysis(left, floor, "scatter"), chance, refused)
 
 
@@ -247,7 +247,7 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
         return harmful
-    odds, sure = in_place(fit), determined(fit)
+    odds, sure = odds_in_place(fit), determined(fit)
     laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
     poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
     out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}
@@ -262,7 +262,7 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     return {worst: Refused(min(fit.probability(worst), 1.0 if worst in sure else settings.PRIOR_PROBABILITY))}
 
 
-def in_place(fit: Fit) -> dict[str, float]:
+def odds_in_place(fit: Fit) -> dict[str, float]:
     """Posterior odds of each effect and law against nothing in its place; of a law also against its alternatives.
 
     Alternatives of an effect do not count here: they are reported as confounded. The odds of a law include those of its

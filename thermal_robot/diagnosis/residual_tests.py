@@ -122,7 +122,7 @@ class ResidualAnalysis:
     source: str
 
 
-def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> ResidualAnalysis:
+def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> ResidualAnalysis:
     """Residual analysis of a fit: several tests for noise with Bonferroni correction.
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws

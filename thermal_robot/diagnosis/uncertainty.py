@@ -49,7 +49,7 @@ def inflated_for_structure(fit: Fit) -> Fit:
     if not e.best.blocks:
         return fit
     model = _model(fit)
-    said, wider = _said(fit, model), dict(e.values)
+    said, wider = _other_covariances(fit, model), dict(e.values)
     for b, span in zip(e.best.blocks, model.spans, strict=True):
         values, covariance = e.values[b]
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
@@ -64,14 +64,14 @@ def variance_inflation(fit: Fit, linear: Linear, information: Array, axes: Array
     ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
     """
     model = replace(_model(fit), linear=linear, scales=(1.0,) * len(linear.blocks))
-    return _times(1.0 / (1.0 + information), axes, _said(fit, model))
+    return _inflation_factors(1.0 / (1.0 + information), axes, _other_covariances(fit, model))
 
 
 def _model(fit: Fit) -> Model:
     return Model.of(fit.explanation, blocks(fit.campaign))
 
 
-def _said(fit: Fit, model: Model) -> list[Array]:
+def _other_covariances(fit: Fit, model: Model) -> list[Array]:
     """Parameter covariances (P, P) beside the posterior's: jackknife over blocks of rows, and sandwich."""
     found, e = [], fit.explanation
     for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
@@ -121,12 +121,12 @@ def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
     """Covariance (P, P), in units of the prior deviations, raised along its axes to the largest of the others."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
-    times = _times(variance, axes, said)
+    times = _inflation_factors(variance, axes, said)
     wide = np.where(variance < 1.0, 1.0 / (1.0 + (1.0 / variance - 1.0) / times), variance)
     return np.asarray((axes * wide) @ axes.T)
 
 
-def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
+def _inflation_factors(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
     """Variance inflation factors (P,), at least 1, along principal axes: largest of some covariances over variance."""
     most = np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0)
     return np.asarray(most / variance)
@@ -146,7 +146,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
         relative = campaign.relative_noise[rows, 0]
         quiet = relative <= np.median(relative)
         share = float(np.sqrt((relative[quiet] ** 2).mean()))
-    total = _size(left[quiet], told[quiet], ~e.outliers[rows[quiet]])
+    total = _conformal_size(left[quiet], told[quiet], ~e.outliers[rows[quiet]])
     noise = share * (campaign.noise_position or floor)
     beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
     values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
@@ -186,7 +186,7 @@ def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
     return validation.residuals(range(len(model.spans)))[:, :3] @ base.T, validation.numbers
 
 
-def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
+def _conformal_size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
     """Conformal residual size (3,) per axis: with the parameters' variance, 1.96 of it hold 95 % of the residuals.
 
     The ratio of the axes is that of their rms without outliers; outliers count in the 95 %.

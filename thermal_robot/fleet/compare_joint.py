@@ -178,7 +178,7 @@ def _numbered(base: Combination, used: Sequence[int]) -> Combination:
 
 def _choices(item: Candidate, statistics: Sequence[Sums]) -> Iterator[Choice]:
     """Yield the alternatives of an effect: shared, in all places and in each, then different by place and parameter."""
-    everywhere, some, places = tuple(range(len(statistics))), some_of(len(statistics)), item.places
+    everywhere, some, places = tuple(range(len(statistics))), campaign_subsets(len(statistics)), item.places
     among = len(places) if len(places) > 1 else 0
     shared: list[tuple[Place, tuple[int, ...]]] = [(("", ""), item.at)]
     shared += [(place, tuple(inside)) for place, inside in places.items() if among]
@@ -206,7 +206,7 @@ def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]
             yield from ((place, (k,), each / (2.0 * len(inside))) for k in inside)
 
 
-def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
+def campaign_subsets(campaigns: int) -> tuple[tuple[int, ...], ...]:
     """Subsets of campaigns that may differ from the others: all, or with many campaigns singles and splits in order."""
     every = range(campaigns)
     if campaigns <= settings.FEW:

@@ -406,13 +406,13 @@ def _compared(
             splits.append((label, population(values[kept], deviations[kept], own), kept, own, names[groups]))
     if not splits:
         return found, usual, unlike
-    label, by, kept, own, names = min(splits, key=lambda split: split[1].alike)
+    label, by, kept, own, names = min(splits, key=lambda split: split[1].p_equal_means)
     per_group = zip(names, by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
     groups_told = sorted(
         (Group(*group) for group in per_group), key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group)
     )
-    found = replace(found, label=label, p_label=by.alike, groups=tuple(groups_told[: settings.MOST_GROUPS]))
-    if by.alike < settings.STRIKING:
+    found = replace(found, label=label, p_label=by.p_equal_means, groups=tuple(groups_told[: settings.MOST_GROUPS]))
+    if by.p_equal_means < settings.STRIKING:
         found = replace(found, spread=by.spread, spread_std=by.spread_std)
         unlike = np.where(kept, 0.0, unlike)
         usual[kept], unlike[kept] = by.means[own], by.apart

@@ -17,7 +17,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis import Diagnosis
-from thermal_robot.diagnosis.data_checks import as_counted, usable
+from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
 from thermal_robot.effects import RANDOM, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
@@ -188,7 +188,7 @@ def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
         return given.fit
     if given.position is None or not given.samples:
         raise CampaignError(given.name, "nothing was measured", expected="a campaign with measured positions")
-    found = fit(as_counted(usable(given)[0]), choose(chosen, (), ()))
+    found = fit(with_corrected_signs(usable(given)[0]), choose(chosen, (), ()))
     if another_motion(found) is not None:
         expected = "a campaign that `thermal-robot diagnose` can use; it says what is wrong"
         raise CampaignError(given.name, "robot and table do not describe the same motion", expected=expected)

@@ -115,7 +115,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
 
 def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect, ...]:
     """Effects of all campaigns in their most frequent settings, in all places named."""
-    kept = [effect for effect in named if not _begins_anew(effect, observations)]
+    kept = [effect for effect in named if not _independent_per_campaign(effect, observations)]
     found = [e for e in library().values() if e.told_inside and not gate.missing(e, observations)]
     always = {effect.name for effect in found}
     for name in dict.fromkeys(e.name for e in kept if e.name not in always):
@@ -127,7 +127,7 @@ def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect
     return tuple(found)
 
 
-def _begins_anew(effect: Effect, observations: Observations) -> bool:
+def _independent_per_campaign(effect: Effect, observations: Observations) -> bool:
     """Whether an effect is independent in each campaign."""
     if effect.name in FRAMES or effect.name.startswith(PREFIX):
         return True
@@ -170,7 +170,7 @@ class _Visit:
     @classmethod
     def of(cls, fit: Fit, keys: Sequence[Key], given: dict[Key, Parameter]) -> _Visit:
         """Responses of the common parameters in a campaign's rows; none for an effect whose columns it lacks."""
-        fresh = [effect for effect, _ in fit.effects if _begins_anew(effect, fit.nominal)]
+        fresh = [effect for effect, _ in fit.effects if _independent_per_campaign(effect, fit.nominal)]
         own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
         white, linear = fit.explanation.whitening, fit.explanation.linear
         white = replace(white, noise=white.noise * fit.explanation.best.noise)

@@ -172,9 +172,9 @@ def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tupl
     values[kept] = mean
     if len(kept) < len(free):
         out = np.flatnonzero(~free)
-        beside, vector = columns.matrix[out[:, None], kept], columns.vector[out]
-        pull[out] = (vector - beside @ mean) / variance
-        rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(beside) @ np.abs(mean)) / variance
+        conditional_scales, vector = columns.matrix[out[:, None], kept], columns.vector[out]
+        pull[out] = (vector - conditional_scales @ mean) / variance
+        rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(conditional_scales) @ np.abs(mean)) / variance
         wrong[out] = pull[out] > rounding
     if len(columns.constrained):
         own = values[columns.constrained]
@@ -223,14 +223,14 @@ def _truncated(
         mean[out], own[out] = pull[out] / hessian, 1.0 / hessian
         log_mass = float((0.5 * np.log(prior_precision[out] / hessian) + 0.5 * pull[out] ** 2 / hessian).sum())
     p = columns.constrained
-    at, beside = mean[p], own[p]
-    root = np.sqrt(beside)
+    at, conditional_scales = mean[p], own[p]
+    root = np.sqrt(conditional_scales)
     z = at / root
     # of a normal on one side of zero: mean m + σ r, mean square σ² + m (m + σ r), with r = φ(z)/Φ(z)
     ratio = _ROOT_2_OVER_PI / erfcx(-z / _ROOT_2)
     first, second = mean, mean**2 + own
     first[p] = moved = np.maximum(at + root * ratio, 0.0)
-    second[p] = np.maximum(beside + at * moved, moved**2)
+    second[p] = np.maximum(conditional_scales + at * moved, moved**2)
     return first, second, log_mass + float((log_ndtr(z) + _LOG_2).sum())
 
 
@@ -349,7 +349,7 @@ class ScalePrior:
         return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
 
 
-def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
+def conditional_scales(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
     """Conditional mean and standard deviations of ln λ of further blocks, given those of B known ones.
 
     ``spread`` and ``log_scale`` (B,) are those of the known blocks, ``own`` (K,) the spreads of the further ones.

@@ -72,7 +72,7 @@ class DesignMatrix:
         rows = len(array) // measures
         return cls(different, np.arange(len(different)), np.arange(rows), np.ones((rows, measures)))
 
-    def weighed(self, used: Numbers, root: Array) -> DesignMatrix:
+    def weighted(self, used: Numbers, root: Array) -> DesignMatrix:
         """Columns over the rows in use, (n,), times ``root`` (n, m), computed on demand."""
         return replace(self, used=used, root=root)
 

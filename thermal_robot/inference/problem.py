@@ -104,7 +104,7 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
 def white_stack(stack: DesignMatrix, whitening: Whitening) -> DesignMatrix:
     """Columns over the rows with weight, in units of the noise, without the discrepancy."""
     used = np.flatnonzero(whitening.weights > 0)
-    return stack.weighed(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
+    return stack.weighted(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
 
 
 def normal_equations(

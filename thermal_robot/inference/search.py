@@ -30,7 +30,7 @@ from scipy.special import erfcx, log_ndtr
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, beside, evidence
+from thermal_robot.inference.evidence import Combination, Gram, conditional_scales, evidence
 
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
@@ -74,7 +74,7 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
             np.add(left_over[:, :, None], seen, out=part)
             taken = np.divide(told, part, out=part).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        about, spread = beside(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
+        about, spread = conditional_scales(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
         log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
         log -= 0.5 * ((log_scale - about) / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)

@@ -380,7 +380,7 @@ def _converted(taken: str, meant: str, factor: float = 1.0) -> Repair:
     return _changed("orientation", change)
 
 
-def _turn_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
+def _orientation_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
     """Kind of fault of measured orientations."""
     found = tuple(proposals)
     return Kind(name, says, remedy, lambda readings: () if readings.orientation is None else found)
@@ -398,14 +398,14 @@ AXES = (
     Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", lambda _: _MIRRORS),
 )
 TURNS = (
-    _turn_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ORDERS),
-    _turn_kind(
+    _orientation_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ORDERS),
+    _orientation_kind(
         "conjugate quaternion",
         "quaternions turn the measurement frame into the target's, not back",
         "change the sign of qx, qy, qz",
         [("", _mapped("orientation", _CONJUGATE))],
     ),
-    _turn_kind(
+    _orientation_kind(
         "angles of orientations",
         "orientations are made of {}",
         "convert them anew",
@@ -414,7 +414,7 @@ TURNS = (
             for taken, meant in permutations(_ANGLES, 2)
         ],
     ),
-    _turn_kind(
+    _orientation_kind(
         "angles in degrees",
         "angles in rad are read as degrees in {}",
         "convert them anew",

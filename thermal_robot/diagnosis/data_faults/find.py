@@ -147,7 +147,7 @@ class AffectedRows:
         frames = self.frames or part.align(begun=np.stack([begun, part.declared.tool[:3, 3]]))
         return Repaired(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
 
-    def hit(self, found: Repaired) -> Rows:
+    def improved_rows(self, found: Repaired) -> Rows:
         """Rows (N,) that fit better with the repair than without.
 
         Rows that nothing mends, and those that are not determined, count as the others.
@@ -253,12 +253,12 @@ class Screen:
 
     def both_sides(self) -> list[Repaired]:
         """Faults of the joints, of the measurements, and pairs with one of each: distances on a few rows."""
-        joints = self._glanced([(), *((p,) for p in self._of_joints)])
+        joints = self._prescreened([(), *((p,) for p in self._of_joints)])
         measured = [*self._proposals(MEASUREMENT_KINDS)]
         units, axes, turns = ([p for p in measured if p.kind in kinds] for kinds in (UNITS, AXES, TURNS))
         sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *product(units, axes)]
         asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
-        looked = self._looked(asked)
+        looked = self._screened(asked)
         if self.struck.readings.orientation is None:
             return looked
         looked.sort(key=attrgetter("typical"))
@@ -266,7 +266,7 @@ class Screen:
             t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]
         ]
         more = [((*t.fault, *turn), t.place, 0.0) for t in near for turn in ((), *((p,) for p in turns))]
-        return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
+        return self._screened([own for own in more if len(own[0]) <= 2], turns=True)
 
     def two_of_joints(self) -> list[Repaired]:
         """Pairs of faults of the joints, including sign reversals of any number of joints with another fault."""
@@ -285,7 +285,7 @@ class Screen:
             return []
         self.asked += len(made)
         order = np.argsort(np.concatenate(scores), kind="stable")[: settings.MOST_SURVIVORS]
-        return self._looked(self._glanced([made[k] for k in order]), turns=True)
+        return self._screened(self._prescreened([made[k] for k in order]), turns=True)
 
     @cached_property
     def _of_joints(self) -> list[Proposal]:
@@ -328,7 +328,7 @@ class Screen:
         )
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
-    def _glanced(self, faults: Sequence[Fault]) -> Chosen:
+    def _prescreened(self, faults: Sequence[Fault]) -> Chosen:
         """Faults with the smallest residual of an affine map, refitted once without outliers."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
@@ -342,7 +342,7 @@ class Screen:
         least = score * own[0][1].maps_place
         return [(own[k][0], place[k], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
 
-    def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Repaired]:
+    def _screened(self, chosen: Chosen, *, turns: bool = False) -> list[Repaired]:
         """Faults with their rigid-registration residual on a few rows, if measured points extend as far as the motion.
 
         Those of which even a map leaves more than a mend may are passed over.
@@ -449,7 +449,7 @@ def _data_fault(campaign: Campaign, struck: AffectedRows, found: Sequence[Repair
         alike.setdefault(tuple(p.kind for p in tried.fault), []).append(tried)
     alike = dict([*alike.items()][: settings.TOLD])
     best = min(found, key=attrgetter("median"))
-    hit = struck.hit(best)
+    hit = struck.improved_rows(best)
     remedies = (" and ".join(dict.fromkeys(kind.remedy for kind in kinds)) for kinds in alike)
     return DataFault(
         kinds=tuple(dict.fromkeys(kind.name for kinds in alike for kind in kinds)),

@@ -26,7 +26,7 @@ from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import spread
-from thermal_robot.diagnosis.residual_tests import examine
+from thermal_robot.diagnosis.residual_tests import analyse_residual
 from thermal_robot.diagnosis.values import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
@@ -401,7 +401,7 @@ def frames_alone(
 ) -> Conclusion:
     """Conclusion with the unknown frames alone, where no effect can be tested without the columns in ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
-    left = examine(bare)
+    left = analyse_residual(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
 
 
