@@ -133,7 +133,7 @@ def test_a_wheel_on_the_motor_is_found_with_its_order(rv_m2):
     again = scan(blind, [target])[0][0][0]
     assert (again.law.place, again.law.shape) == ("joint_2", "harmonic")
     assert again.law.marks[0] == pytest.approx(51.0, abs=0.06)
-    assert again.net_gain < scan(here, [target])[0][0][0].worth
+    assert again.net_gain < scan(here, [target])[0][0][0].net_gain
     # a smooth law of that joint is told its waves where their orders are known
     smooth = replace(first, shape="smooth", marks=(-1.0, -0.5, 0.0, 0.5, 1.0))
     assert shaped(here, target, smooth).law.marks == (51.0,)
