@@ -79,7 +79,7 @@ def test_columns_of_plain_text_stand_below_each_other():
 
 def test_the_last_one_registered_counts(monkeypatch):
     monkeypatch.setattr(renderer, "_renderers", [])
-    with pytest.raises(RuntimeError, match="import thermal_robot, or call told_by"):
+    with pytest.raises(RuntimeError, match="import thermal_robot, or call register_renderer"):
         renderer.registered_renderer()
     first, last = object(), object()
     renderer.register_renderer(first)

@@ -116,7 +116,7 @@ def test_blocks_that_speak_for_an_effect_do_not_outweigh_a_region_that_refuses_i
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
     for_it, against = DensityGain("time", 0.2, 5.0, (1.0, 9.0)), DensityGain("region", -0.5, -9.0, (-15.0, -3.0))
     said = [{"drift": HeldOutTest(for_it, against)}, {}]
-    monkeypatch.setattr(word, "earned", lambda _: said.pop(0))
+    monkeypatch.setattr(word, "held_out_tests", lambda _: said.pop(0))
     left, refused = pruned(known, lambda _: None)
     assert left.effects == ()
     assert refused["drift"].share == against.share
@@ -129,7 +129,7 @@ def test_the_more_rows_held_out_suffer_the_less_probable_it_is(rv_m2, monkeypatc
     for nats in (-0.1, -1.0, -8.0):
         gained = DensityGain("time", nats / 100.0, nats, (nats - 10.0, nats + 10.0))
         answers = [{"drift": HeldOutTest(gained, gained)}, {}]
-        monkeypatch.setattr(word, "earned", lambda _, answers=answers: answers.pop(0))
+        monkeypatch.setattr(word, "held_out_tests", lambda _, answers=answers: answers.pop(0))
         said.append(pruned(known, lambda _: None)[1]["drift"].probability)
     assert said == sorted(said, reverse=True)
     assert said[2] < 1e-3 * settings.PRIOR_PROBABILITY
@@ -206,7 +206,7 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     assert determined(unseen) == {"thermal_elongation"}
     good = DensityGain("time", 0.2, 5.0, (1.0, 9.0))
     said = {name: HeldOutTest(good, good) for name in names(unseen)}
-    monkeypatch.setattr(word, "earned", lambda own: {name: said[name] for name in names(own)})
+    monkeypatch.setattr(word, "held_out_tests", lambda own: {name: said[name] for name in names(own)})
     downweighted = []
     left, refused = pruned(unseen, downweighted.append)
     assert downweighted[0] == "nothing determines geometric"

@@ -54,7 +54,7 @@ def belief(models):
     return 1.0 - odds.get("", 0.0)
 
 
-def rungs(models):
+def hyperparameters(models):
     return [PLAIN, *((k, tau) for k in range(len(models.kernels)) for tau in settings.TAUS)]
 
 
@@ -76,7 +76,7 @@ def near_nothing(off):
 
 
 def test_evidence_beside_a_discrepancy_is_the_density_of_the_gap():
-    """Of all combinations and rungs, weights included, but for one constant and the prior odds of rungs."""
+    """Of all combinations and hyperparameters, weights included, but for one constant and the prior odds of hyperparameters."""
     for seed in range(2):
         linear, whitening = small_problem(seed, rows=12, present=(1,))
         offered, off = two_forms(12, seed), []
@@ -91,10 +91,10 @@ def test_evidence_beside_a_discrepancy_is_the_density_of_the_gap():
 
 
 def everything(models):
-    """Log evidence of all combinations beside all rungs, each computed."""
+    """Log evidence of all combinations beside all hyperparameters, each computed."""
     return {
         (hyper, blocks): models.search_at(hyper).evaluate(blocks).log_evidence
-        for hyper in rungs(models)
+        for hyper in hyperparameters(models)
         for blocks in CHOSEN
     }
 
@@ -103,7 +103,7 @@ def everything(models):
 @pytest.mark.parametrize("tau", [0.0, 0.7, 4.0, 20.0])
 @pytest.mark.parametrize("present", [(), (1,), (0, 2)], ids=str)
 def test_the_best_and_summed_probabilities_are_those_of_all_combinations_and_discrepancies(present, tau, seeds):
-    """What the search leaves out of the sum, rungs 4 nats below the best, changes none by more than some hundredths."""
+    """What the search leaves out of the sum, hyperparameters 4 nats below the best, changes none by more than some hundredths."""
     for seed in seeds:
         linear, whitening, models = drawn(seed, present=present, tau=tau, which=(seed + len(present)) % 2)
         best = models.run()[1]

@@ -170,8 +170,8 @@ def _compared(
     effect, name, unit, joint = key
     values = pair[0].value if pair[0] else None, pair[1].value if pair[1] else None
     stds = pair[0].std if pair[0] else None, pair[1].std if pair[1] else None
-    teller = both[0] if pair[0] else both[1]
-    known = Compared(effect, teller.title(effect, joint), joint, name, unit, values, stds)
+    known_by = both[0] if pair[0] else both[1]
+    known = Compared(effect, known_by.title(effect, joint), joint, name, unit, values, stds)
     if values[0] is None or values[1] is None or stds[0] is None or stds[1] is None:
         return known
     difference, std = values[1] - values[0], float(np.hypot(stds[0], stds[1]))
