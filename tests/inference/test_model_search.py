@@ -76,7 +76,7 @@ def near_nothing(off):
 
 
 def test_evidence_beside_a_discrepancy_is_the_density_of_the_gap():
-    """Of all combinations and hyperparameters, weights included, but for one constant and the prior odds of hyperparameters."""
+    """Of all combinations and hyperparameters, but for one constant and the prior odds of the latter."""
     for seed in range(2):
         linear, whitening = small_problem(seed, rows=12, present=(1,))
         offered, off = two_forms(12, seed), []
@@ -103,7 +103,7 @@ def everything(models):
 @pytest.mark.parametrize("tau", [0.0, 0.7, 4.0, 20.0])
 @pytest.mark.parametrize("present", [(), (1,), (0, 2)], ids=str)
 def test_the_best_and_summed_probabilities_are_those_of_all_combinations_and_discrepancies(present, tau, seeds):
-    """What the search leaves out of the sum, hyperparameters 4 nats below the best, changes none by more than some hundredths."""
+    """Hyperparameters 4 nats below the best, left out of the sum, change none by more than some hundredths."""
     for seed in seeds:
         linear, whitening, models = drawn(seed, present=present, tau=tau, which=(seed + len(present)) % 2)
         best = models.run()[1]

@@ -324,8 +324,9 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
     Frames and parameters are refitted to the training rows. The selection stays that of all rows: effects, laws,
     constants, prior scales, linearisation point, noise, outliers. The estimate is then that of the saved model; an
-    effect selected from noise alone seems to gain a little: :func:`~thermal_robot.diagnosis.prune.held_out_tests` requires
-    more. The intervals are those of fresh rows of the same kind under the saved model, noise included. Raises
+    effect selected from noise alone seems to gain a little:
+    :func:`~thermal_robot.diagnosis.prune.held_out_tests` requires more. The intervals are those of fresh rows of the
+    same kind under the saved model, noise included. Raises
     :class:`EstimationError` if all rows repeat one pose.
     """
     block, scheme = held_out_groups(fit.campaign)

@@ -64,7 +64,7 @@ def test_it_is_a_fresh_fit_of_the_same_choice(fresh, once):
 def test_old_rows_are_looked_at_only_where_it_says_so(found, whole, few, monkeypatch):
     seen, plain = [], sequential.converged_fit
     monkeypatch.setattr(
-        sequential, "settled", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
+        sequential, "converged_fit", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
     )
     start, looked = fixed_point(found.fit), []
     for k in range(10):
