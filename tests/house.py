@@ -11,7 +11,7 @@ ROOT = Path(thermal_robot.__file__).parent
 PACKAGE = "thermal_robot"
 ORDER = (
     "arrays errors files percents compiling schema tables kinematics urdf_text robot shapes assembly maps paper "
-    "campaign observables observations effects inference iso9283 prediction model_file correction simulation teller "
+    "campaign observables observations effects inference iso9283 prediction model_file correction simulation renderer "
     "diagnosis motion planning fleet diagnosing datasets report console streams blind viewer commands cli __main__"
 ).split()
 """Rooms from the ground up: each may import those before it."""

@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from thermal_robot import console, teller
+from thermal_robot import console, renderer
 from thermal_robot.console import NORMAL, QUIET, VERBOSE, add_loudness, counted, heard, note, stages
 from thermal_robot.errors import Note
 from thermal_robot.percents import percent
@@ -78,14 +78,14 @@ def test_columns_of_plain_text_stand_below_each_other():
 
 
 def test_the_last_one_registered_counts(monkeypatch):
-    monkeypatch.setattr(teller, "_tellers", [])
-    with pytest.raises(RuntimeError, match="import thermal_robot, or call told_by"):
-        teller.registered()
+    monkeypatch.setattr(renderer, "_renderers", [])
+    with pytest.raises(RuntimeError, match="import thermal_robot, or call register_renderer"):
+        renderer.registered_renderer()
     first, last = object(), object()
-    teller.told_by(first)
-    assert teller.registered() is first
-    teller.told_by(last)
-    assert teller.registered() is last
+    renderer.register_renderer(first)
+    assert renderer.registered_renderer() is first
+    renderer.register_renderer(last)
+    assert renderer.registered_renderer() is last
 
 
 # ---- what is told beside the result

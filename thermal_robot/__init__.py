@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot import report
-from thermal_robot.teller import told_by
+from thermal_robot.renderer import register_renderer
 
 if TYPE_CHECKING:
     from thermal_robot.campaign import (
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
 
-told_by(report)
+register_renderer(report)
 __version__ = "0.2.0"
 
 _HOME = {

@@ -10,7 +10,7 @@ from typing import Any, overload
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.diagnosis import diagnose as diagnose_campaign
-from thermal_robot.diagnosis.diagnose import asked_for
+from thermal_robot.diagnosis.diagnose import effect_names
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.fleet.compare import compare as compare_campaigns
@@ -19,7 +19,7 @@ from thermal_robot.motion.compare import compare_motions
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.read import declares_motion, read_motion
-from thermal_robot.motion.result import MotionDiagnosis, told
+from thermal_robot.motion.result import MotionDiagnosis, with_summary
 
 Progress = Callable[[str], None]
 
@@ -111,8 +111,8 @@ def diagnose(
     if effects:
         raise EffectError("effects of your own are of poses; a log of motion knows its servos' alone")
     require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
-    only, without = asked_for(only, without)
-    return told(diagnose_motion(campaign, only=only, without=without, progress=progress))
+    only, without = effect_names(only, without)
+    return with_summary(diagnose_motion(campaign, only=only, without=without, progress=progress))
 
 
 def compare(

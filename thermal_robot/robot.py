@@ -139,7 +139,7 @@ class Robot:
 
     def _repr_html_(self) -> str:
         bounds = zip(self.joint_names, self.joint_types, self.lower, self.upper, strict=True)
-        rows = [(name, kind, _told(kind, low), _told(kind, high)) for name, kind, low, high in bounds]
+        rows = [(name, kind, _limit_text(kind, low), _limit_text(kind, high)) for name, kind, low, high in bounds]
         weight = f", {self.mass:.3g} kg" if self.has_masses else ", no masses"
         heading = f"{self.name}: {self.root_frame} to {self.tool_frame}, {len(self.segments)} segments{weight}"
         return html_table(rows, head=("joint", "type", "lower limit", "upper limit"), heading=heading)
@@ -304,7 +304,7 @@ def joint_range(robot: Robot) -> tuple[Array, Array]:
     return low, np.where(round_, np.minimum(robot.upper, WIDE), robot.upper)
 
 
-def _told(kind: str, limit: float) -> str:
+def _limit_text(kind: str, limit: float) -> str:
     if not np.isfinite(limit):
         return "none"
     return f"{limit:.4g} m" if kind == "prismatic" else f"{np.degrees(limit):.4g}°"

@@ -141,7 +141,7 @@ def false(seeds, old=300, batches=20, more=50):
         fallen["stream"] += not stream.choice_stands
         if not stream.choice_stands:
             reasons.append((case, seed, "stream", stream.reason))
-        print(case, seed, found.verdict, found.fit.explanation.discrepancy.form, fallen, updates, flush=True)
+        print(case, seed, found.verdict, found.fit.explanation.discrepancy.kernel, fallen, updates, flush=True)
     print(*reasons, sep="\n")
 
 

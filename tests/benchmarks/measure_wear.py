@@ -154,11 +154,11 @@ def table(results):
     print(f"trend of {TREND[0]:g} to {TREND[1]:g} sigma: rate in its 95 % interval {hit} of {len(rates)} told so")
     extra = sum(any([*x[:2]] != [r["worn"], r["joint"]] for x in r["rings"]) for r in by["trend"])
     print(f"    something else rings, too: {extra} of {len(by['trend'])}")
-    told_as = ("constant", "jump", "trend", "walk")
-    print(f"{'what the parameter does':26}" + "".join(f"{'told ' + t:>15}" for t in told_as))
+    displayed_status = ("constant", "jump", "trend", "walk")
+    print(f"{'what the parameter does':26}" + "".join(f"{'told ' + t:>15}" for t in displayed_status))
     for kind in ("jump", "trend"):
         count = Counter(r["told"] for r in by[kind])
-        print(f"{kind:26}" + "".join(f"{count[t]:15d}" for t in told_as))
+        print(f"{kind:26}" + "".join(f"{count[t]:15d}" for t in displayed_status))
 
 
 def at(result):

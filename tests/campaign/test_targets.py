@@ -11,7 +11,7 @@ import pytest
 from campaign.files import PLAIN_TOML, read, refusal, says
 
 from thermal_robot.campaign import describe, read_campaign, write_campaign
-from thermal_robot.campaign.targets import of_a_point, posed, relative_sigmas, sigma_of_all, telling, told_by
+from thermal_robot.campaign.targets import of_a_point, posed, propagated_sigma, relative_sigmas, sigma_of_all, telling
 from thermal_robot.kinematics import exp3, log3, quaternion_to_rotation
 
 PLACES = np.array([[0.1, 0.0, 0.0], [-0.05, 0.08, 0.0], [-0.05, -0.08, 0.02], [0.0, 0.0, 0.12], [0.03, 0.1, -0.1]])
@@ -159,10 +159,10 @@ def test_several_targets_tell_the_noise_of_every_figure(sigmas):
     points = seen(np.random.default_rng(9), 3, 4)[0]
     points[1, 3] = np.nan
     targets = posed((1, 2, 3, 4), points).targets
-    place, turn = told_by(4e-5, targets) if sigmas is None else sigma_of_all(sigmas, targets)
+    place, turn = propagated_sigma(4e-5, targets) if sigmas is None else sigma_of_all(sigmas, targets)
     found = relative_sigmas(sigmas, place, targets, True) * np.repeat([place, turn], 3)
     np.testing.assert_allclose(found, targets.spread * np.reshape(4e-5 if sigmas is None else sigmas, (-1, 1)))
-    assert of_a_point(told_by(4e-5, targets)[0], targets) == pytest.approx(4e-5)
+    assert of_a_point(propagated_sigma(4e-5, targets)[0], targets) == pytest.approx(4e-5)
     # nobody states it: how the figures compare is known all the same
     typical = np.repeat(targets.typical, 3)
     np.testing.assert_allclose(relative_sigmas(None, None, targets, True), targets.spread / typical)

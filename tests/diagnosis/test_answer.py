@@ -147,6 +147,6 @@ def test_at_the_stated_sizes_it_is_the_probability_itself(rv_m2, monkeypatch, ti
     compared = e.combinations[: settings.COMPARED]
     same = [{known.families[b] for b in c.blocks} == chosen for c in compared]
     p = e.probabilities[: len(compared)]
-    assert e.discrepancy.form is None or times != 0.5
-    if e.discrepancy.form is None:  # the same noise alone
+    assert e.discrepancy.kernel is None or times != 0.5
+    if e.discrepancy.kernel is None:  # the same noise alone
         assert weighed.smaller == pytest.approx(p[np.array(same)].sum() / p.sum(), abs=1e-3)

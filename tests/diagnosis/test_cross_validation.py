@@ -11,8 +11,8 @@ from simulate import simulate
 from thermal_robot import EstimationError, diagnose
 from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.cross_validation import (
+    CrossValidation,
     Model,
-    Walk,
     hardest,
     harmed,
     held_out,
@@ -21,13 +21,13 @@ from thermal_robot.diagnosis.cross_validation import (
     shrinkage,
     worst_folds,
 )
-from thermal_robot.diagnosis.prune import grown
+from thermal_robot.diagnosis.prune import forward_selection
 from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.grouping import each
-from thermal_robot.inference.kernels import Form, Smooth, Spectrum
+from thermal_robot.inference.kernels import Kernel, KernelCovariance, SmoothKernel
 from thermal_robot.inference.problem import Linear
 from thermal_robot.kinematics import exp6
 
@@ -53,13 +53,13 @@ def fitted(linear, blocks, weights, rows):
 
 def test_rows_held_out_are_predicted_by_a_fit_to_the_others():
     known = model()
-    walk = Walk.over(known, each(known.block))
+    validation = CrossValidation.over(known, each(known.block))
     for chosen in ((), (1,), (0, 1, 2)):
-        left = walk.residuals(chosen)
+        left = validation.residuals(chosen)
         for test in each(known.block):
             right = fitted(known.linear, chosen, known.whitening.weights, ~test)[test]
-            np.testing.assert_allclose(left[test[walk.numbers]], right, atol=1e-6)
-        assert walk.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
+            np.testing.assert_allclose(left[test[validation.numbers]], right, atol=1e-6)
+        assert validation.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("tests", ["blocks", "regions"])
@@ -67,7 +67,7 @@ def test_the_walk_without_a_block_is_that_of_a_campaign_without_it(tests):
     known = model(rows=120)
     folds = each(known.block) if tests == "blocks" else each(np.random.default_rng(0).integers(0, 4, 120))
     chosen = (0, 1, 2)
-    found = Walk.over(known, folds).squares(chosen)
+    found = CrossValidation.over(known, folds).squares(chosen)
     literal = []
     for b in range(20):
         rows = known.block != b
@@ -79,7 +79,7 @@ def test_the_walk_without_a_block_is_that_of_a_campaign_without_it(tests):
         whitening = replace(known.whitening, weights=known.whitening.weights[rows])
         less = replace(known, linear=some, whitening=whitening, kept=known.kept[rows], block=np.arange(rows.sum()))
         own = [fold[rows] for fold in folds if fold[rows].any()]
-        literal.append(sum((Walk.over(less, [f]).residuals(chosen) ** 2).sum() for f in own))
+        literal.append(sum((CrossValidation.over(less, [f]).residuals(chosen) ** 2).sum() for f in own))
     # to first order: a twentieth of the rows is left out twice
     np.testing.assert_allclose(found[1:], literal, rtol=0.02)
     assert np.sqrt(jackknife(found[1:])) == pytest.approx(np.sqrt(jackknife(np.array(literal))), rel=0.15)
@@ -89,12 +89,12 @@ def test_rows_that_are_alike_count_by_their_own_covariance():
     """Generalised least squares on some rows: their covariance is that part of the whole one."""
     known = model()
     rng = np.random.default_rng(2)
-    form = Form("some", rng.normal(size=(ROWS, 4)), rng.normal(size=(3, 2)))
+    kernel = Kernel("some", rng.normal(size=(ROWS, 4)), rng.normal(size=(3, 2)))
     weights, noise = np.where(np.arange(ROWS) == 5, 0.0, 1.0), np.full(3, 2.0)
-    smooth = Smooth(Spectrum.of(form, weights, noise), 3.0)
+    smooth = KernelCovariance(SmoothKernel.of(kernel, weights, noise), 3.0)
     alike = replace(known, whitening=replace(known.whitening, weights=weights, noise=noise, smooth=smooth))
     # K of mean one on the diagonal, in units of the noise
-    likeness = np.kron(form.functions @ form.functions.T, form.moves @ form.moves.T)
+    likeness = np.kron(kernel.functions @ kernel.functions.T, kernel.moves @ kernel.moves.T)
     covariance = np.eye(3 * ROWS) + 3.0**2 * likeness / np.diag(likeness).mean()
     for rows in (known.block != 3, known.block < 10, np.ones(ROWS, dtype=bool)):
         own = np.repeat(rows & (weights > 0), 3)
@@ -108,10 +108,10 @@ def test_a_fold_that_leaves_the_frames_open_is_left_out():
     alone = known.linear.frames.copy()
     alone[known.block != 4, :, 0] = alone[known.block != 4, :, 1]
     short = replace(known, linear=replace(known.linear, frames=alone))
-    walk = Walk.over(short, each(short.block))
-    assert len(walk.tests) == 19
-    assert not (walk.numbers == np.flatnonzero(short.block == 4)[0]).any()
-    assert list(walk.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
+    validation = CrossValidation.over(short, each(short.block))
+    assert len(validation.tests) == 19
+    assert not (validation.numbers == np.flatnonzero(short.block == 4)[0]).any()
+    assert list(validation.counts) == [ROWS - 3, *(ROWS - 3 if b == 4 else ROWS - 6 for b in range(20))]
 
 
 def test_what_a_model_leaves_out_counts_as_noise_against_priors():
@@ -406,7 +406,7 @@ def test_a_target_mounted_anew_for_a_session_does_not_count_against_what_carries
     there = campaign.labels["session"] == "day 2"
     moved = np.where(there[:, None], other.position, campaign.position)
     alone = {s.name: s for s in worst_folds(fit(campaign, choose(("backlash",), (), ())))}
-    known = grown(fit(replace(campaign, position=moved), choose(("backlash",), (), ())), 1, lambda _: None)
+    known = forward_selection(fit(replace(campaign, position=moved), choose(("backlash",), (), ())), 1, lambda _: None)
     (event,) = [law for law, _ in known.effects if law.name == "discovered.1"]
     assert (event.kind, event.quantity, event.labels[int(event.marks[0])]) == ("tool", "session", "day 2")
     for name, scheme in {s.name: s for s in worst_folds(known)}.items():

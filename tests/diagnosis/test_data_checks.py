@@ -10,7 +10,15 @@ from simulate import simulate
 
 import thermal_robot as tr
 from thermal_robot import CorrectedModel, calibrate, diagnose
-from thermal_robot.diagnosis.data_checks import SAID, STRAIGHT, as_counted, cautions, contradicted, not_executed, usable
+from thermal_robot.diagnosis.data_checks import (
+    SAID,
+    STRAIGHT,
+    cautions,
+    contradicted,
+    not_executed,
+    usable,
+    with_corrected_signs,
+)
 from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
@@ -130,7 +138,7 @@ def test_what_counts_the_other_way_is_read_with_the_other_sign(quantity, arm):
     effect, spoil = SPOILT[quantity]
     plain = simulate(load_arm(arm), [effect], seed=11, ratio=(4.0, 6.0))[0]
     spoilt = spoil(plain)
-    read = as_counted(spoilt)
+    read = with_corrected_signs(spoilt)
     assert read.warnings[0] == SAID[quantity]
     assert read.turned == (() if quantity == "gravity" else (quantity,))
     np.testing.assert_array_equal(read.robot.gravity, plain.robot.gravity)
@@ -143,7 +151,7 @@ def test_what_counts_the_other_way_is_read_with_the_other_sign(quantity, arm):
 @pytest.mark.parametrize("names", [[], ["geometric"], *([effect] for effect, _ in SPOILT.values())])
 def test_what_counts_as_it_should_stays(names, seed, arm):
     plain = with_torques(simulate(load_arm(arm), names, seed=seed, ratio=(1.0, 6.0))[0], 1.0)
-    read = as_counted(plain)
+    read = with_corrected_signs(plain)
     assert (read.turned, read.warnings) == ((), plain.warnings)
     np.testing.assert_array_equal(read.robot.gravity, plain.robot.gravity)
 
@@ -152,7 +160,7 @@ def test_where_those_that_can_tell_disagree_nothing_is_turned(rv_m2):
     """Half of the joints count the load: no one sign is right."""
     plain = simulate(rv_m2, ["joint_compliance"], seed=11, ratio=(4.0, 6.0))[0]
     mixed = with_torques(plain, np.where(np.arange(rv_m2.n) == 1, 1.0, -1.0))
-    assert as_counted(mixed).turned == ()
+    assert with_corrected_signs(mixed).turned == ()
 
 
 @pytest.mark.parametrize(("share", "told"), [(-1.0, True), (-0.3, True), (0.0, False), (0.3, False), (1.0, False)])
@@ -162,7 +170,7 @@ def test_torques_that_go_against_gravity_are_told_whatever_explains_the_gap(rv_m
     torque = observe(plain).torque
     read = share * torque + 0.15 * torque.std() * np.random.default_rng(5).normal(size=torque.shape)
     columns = {f"torque.{n}": t for n, t in zip(rv_m2.joint_names, read.T, strict=True)}
-    found = as_counted(replace(plain, covariates={**plain.covariates, **columns}))
+    found = with_corrected_signs(replace(plain, covariates={**plain.covariates, **columns}))
     assert any("the sign of torque.* is reversed" in note for note in found.warnings) == told
     assert found.turned == ()
 
@@ -170,7 +178,7 @@ def test_torques_that_go_against_gravity_are_told_whatever_explains_the_gap(rv_m
 def test_directions_that_nobody_recorded_are_not_reversed_but_wrongly_derived(rv_m2):
     plain = simulate(rv_m2, ["backlash"], seed=11, ratio=(4.0, 6.0))[0]
     derived = tuple(name for name in plain.covariates if name.startswith("approach."))
-    found = as_counted(replace(mirrored(plain, "approach."), derived=derived))
+    found = with_corrected_signs(replace(mirrored(plain, "approach."), derived=derived))
     assert (found.turned, found.warnings[0]) == ((), STRAIGHT)
 
 

@@ -12,7 +12,7 @@ from simulate import simulate
 import thermal_robot
 import thermal_robot as tr
 from thermal_robot import EffectError, EstimationError, diagnose
-from thermal_robot.diagnosis.data_faults.misfit import unsettled
+from thermal_robot.diagnosis.data_faults.misfit import unconverged
 from thermal_robot.effects import JointOffset
 from thermal_robot.inference import exact
 from thermal_robot.kinematics import rotation_to_quaternion
@@ -241,7 +241,7 @@ def test_a_fit_that_runs_away_is_not_delivered(campaign, monkeypatch):
     # a fit that settled says nothing
     found = diagnose(campaign, only="joint_offset")
     assert found.verdict == ("joint_offset",)
-    assert unsettled(found.fit) == ""
+    assert unconverged(found.fit) == ""
     assert not any("settle" in told for told in found.warnings)
     # a fit that runs away is not delivered
     true = exact.gauss_newton

@@ -13,13 +13,13 @@ from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import (
     by_share,
     confounding,
+    divided_effects,
     estimates,
     findings,
     fitted_values,
     random_findings,
     separates,
     titled,
-    told_inside,
     unknown_frames,
     within_frames,
 )
@@ -187,7 +187,7 @@ def test_figures_stand_where_the_data_identify_and_parts_name_their_container():
     first = [one.identified for one in estimates(parted, 0)]
     assert any(first)
     assert not all(first)  # segments have redundant parameters
-    parts = told_inside(parted)
+    parts = divided_effects(parted)
     assert {name: part.container for name, part in parts.items()} == dict.fromkeys(
         ("joint_offset", "geometric"), "geometric"
     )

@@ -11,7 +11,15 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis import prune as word
-from thermal_robot.diagnosis.prune import Earned, Gained, beside_scatter, determined, earned, in_place, pruned
+from thermal_robot.diagnosis.prune import (
+    DensityGain,
+    HeldOutTest,
+    determined,
+    held_out_tests,
+    odds_in_place,
+    pruned,
+    selected_with_scatter,
+)
 from thermal_robot.diagnosis.values import Refused
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
@@ -44,12 +52,12 @@ def test_a_law_that_follows_noise_is_taken_out_again(rv_m2, law):
     kept = []
     for seed in range(12):
         known = fit(simulate(rv_m2, seed=seed, samples=75, noise=NOISE)[0], ())
-        heard = []
-        left, refused = pruned(forced(known, block(known.corrected, law)), heard.append)
+        downweighted = []
+        left, refused = pruned(forced(known, block(known.corrected, law)), downweighted.append)
         kept.append(law.name in names(left))
         assert refused == {}  # laws were nobody's candidates: nothing is said of them
         if not kept[-1]:
-            assert heard[0] == f"rows held out refuse {law.name}"
+            assert downweighted[0] == f"rows held out refuse {law.name}"
             assert left.effects == ()
     assert sum(kept) <= 1, kept
 
@@ -75,7 +83,7 @@ def test_what_fits_noise_alone_harms_and_is_less_probable_than_before(rv_m2):
     for seed in range(6):
         known = fit(simulate(rv_m2, seed=seed, samples=30)[0], ())
         beside = forced(known, geometry(known))
-        said = earned(beside)["geometric"]
+        said = held_out_tests(beside)["geometric"]
         harms.append(said.harms)
         assert not said.helps
         left, refused = pruned(beside, lambda _: None)
@@ -92,23 +100,23 @@ def test_the_worst_goes_first_and_what_is_at_work_stays(rv_m2):
         data = simulate(rv_m2, ["thermal_elongation"], seed=seed, samples=30, ratio=(6.0, 6.0))[0]
         known = fit(data, choose(("thermal_elongation",), (), ()))
         beside = forced(forced(known, geometry(known)), block(known.corrected, SPURIOUS[1]))
-        found = earned(beside)
+        found = held_out_tests(beside)
         assert set(found) == {"thermal_elongation", "geometric", "discovered.1"}
         clear = [n for n, e in found.items() if e.clearly]
         poor = [n for n, e in found.items() if e.harms or (n == "discovered.1" and not e.helps)]
         judged = clear or [min(poor, key=lambda n: found[n].blocked.nats)]
-        heard = []
-        left, refused = pruned(beside, heard.append)
-        assert heard[0] == f"rows held out refuse {', '.join(judged)}"
+        downweighted = []
+        left, refused = pruned(beside, downweighted.append)
+        assert downweighted[0] == f"rows held out refuse {', '.join(judged)}"
         assert "thermal_elongation" in names(left)
         assert set(refused) <= {"geometric"}
 
 
 def test_blocks_that_speak_for_an_effect_do_not_outweigh_a_region_that_refuses_it(rv_m2, monkeypatch):
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
-    for_it, against = Gained("time", 0.2, 5.0, (1.0, 9.0)), Gained("region", -0.5, -9.0, (-15.0, -3.0))
-    said = [{"drift": Earned(for_it, against)}, {}]
-    monkeypatch.setattr(word, "earned", lambda _: said.pop(0))
+    for_it, against = DensityGain("time", 0.2, 5.0, (1.0, 9.0)), DensityGain("region", -0.5, -9.0, (-15.0, -3.0))
+    said = [{"drift": HeldOutTest(for_it, against)}, {}]
+    monkeypatch.setattr(word, "held_out_tests", lambda _: said.pop(0))
     left, refused = pruned(known, lambda _: None)
     assert left.effects == ()
     assert refused["drift"].share == against.share
@@ -119,9 +127,9 @@ def test_the_more_rows_held_out_suffer_the_less_probable_it_is(rv_m2, monkeypatc
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
     said = []
     for nats in (-0.1, -1.0, -8.0):
-        gained = Gained("time", nats / 100.0, nats, (nats - 10.0, nats + 10.0))
-        answers = [{"drift": Earned(gained, gained)}, {}]
-        monkeypatch.setattr(word, "earned", lambda _, answers=answers: answers.pop(0))
+        gained = DensityGain("time", nats / 100.0, nats, (nats - 10.0, nats + 10.0))
+        answers = [{"drift": HeldOutTest(gained, gained)}, {}]
+        monkeypatch.setattr(word, "held_out_tests", lambda _, answers=answers: answers.pop(0))
         said.append(pruned(known, lambda _: None)[1]["drift"].probability)
     assert said == sorted(said, reverse=True)
     assert said[2] < 1e-3 * settings.PRIOR_PROBABILITY
@@ -134,8 +142,8 @@ def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
     for seed in range(12):
         data = simulate(rv_m2, ["joint_gain"], seed=seed, samples=75, ratio=(0.35, 0.35))[0]
         known = fit(data, choose(("joint_gain",), (), ()))
-        odds, heard = in_place(known), []
-        left, refused = pruned(known, heard.append)
+        odds, downweighted = odds_in_place(known), []
+        left, refused = pruned(known, downweighted.append)
         if not known.effects:
             assert odds == {}
             continue
@@ -144,7 +152,7 @@ def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
         assert odds["joint_gain"] == pytest.approx(min(p / (1.0 - p), MANY), rel=1e-6)
         if p / (1.0 - p) < settings.NAMING_ODDS:
             assert left.effects == ()
-            if heard[0] == "in question: joint_gain":
+            if downweighted[0] == "in question: joint_gain":
                 assert refused["joint_gain"].probability == pytest.approx(p)
                 open_ += 1
         else:
@@ -157,7 +165,7 @@ def test_two_that_one_of_is_at_work_are_not_in_question(rv_m2):
     data = simulate(rv_m2, ["joint_compliance"], seed=4, samples=75, ratio=(4.0, 4.0))[0]
     known = fit(data, choose(("joint_compliance", "link_compliance"), (), ()))
     assert len(known.effects) == 1
-    assert in_place(known) == {names(known)[0]: MANY}
+    assert odds_in_place(known) == {names(known)[0]: MANY}
     both = known.explanation.probability(range(len(known.families)))
     assert both == pytest.approx(1.0, abs=1e-6)
 
@@ -167,7 +175,7 @@ def test_a_law_far_less_probable_than_its_rivals_is_not_found(rv_m2, monkeypatch
     law = SPURIOUS[1]
     known = refit(fit(with_law(rv_m2, law, [-2e-4, 2e-4], seed=0)[0], ()), {law.name: (law,)}, [[law]])
     monkeypatch.setattr(word, "discovered", lambda _: [SimpleNamespace(law=law, probability=probability)])
-    assert (in_place(known)[law.name] >= settings.NAMING_ODDS) == stays
+    assert (odds_in_place(known)[law.name] >= settings.NAMING_ODDS) == stays
     assert (names(pruned(known, lambda _: None)[0]) == [law.name]) == stays
 
 
@@ -180,7 +188,7 @@ def test_what_stays_obeys_the_rule_and_is_not_asked_again(rv_m2, seed):
     left, refused = pruned(beside, lambda _: None)
     assert "backlash" in names(left)
     assert not set(refused) & set(names(left))
-    table, odds, sure = earned(left), in_place(left), determined(left)
+    table, odds, sure = held_out_tests(left), odds_in_place(left), determined(left)
     for effect, _ in left.effects:
         assert not table[effect.name].harms
         assert table[effect.name].helps or not effect.name.startswith("discovered.")
@@ -196,12 +204,12 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     item = block(known.corrected, choose(("geometric",), (), ())[0])
     unseen = forced(known, replace(item, sizes=1e-3 * NOISE / np.sqrt((item.columns**2).mean(axis=(0, 1))) / 50.0))
     assert determined(unseen) == {"thermal_elongation"}
-    good = Gained("time", 0.2, 5.0, (1.0, 9.0))
-    said = {name: Earned(good, good) for name in names(unseen)}
-    monkeypatch.setattr(word, "earned", lambda own: {name: said[name] for name in names(own)})
-    heard = []
-    left, refused = pruned(unseen, heard.append)
-    assert heard[0] == "nothing determines geometric"
+    good = DensityGain("time", 0.2, 5.0, (1.0, 9.0))
+    said = {name: HeldOutTest(good, good) for name in names(unseen)}
+    monkeypatch.setattr(word, "held_out_tests", lambda own: {name: said[name] for name in names(own)})
+    downweighted = []
+    left, refused = pruned(unseen, downweighted.append)
+    assert downweighted[0] == "nothing determines geometric"
     assert names(left) == ["thermal_elongation"]
     assert refused["geometric"].share is None
 
@@ -223,7 +231,7 @@ def best_by_chance(known):
                     tried.append(seen.joint_sensitivity[:, :3, joint, None] * part[:, None, :])
     target = Target.of(seen.gap, known.explanation.linear.frames)
     assert len(tried) > 200
-    columns = max(tried, key=lambda c: target.worth(c).gain)
+    columns = max(tried, key=lambda c: target.score(c).gain)
     return Block(Law(), (), columns, NOISE / np.sqrt((columns**2).mean(axis=(0, 1))))
 
 
@@ -232,7 +240,7 @@ def test_a_law_picked_from_hundreds_in_noise_does_not_help(rv_m2):
     helps = []
     for seed in range(24):
         known = fit(simulate(rv_m2, seed=seed, samples=75)[0], ())
-        helps.append(earned(forced(known, best_by_chance(known)))["law"].helps)
+        helps.append(held_out_tests(forced(known, best_by_chance(known)))["law"].helps)
     assert np.mean(helps) < 0.1
 
 
@@ -241,7 +249,7 @@ def test_an_effect_of_twice_the_noise_helps_and_stays(rv_m2, name):
     for seed in range(2):
         known = fit(simulate(rv_m2, [name], seed=seed, samples=75, ratio=(2.0, 2.0))[0], choose((name,), (), ()))
         assert names(known) == [name]
-        said = earned(known)[name]
+        said = held_out_tests(known)[name]
         assert said.helps
         assert not said.harms
         assert said.blocked.scheme == "time"
@@ -254,13 +262,13 @@ def test_an_effect_of_twice_the_noise_helps_and_stays(rv_m2, name):
 
 def test_of_two_effects_each_is_asked_beside_the_other(rv_m2):
     campaign = simulate(rv_m2, ["thermal_elongation", "backlash"], seed=1, samples=75)[0]
-    both = earned(fit(campaign, choose((), (), ())))
+    both = held_out_tests(fit(campaign, choose((), (), ())))
     assert set(both) == {"thermal_elongation", "backlash"}
     assert all(said.helps for said in both.values())
     small = campaign.drop_covariate("temperature")
-    schemes = {said.hardest.scheme for said in earned(fit(small, choose(("backlash",), (), ()))).values()}
+    schemes = {said.hardest.scheme for said in held_out_tests(fit(small, choose(("backlash",), (), ()))).values()}
     assert "temperature" not in schemes
-    assert earned(fit(simulate(rv_m2, seed=2)[0], ())) == {}  # nothing found earns nothing
+    assert held_out_tests(fit(simulate(rv_m2, seed=2)[0], ())) == {}  # nothing found earns nothing
 
 
 REPEATED_NOISE, SIGMA = 20e-6, 4e-4  # m, rad
@@ -309,8 +317,8 @@ def concluded(campaign, names, refused=None):
     known = fit(campaign, choose(names, (), ()))
     chance = random_gap(known)
     assert chance.explains_size
-    heard = []
-    return beside_scatter(known, chance, refused or {}, heard.append), known
+    downweighted = []
+    return selected_with_scatter(known, chance, refused or {}, downweighted.append), known
 
 
 def test_scatter_explains_what_it_is_and_leaves_nothing(rv_m2):

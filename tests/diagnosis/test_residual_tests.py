@@ -10,7 +10,7 @@ from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.diagnosis.residual_tests import (
-    examine,
+    analyse_residual,
     nearest,
     repeats,
     residual,
@@ -50,7 +50,7 @@ def known(robot, effects=(), only=("instrument_scale",), **how):
 
 def test_noise_is_noise_whatever_its_size(rv_m2):
     for seed in range(4):
-        said = examine(known(rv_m2, seed=seed))
+        said = analyse_residual(known(rv_m2, seed=seed))
         assert not said.unexplained.flagged
         assert (said.unexplained.rms, said.unexplained.reasons, said.unexplained.depends_on) == (0.0, (), ())
         assert said.unexplained.p_value > settings.LEVEL
@@ -64,14 +64,14 @@ def test_the_floor_is_stated_or_learnt_from_what_there_is(rv_m2):
     place = observe(stated, Frames.declared(stated)).predicted_position[rows]
     again = replace(none.take(rows), position=place + NOISE * rng.normal(size=place.shape), rows=np.arange(2, 122))
     for campaign, source in ((stated, "stated"), (none, "remainder"), (again, "repeats")):
-        said = examine(fit(campaign, choose(("instrument_scale",), (), ())))
+        said = analyse_residual(fit(campaign, choose(("instrument_scale",), (), ())))
         assert said.source == source
         assert said.floor == pytest.approx(NOISE, rel=0.2)
-    assert examine(fit(stated, ())).floor == NOISE
+    assert analyse_residual(fit(stated, ())).floor == NOISE
 
 
 def test_play_of_a_joint_is_told_with_its_place_and_side(rv_m2):
-    said = examine(known(rv_m2, ["backlash"], ratio=(5.0, 6.0), places=["joint_3"])).unexplained
+    said = analyse_residual(known(rv_m2, ["backlash"], ratio=(5.0, 6.0), places=["joint_3"])).unexplained
     assert said.flagged
     assert said.p_value < 1e-10
     assert (said.locations[0].kind, said.locations[0].name) == ("joint", "joint_3")
@@ -79,15 +79,15 @@ def test_play_of_a_joint_is_told_with_its_place_and_side(rv_m2):
     assert said.depends_on[0].covariate == "approach.joint_3"
     assert any("times the stated noise" in reason for reason in said.reasons)
     # what is explained is not left, and a remark is made at each stage
-    explained, heard = known(rv_m2, ["backlash"], only=("backlash",), ratio=(5.0, 6.0), places=["joint_3"]), []
-    assert not examine(explained, heard.append).unexplained.flagged
-    assert len(heard) == 2
+    explained, downweighted = known(rv_m2, ["backlash"], only=("backlash",), ratio=(5.0, 6.0), places=["joint_3"]), []
+    assert not analyse_residual(explained, downweighted.append).unexplained.flagged
+    assert len(downweighted) == 2
     # noise subtracted, as it is stated; the frames take a little of an effect
     assert said.rms == pytest.approx(5.5 * np.sqrt(3.0) * NOISE, rel=0.2)
 
 
 def test_places_share_one_probability(rv_m2):
-    said = examine(known(rv_m2, ["backlash"], ratio=(1.5, 1.6), places=["joint_3"])).unexplained
+    said = analyse_residual(known(rv_m2, ["backlash"], ratio=(1.5, 1.6), places=["joint_3"])).unexplained
     assert said.flagged
     shares = [place.share for place in said.locations]
     assert shares == sorted(shares, reverse=True)
@@ -100,7 +100,7 @@ def test_a_remainder_below_what_anybody_measures_is_no_question(rv_m2):
     plain = simulate(rv_m2, seed=3)[0]
     place = observe(plain, Frames.declared(plain)).predicted_position
     wave = 1e-10 * np.sin(3.0 * plain.q[:, :3])
-    said = examine(fit(replace(plain, position=place + wave, noise_position=1e-12), ()))
+    said = analyse_residual(fit(replace(plain, position=place + wave, noise_position=1e-12), ()))
     assert not said.unexplained.flagged
     assert said.unexplained.rms == 0.0
 
@@ -111,7 +111,7 @@ def test_structure_below_the_stated_noise_is_looked_at(rv_m2, stated):
     for seed in range(3):
         play = simulate(rv_m2, ["backlash"], seed=seed, noise=NOISE / 2.0, ratio=(1.2, 1.3), places=["joint_3"])[0]
         known = fit(replace(play, noise_position=stated * NOISE), ())
-        said = examine(known).unexplained
+        said = analyse_residual(known).unexplained
         assert said.flagged
         assert not any("times the stated noise" in reason for reason in said.reasons)
         assert said.locations[0].name == "joint_3"
@@ -224,7 +224,7 @@ def test_a_few_rows_anywhere_are_gross_errors(rv_m2, count):
     for seed in range(6):
         known = spoilt(rv_m2, at_random(count), seed)
         assert known.explanation.outliers.sum() == count
-        left = examine(known).unexplained
+        left = analyse_residual(known).unexplained
         assert not left.flagged
         assert too_many(known, residual(known)).p > settings.LEVEL
 
@@ -232,7 +232,7 @@ def test_a_few_rows_anywhere_are_gross_errors(rv_m2, count):
 def test_more_rows_than_an_instrument_spoils_are_unexplained(rv_m2):
     known = spoilt(rv_m2, at_random(15))
     assert known.explanation.outliers.sum() == 15
-    left = examine(known).unexplained
+    left = analyse_residual(known).unexplained
     assert left.flagged
     assert any("15 of 100 rows were set aside (15 %)" in reason for reason in left.reasons)
     # the rest is noise: it follows nothing, and what is unexplained is in the rows set aside
@@ -263,7 +263,7 @@ def test_heavy_tails_set_a_few_more_rows_aside(rv_m2):
 def test_what_they_have_in_common_is_named(rv_m2, name, rows):
     known = spoilt(rv_m2, rows)
     assert known.explanation.outliers.sum() >= 7
-    left = examine(known).unexplained
+    left = analyse_residual(known).unexplained
     assert left.flagged
     assert any(f"lie together in {name}" in reason for reason in left.reasons)
 

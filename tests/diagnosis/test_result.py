@@ -9,15 +9,15 @@ import pytest
 from helpers import numbers
 
 import thermal_robot as tr
-from thermal_robot import teller
-from thermal_robot.diagnosis.result import frame_table, told
+from thermal_robot import renderer
+from thermal_robot.diagnosis.result import frame_table, with_summary
 from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.renderer import register_renderer
 from thermal_robot.report import schema
-from thermal_robot.teller import told_by
 
 
 class Parrot:
-    """A teller that says whom it was asked about."""
+    """A renderer that says whom it was asked about."""
 
     def headline(self, diagnosis):
         return f"headline of {diagnosis.campaign}"
@@ -37,12 +37,12 @@ class Parrot:
 
 @pytest.fixture
 def nobody(monkeypatch):
-    monkeypatch.setattr(teller, "_tellers", [])
+    monkeypatch.setattr(renderer, "_renderers", [])
 
 
-def test_without_a_teller_it_says_what_to_do(hall, nobody):
-    for ask in (told, str, lambda d: d._repr_html_(), lambda d: d.explain("backlash")):
-        with pytest.raises(RuntimeError, match="import thermal_robot, or call told_by"):
+def test_without_a_renderer_it_says_what_to_do(hall, nobody):
+    for ask in (with_summary, str, lambda d: d._repr_html_(), lambda d: d.explain("backlash")):
+        with pytest.raises(RuntimeError, match="import thermal_robot, or call register_renderer"):
             ask(hall)
     assert "backlash" in repr(hall)
     assert hall.to_dict()["verdict"]["summary"] == hall.summary
@@ -53,14 +53,14 @@ def test_whoever_was_named_last_is_asked(hall, nobody):
         def headline(self, diagnosis):
             return "other"
 
-    told_by(Parrot())
-    said = told(replace(hall, summary="", advice=""))
+    register_renderer(Parrot())
+    said = with_summary(replace(hall, summary="", advice=""))
     assert (said.summary, said.advice) == (f"headline of {hall.campaign}", f"advice for {hall.campaign}")
     assert str(hall) == f"text of {hall.campaign}"
     assert hall._repr_html_() == f"<p>{hall.campaign}</p>"
     assert hall.explain("backlash") == "figure of backlash"
-    told_by(Other())
-    assert told(hall).summary == "other"
+    register_renderer(Other())
+    assert with_summary(hall).summary == "other"
     assert said.effects == hall.effects
 
 

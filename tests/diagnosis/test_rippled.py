@@ -7,7 +7,7 @@ from inference.test_ripple import rippling
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis import prune
-from thermal_robot.diagnosis.prune import grown
+from thermal_robot.diagnosis.prune import forward_selection
 from thermal_robot.effects import JointRipple, choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit
@@ -31,16 +31,18 @@ def test_ripple_is_named_with_its_orders(rv_m2, seed):
 def test_who_leaves_ripple_out_gets_none(rv_m2):
     true = JointRipple().having("joint_2", 26.6, 1.0)
     plain = fit(rippling(rv_m2, true, (3e-4,), 0), choose(without=("joint_ripple",)))
-    wider = grown(plain, 1, lambda _: None) or plain
+    wider = forward_selection(plain, 1, lambda _: None) or plain
     assert not any(isinstance(effect, JointRipple) for effect, _ in wider.effects)
 
 
 def test_a_ripple_that_is_held_stays_where_none_is_generated_anew(rv_m2, monkeypatch):
     """Evidence and rows held out decide of it, and no generator."""
-    rippled = grown(fit(rippling(rv_m2, JointRipple().having("joint_2", 26.6, 1.0), (3e-4,), 0), choose()), 1, str)
+    rippled = forward_selection(
+        fit(rippling(rv_m2, JointRipple().having("joint_2", 26.6, 1.0), (3e-4,), 0), choose()), 1, str
+    )
     assert any(isinstance(effect, JointRipple) for effect, _ in rippled.effects)
     monkeypatch.setattr(prune, "waves", lambda _: JointRipple())
-    again = grown(rippled, 2, str) or rippled
+    again = forward_selection(rippled, 2, str) or rippled
     assert any(isinstance(effect, JointRipple) for effect, _ in again.effects)
     assert JointRipple.name in again.variants
 

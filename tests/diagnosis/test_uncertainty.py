@@ -9,7 +9,7 @@ from helpers import NOISE
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.uncertainty import as_remainder_says
+from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.effects import JointGain, choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.kinematics import Displacement
@@ -46,7 +46,7 @@ def off(rv_m2):
     found = []
     for seed in range(12):
         known = fit(warped(rv_m2, seed, 2e-4), [JointGain()])
-        found.append([(told(k)[0] - GAIN) / told(k)[1] for k in (known, as_remainder_says(known))])
+        found.append([(told(k)[0] - GAIN) / told(k)[1] for k in (known, inflated_for_structure(known))])
     return np.array(found)
 
 
@@ -62,7 +62,7 @@ def test_independent_noise_leaves_deviations_nearly_as_they_are(rv_m2):
     times = []
     for seed in range(6):
         known = fit(warped(rv_m2, seed, 0.0), [JointGain()])
-        wider = as_remainder_says(known)
+        wider = inflated_for_structure(known)
         assert told(wider)[0] == told(known)[0]
         times.append(told(wider)[1] / told(known)[1])
     assert min(times) >= 1.0 - 1e-9
@@ -73,7 +73,7 @@ def test_no_axis_becomes_wider_than_its_prior(rv_m2):
     known = fit(simulate(rv_m2, ["geometric"], seed=3)[0], choose(("geometric",)))
     (b,) = known.explanation.best.blocks
     prior = known.explanation.linear.blocks[b].sizes * known.explanation.best.scales[b]
-    narrow, wide = (k.explanation.values[b][1] / np.outer(prior, prior) for k in (known, as_remainder_says(known)))
+    narrow, wide = (k.explanation.values[b][1] / np.outer(prior, prior) for k in (known, inflated_for_structure(known)))
     assert np.linalg.eigvalsh(wide - narrow).min() > -1e-9
     assert np.linalg.eigvalsh(wide).max() <= max(1.0, np.linalg.eigvalsh(narrow).max()) + 1e-9
 
@@ -91,8 +91,8 @@ def test_a_diagnosis_that_leaves_noise_alone_and_a_fit_of_nothing_keep_them(rv_m
     assert effect.name == "joint_gain"
     # A smooth discrepancy and no effect, as where frames are known and no candidate is worth its place.
     known = fit(warped(rv_m2, 0, 2e-4), [])
-    assert known.explanation.discrepancy.form is not None
-    assert as_remainder_says(known) is known
+    assert known.explanation.discrepancy.kernel is not None
+    assert inflated_for_structure(known) is known
 
 
 MIXTURES = (["joint_offset"], ["thermal_elongation"], ["joint_compliance"], ["transmission_error"], ["geometric"], [])

@@ -11,8 +11,8 @@ from helpers import NOISE, disturbed, erring, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
-from thermal_robot.diagnosis.prune import as_laws_say, grown
-from thermal_robot.diagnosis.residual_tests import examine
+from thermal_robot.diagnosis.prune import attributed_to_laws, forward_selection
+from thermal_robot.diagnosis.residual_tests import analyse_residual
 from thermal_robot.diagnosis.values import Dependence, Location, Unexplained
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
@@ -22,7 +22,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.generate import Discovery, discovered
-from thermal_robot.inference.kernels import Form
+from thermal_robot.inference.kernels import Kernel
 from thermal_robot.inference.scatter import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
@@ -180,16 +180,16 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
 def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     law, values = CASES["step"]
     known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
-    before = examine(known).unexplained
+    before = analyse_residual(known).unexplained
     assert before.flagged
-    heard = []
-    after = grown(known, 2, heard.append)
-    assert heard[0] == "causes that nobody listed: scan 2"
+    downweighted = []
+    after = forward_selection(known, 2, downweighted.append)
+    assert downweighted[0] == "causes that nobody listed: scan 2"
     (own,) = [effect for effect, _ in after.effects if isinstance(effect, Discovered)]
     assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
     assert "discovered.2" in after.families
-    assert not examine(after).unexplained.flagged
-    said = as_laws_say(before, discovered(after), after.explanation.discrepancy)
+    assert not analyse_residual(after).unexplained.flagged
+    said = attributed_to_laws(before, discovered(after), after.explanation.discrepancy)
     assert (said.rms, said.p_value, said.reasons) == (before.rms, before.p_value, before.reasons)
     assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
     assert [d.covariate for d in said.depends_on] == [law.quantity]
@@ -202,8 +202,8 @@ def test_a_second_law_is_looked_for_beside_the_first(rv_m2):
     (first, one), (second, two) = CASES["step"], CASES["hinge"]
     data = disturbed(with_law(rv_m2, first, one, seed=5)[0], [(second, np.array(two))])
     known = fit(data, choose(("joint_offset",), (), ()))
-    alone = grown(known, 1, lambda _: None)
-    both = grown(alone, 2, lambda _: None)
+    alone = forward_selection(known, 1, lambda _: None)
+    both = forward_selection(alone, 2, lambda _: None)
     laws = {effect.name: effect.place for effect, _ in both.effects if isinstance(effect, Discovered)}
     assert set(laws) == {"discovered.1", "discovered.2"}
     assert set(laws.values()) == {first.place, second.place}
@@ -224,32 +224,32 @@ def test_laws_say_where_the_remainder_enters_and_what_it_follows():
     likely, unlikely = settings.LIKELY_PLACE + 0.01, settings.LIKELY_PLACE - 0.01
     places = ((("joint", "elbow"), 1.0 + 1e-12), (("base", "base"), likely), (("tool", "tool"), unlikely))
     found = (a_discovery("elbow", "payload", 0.9, places), a_discovery("wrist", "speed", 0.8))
-    said = as_laws_say(left, found, NONE)
+    said = attributed_to_laws(left, found, NONE)
     assert [(p.kind, p.name) for p in said.locations] == [("joint", "elbow"), ("base", "base"), ("joint", "wrist")]
     assert max(p.share for p in said.locations) == 1.0
     assert [d.covariate for d in said.depends_on] == ["payload", "speed"]
     np.testing.assert_allclose([d.p_value for d in said.depends_on], [0.1, 0.2])
     # rounding may lift a probability above one; a law describes, it does not say why, however little is left
-    small = as_laws_say(Unexplained(False, 0.0, 0.4), (a_discovery("elbow", "payload", 1.0 + 1e-12),), NONE)
+    small = attributed_to_laws(Unexplained(False, 0.0, 0.4), (a_discovery("elbow", "payload", 1.0 + 1e-12),), NONE)
     assert small.flagged
     assert [d.p_value for d in small.depends_on] == [0.0]
 
 
 def beside(anew, place):
     """A discrepancy of one form that has three quarters of the probability."""
-    form = Form("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
-    return Discrepancy(form, 4.0, 0.9, {form.name: 0.75})
+    kernel = Kernel("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
+    return Discrepancy(kernel, 4.0, 0.9, {kernel.name: 0.75})
 
 
 def test_what_errs_anew_in_every_pose_has_a_place_and_follows_nothing():
     left = Unexplained(True, 1e-4, 1e-6, (), (Location("base", "base", 1.0),), (Dependence("time", 1e-6),))
-    said = as_laws_say(left, (), beside(True, ("joint", "elbow")))
+    said = attributed_to_laws(left, (), beside(True, ("joint", "elbow")))
     assert said.locations == (Location("joint", "elbow", 0.75),)
     assert said.depends_on == ()
     assert (said.rms, said.p_value) == (left.rms, left.p_value)
     # what is smooth or anywhere has the place that the tests found; where nothing is left there is no place
     nothing = Unexplained(False, 0.0, 0.4)
-    assert as_laws_say(left, (), beside(False, ("joint", "elbow"))) is left
-    assert as_laws_say(left, (), beside(True, ("", ""))) is left
-    assert as_laws_say(left, (), NONE) is left
-    assert as_laws_say(nothing, (), beside(True, ("joint", "elbow"))) is nothing
+    assert attributed_to_laws(left, (), beside(False, ("joint", "elbow"))) is left
+    assert attributed_to_laws(left, (), beside(True, ("", ""))) is left
+    assert attributed_to_laws(left, (), NONE) is left
+    assert attributed_to_laws(nothing, (), beside(True, ("joint", "elbow"))) is nothing

@@ -89,8 +89,8 @@ def test_the_order_of_campaigns_does_not_matter_but_for_since():
         (change,) = other.changes
         assert {frozenset(group) for group in change.groups} == {frozenset("ab"), frozenset("c")}
         assert change.chi2 == pytest.approx(first.changes[0].chi2, rel=1e-6)
-        told = dict(zip(other.campaigns, change.values, strict=True))
-        assert [told[name] for name in names] == pytest.approx(first.changes[0].values, rel=1e-5)
+        compared = dict(zip(other.campaigns, change.values, strict=True))
+        assert [compared[name] for name in names] == pytest.approx(first.changes[0].values, rel=1e-5)
         assert other.verdict == first.verdict
         assert other.effect("joint_offset").chi2 == pytest.approx(first.effect("joint_offset").chi2, rel=1e-6)
     assert places(tr.compare(days[2], *days[:2], names=["c", "a", "b"])) == [("joint_offset", "joint_3", "a")]
@@ -108,11 +108,11 @@ def test_an_effect_of_another_size_in_each_campaign_loses_its_name():
 
 def test_campaigns_and_paths_are_diagnosed_on_the_way(tmp_path):
     tr.write_campaign(campaign(1), tmp_path / "monday")
-    said = []
-    found = tr.compare(tmp_path / "monday", campaign(2), only=["joint_offset"], progress=said.append)
+    statistics = []
+    found = tr.compare(tmp_path / "monday", campaign(2), only=["joint_offset"], progress=statistics.append)
     assert found.changes == ()
     assert found.samples == (50, 50)
-    assert any(line.startswith("campaign 2 of 2: ") for line in said)
+    assert any(line.startswith("campaign 2 of 2: ") for line in statistics)
 
 
 def test_what_one_campaign_cannot_tell_is_not_compared(arm):
@@ -149,13 +149,13 @@ def test_another_robot_is_refused_in_words(arm, before):
     x, *rest = re.search(r'xyz="([^"]*)"', own).group(1).split()
     moved = re.sub(r'xyz="[^"]*"', f'xyz="{float(x) + 0.001} {" ".join(rest)}"', own, count=1)
     longer = tr.load_robot(arm.urdf.replace(own, moved), "tool0")
-    for robot, said in (
+    for robot, statistics in (
         (ur5, r"is of another robot than .*: their joints differ.*shoulder_pan_joint.*joint_1"),
         (longer, r"described by another nominal model than .*up to (1|0\.99\d*) mm away"),
     ):
         other = tr.diagnose(tr.simulate(robot, rows=40, noise=NOISE), only="joint_offset")
         for pair in ((before, other), (before.model, other.model)):
-            with pytest.raises(tr.CampaignError, match=said):
+            with pytest.raises(tr.CampaignError, match=statistics):
                 tr.compare(*pair)
 
 

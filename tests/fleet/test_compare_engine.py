@@ -14,7 +14,7 @@ from thermal_robot.effects import Parameter, library, named
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare import _equal, _judged, _parameters
 from thermal_robot.fleet.compare_joint import joint
-from thermal_robot.fleet.compare_sums import Candidate, Known, Sums, candidates, sums, told
+from thermal_robot.fleet.compare_sums import Candidate, ModelAsFit, Sums, candidates, identifiable, sums
 from thermal_robot.inference.algebra import solve
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
@@ -34,7 +34,7 @@ def listed(campaigns, places=JOINTS, named=None, size=1.0):
     return [Candidate("own", "own", effect, own, np.full(len(own), size), (own,) * campaigns, named, at)]
 
 
-def said(truths, rng, rows=60):
+def statistics(truths, rng, rows=60):
     """What campaigns with these parameters say, noise one."""
     result = []
     for truth in truths:
@@ -44,7 +44,7 @@ def said(truths, rng, rows=60):
 
 
 def fitted(truths, rng):
-    return joint(listed(len(truths)), said(truths, rng))
+    return joint(listed(len(truths)), statistics(truths, rng))
 
 
 def four(changes=()):
@@ -52,11 +52,11 @@ def four(changes=()):
     truths = np.tile(TRUTH, (4, 1))
     for where, k, by in changes:
         truths[list(where), k] += by
-    return said(truths, np.random.default_rng(5))
+    return statistics(truths, np.random.default_rng(5))
 
 
 def test_what_did_not_change_is_shared_as_least_squares_over_all_has_it():
-    sums = said([TRUTH] * 3, np.random.default_rng(1))
+    sums = statistics([TRUTH] * 3, np.random.default_rng(1))
     found = joint(listed(3), sums)
     assert found.changes == ()
     together = solve(sum(s.matrix for s in sums), sum(s.vector for s in sums))
@@ -199,7 +199,7 @@ def test_equal_follows_the_law_of_chi_square():
 def test_a_parameter_that_repeats_another_is_told_once():
     columns = np.random.default_rng(0).normal(size=(30, 3))
     columns = np.column_stack([columns, columns[:, 0] + columns[:, 1], np.zeros(30)])
-    assert told([Sums(columns.T @ columns, np.zeros(5))] * 2) == [0, 1, 2]
+    assert identifiable([Sums(columns.T @ columns, np.zeros(5))] * 2) == [0, 1, 2]
 
 
 # ---- what a campaign or its model says
@@ -216,15 +216,15 @@ def of_days(days):
 
 
 @pytest.fixture(scope="module")
-def told_sums(days, of_days):
+def day_sums(days, of_days):
     return [sums(d, d.fit, of_days, k) for k, d in enumerate(days)]
 
 
 def names(of_days):
-    return [p.name for item in of_days for p in item.told]
+    return [p.name for item in of_days for p in item.compared]
 
 
-def test_it_is_least_squares_with_free_frames(told_sums, of_days, days):
+def test_it_is_least_squares_with_free_frames(day_sums, of_days, days):
     """The parameters that a campaign says are those of a fit by finite differences of its own robot."""
     fit = days[0].fit
     robot, q, frames = fit.campaign.robot, fit.campaign.q, fit.corrected.frames
@@ -246,7 +246,7 @@ def test_it_is_least_squares_with_free_frames(told_sums, of_days, days):
         columns = np.stack([(s * weight).ravel() for s in slope], axis=1)
         state = state + np.linalg.lstsq(columns, (left * weight).ravel())[0]
     where = [names(of_days).index(f"zero offset, joint_{k}") for k in (2, 3, 4)]
-    alone = told_sums[0].some(where)
+    alone = day_sums[0].some(where)
     values = np.linalg.solve(alone.matrix, alone.vector)
     spread = np.sqrt(np.linalg.inv(alone.matrix).diagonal())
     assert (np.abs(values - state[:3]) < 0.02 * spread).all()
@@ -262,9 +262,9 @@ def test_every_effect_is_compared_in_all_places_zeros_first():
     own = {item.name: item for item in of_days}
     assert own["joint_gain"].named == ("joint_gain" in days[0].verdict, True)
     zeros = own["joint_offset"]
-    assert [len(zeros.told), *map(len, zeros.parameters)] == [5, 5, 5]  # whichever places a diagnosis named
+    assert [len(zeros.compared), *map(len, zeros.parameters)] == [5, 5, 5]  # whichever places a diagnosis named
     np.testing.assert_array_equal(zeros.sizes, np.full(5, 1e-3))
-    assert not any(p.responses for p in zeros.told)
+    assert not any(p.responses for p in zeros.compared)
 
 
 def lifted():
@@ -295,20 +295,20 @@ def test_a_base_that_rocks_does_not_tell_where_it_stands():
     found = tr.diagnose(campaign, only=["geometric", "joint_offset", "drift"])
     assert "drift" in found.verdict
     of_days = candidates([found], [found.fit], ["one"])
-    told = np.linalg.eigvalsh(sums(found, found.fit, of_days, 0).matrix)
+    compared = np.linalg.eigvalsh(sums(found, found.fit, of_days, 0).matrix)
     # nothing is told to no better than some expected sizes, which rounding apart is told to none
-    assert not ((told > 1e-9) & (told < 0.01)).any()
-    assert (told > 1.0).sum() > 10
+    assert not ((compared > 1e-9) & (compared < 0.01)).any()
+    assert (compared > 1.0).sum() > 10
 
 
 def of_both(found, other):
     """What a campaign, and the model of its diagnosis, say beside another one, by the parameters' names."""
-    fits, model = [found.fit, other.fit], Known.of(found.model, "a")
+    fits, model = [found.fit, other.fit], ModelAsFit.of(found.model, "a")
     of_days = candidates([found, other], fits, ["a", "b"])
     of_model = {item.name: item for item in candidates([model, other], [model, other.fit], ["a", "b"])}
     assert {*of_model} <= {item.name for item in of_days}
     same = [replace(i, parameters=of_model[i.name].parameters if i.name in of_model else ((), ())) for i in of_days]
-    keys = [f"{item.name}: {p.name}" for item in of_days for p in item.told]
+    keys = [f"{item.name}: {p.name}" for item in of_days for p in item.compared]
     return sums(found, found.fit, of_days, 0), sums(model, model, same, 0), keys, of_days
 
 
@@ -328,10 +328,10 @@ def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_
     ((effect, _),) = one.model.effects
     assert effect.places == ("joint_3",)
     _, model, keys, of_days = of_both(one, diagnosed(2))
-    told = dict(zip(keys, np.diag(model.matrix), strict=True))
-    own = told.pop("joint_gain: gain error, joint_3")
+    compared = dict(zip(keys, np.diag(model.matrix), strict=True))
+    own = compared.pop("joint_gain: gain error, joint_3")
     assert own > 100.0
-    assert max(value for key, value in told.items() if key.startswith("joint_gain")) < 1e-9 * own
+    assert max(value for key, value in compared.items() if key.startswith("joint_gain")) < 1e-9 * own
     # and its value is the model's own
     k = keys.index("joint_gain: gain error, joint_3")
     size = np.concatenate([item.sizes for item in of_days])[k]

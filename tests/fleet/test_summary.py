@@ -266,7 +266,7 @@ def test_groups_that_are_alike_are_said_to_be_apart_as_often_as_stated():
     for seed in range(300):
         rng = np.random.default_rng([6, seed])
         own = deviations(rng, 60)
-        p_values.append(population(scattered(rng, 1.0, 1.0, own), own, rng.permutation(60) % 4).alike)
+        p_values.append(population(scattered(rng, 1.0, 1.0, own), own, rng.permutation(60) % 4).p_equal_means)
     assert np.mean(np.array(p_values) < 0.05) <= 0.1
     assert np.mean(np.array(p_values) < 0.5) == pytest.approx(0.5, abs=0.12)
 

@@ -15,7 +15,7 @@ from wear_cases import by_hand, columns, jumping, measured, series_of
 from thermal_robot import CampaignError, EffectError, diagnose, load_robot, simulate, wear
 from thermal_robot.effects import Parameter, choose
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.wear import as_date, comparable, days_since, moment, told
+from thermal_robot.fleet.wear import as_date, comparable, days_since, moment, results
 from thermal_robot.fleet.wear_moves import (
     Beside,
     Grid,
@@ -223,7 +223,7 @@ def problem_of(series, has=None):
 
 
 def followed(series, first=FIRST, limits=None):
-    found = told(problem_of(series), series, explanations(series), first, limits or {}, 0.01)
+    found = results(problem_of(series), series, explanations(series), first, limits or {}, 0.01)
     return {worn.place: worn for worn in found}
 
 
@@ -476,7 +476,7 @@ def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_consta
     values = measured(design, states, rng)
     series = series_of(design, values, np.arange(5.0))
     state = State.of(series, (), free=1, grid=Grid(np.ones(1), np.ones(1), np.zeros(1)))
-    found, covariance = state.told(state.path(1))
+    found, covariance = state.combinations(state.path(1))
     rows = design.shape[1]
     whole = np.zeros((5 * rows, 2 + 5))
     whole[:, :2] = design[:, :, [0, 2]].reshape(-1, 2)

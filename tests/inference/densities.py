@@ -74,10 +74,10 @@ def volume(linear, whitening, found, beside=None):
     return -0.5 * np.log(curvature).sum() if (curvature > 0.0).all() else np.nan
 
 
-def dense(form, noise):
+def dense(kernel, noise):
     """(N m, N m) covariance of what the form moves, in units of the noise, with a mean of one on its diagonal."""
-    count = len(form.functions)
-    moves = np.broadcast_to(form.moves, (count, *form.moves.shape[-2:])) / noise[:, None]
-    columns = (form.functions[:, None, :, None] * moves[:, :, None, :]).reshape(count * len(noise), -1)
+    count = len(kernel.functions)
+    moves = np.broadcast_to(kernel.moves, (count, *kernel.moves.shape[-2:])) / noise[:, None]
+    columns = (kernel.functions[:, None, :, None] * moves[:, :, None, :]).reshape(count * len(noise), -1)
     whole = columns @ columns.T
     return whole / np.diag(whole).mean()

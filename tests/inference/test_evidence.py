@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Columns, Posterior, beside, evidence
+from thermal_robot.inference.evidence import Columns, Posterior, conditional_scales, evidence
 from thermal_robot.inference.problem import gram
 from thermal_robot.inference.search import Search
 
@@ -143,13 +143,13 @@ def test_what_is_left_on_the_way_is_far_below():
 
 
 def test_a_column_of_noise_lowers_the_evidence_on_average():
-    gained = []
+    bic_gain = []
     for seed in range(40):
         linear, whitening = small_problem(seed, rows=30, present=(1,))
         search = Search(gram(linear, whitening), (0.0,) * 3)
-        gained += [search.evaluate((1, b)).log_evidence - search.evaluate((1,)).log_evidence for b in (0, 2)]
-    assert np.mean(gained) < -1.0
-    assert np.mean(np.array(gained) > 0.0) < 0.15
+        bic_gain += [search.evaluate((1, b)).log_evidence - search.evaluate((1,)).log_evidence for b in (0, 2)]
+    assert np.mean(bic_gain) < -1.0
+    assert np.mean(np.array(bic_gain) > 0.0) < 0.15
 
 
 @pytest.mark.parametrize("present", [(), (1,)])
@@ -189,7 +189,7 @@ def test_a_further_scale_is_expected_as_known_ones_and_their_common_factor_say(k
     rng = np.random.default_rng(len(known))
     spread, own = rng.uniform(0.3, 1.5, 3), rng.uniform(0.3, 1.5, 4)
     held, log_scale = spread[list(known)], rng.normal(size=len(known))
-    mean, deviation = beside(held, log_scale, own)
+    mean, deviation = conditional_scales(held, log_scale, own)
     for further, found in zip(own, deviation, strict=True):
         whole = np.diag([*held, further]) ** 2 + settings.COARSENESS**2
         gain = np.linalg.solve(whole[:-1, :-1], whole[:-1, -1])

@@ -15,13 +15,13 @@ from thermal_robot.effects import Backlash, JointGain, choose, gate
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.exact import (
+    _alternatives,
     _leading,
-    _others,
     corrected_observations,
+    downweighted,
     gauss_newton,
-    heard,
     refined,
-    settle,
+    select_exactly,
 )
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import fit
@@ -44,7 +44,7 @@ def settled(campaign, names=NAMES, effects=(), **told):
     """The explanation at its exact fit, and what was said meanwhile."""
     start, said = observe(campaign, register(campaign)), []
     variants = {e.name: e.variants(start) for e in (*choose(names, (), ()), *effects)}
-    return settle(start, variants, said.append, **told), said
+    return select_exactly(start, variants, said.append, **told), said
 
 
 def names_of(found):
@@ -52,13 +52,13 @@ def names_of(found):
 
 
 @pytest.fixture(scope="module")
-def gained(rv_m2):
+def bic_gain(rv_m2):
     campaign = simulate(rv_m2, ["joint_gain"], seed=2, ratio=(20.0, 30.0))[0]
     return campaign, *settled(campaign)
 
 
-def test_what_is_at_work_is_held_and_the_exact_model_leaves_the_noise(gained):
-    campaign, found, said = gained
+def test_what_is_at_work_is_held_and_the_exact_model_leaves_the_noise(bic_gain):
+    campaign, found, said = bic_gain
     assert names_of(found) == ("joint_gain",)
     left = found.explanation.whitening.noise[0] * found.explanation.best.noise
     assert left == pytest.approx(NOISE, rel=0.15)
@@ -77,8 +77,8 @@ def test_what_is_at_work_is_held_and_the_exact_model_leaves_the_noise(gained):
         assert len(names) == len(set(names))
 
 
-def test_where_it_starts_does_not_matter(gained):
-    campaign, found, _ = gained
+def test_where_it_starts_does_not_matter(bic_gain):
+    campaign, found, _ = bic_gain
     start = observe(campaign, register(campaign))
     begin = [choose((name,), (), ())[0].variants(start)[0] for name in ("joint_offset", "drift")]
     for told in ({"starts": [begin]}, {"held": found.held, "before": found.explanation}):
@@ -114,7 +114,7 @@ def nominal(rv_m2):
 
 def rivals(chosen, nominal):
     known = gate.variants(replace(chosen, places=()), nominal)
-    return list(_others(chosen, nominal, (*known, *gate.alone(known[0], nominal))))
+    return list(_alternatives(chosen, nominal, (*known, *gate.alone(known[0], nominal))))
 
 
 def test_rivals_of_a_setting_have_one_joint_less_one_more_or_another(nominal):
@@ -136,7 +136,7 @@ def test_rivals_of_a_setting_have_one_joint_less_one_more_or_another(nominal):
     assert {own for own in found if len(own) == 2} == {frozenset(pair), *another}
     assert {own for own in found if len(own) == 3} == {frozenset({*pair, j}) for j in set(joints) - pair}
     laws = [Discovered(place=f"joint_{k}", quantity="time", tried=50.0) for k in (1, 2, 3)]
-    assert list(_others(laws[1], nominal, laws)) == laws
+    assert list(_alternatives(laws[1], nominal, laws)) == laws
     assert set(rivals(scale, nominal)) == {scale}
 
 
@@ -163,7 +163,7 @@ def explained(data, names):
 def evidence(explanation, seen, effect):
     """Log evidence of one effect alone, rows set aside heard."""
     linear = Linear(explanation.linear.gap, explanation.linear.frames, (block(seen, effect),))
-    return Search(gram(linear, heard(explanation)), [0.0]).evaluate((0,)).log_evidence
+    return Search(gram(linear, downweighted(explanation)), [0.0]).evaluate((0,)).log_evidence
 
 
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])

@@ -10,8 +10,8 @@ from inference.problems import WIDTHS, columns_of
 from thermal_robot.effects import choose
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.law import Discovered
-from thermal_robot.inference.explain import explain, log_odds, log_priors, settings_of_one
-from thermal_robot.inference.kernels import Form
+from thermal_robot.inference.explain import exclusive_settings, explain, log_odds, log_priors
+from thermal_robot.inference.kernels import Kernel
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import Noise
 
@@ -67,22 +67,8 @@ def test_the_remainder_is_the_gap_less_all_that_was_fitted():
     step = np.linalg.lstsq(design, framed, rcond=None)[0]
     np.testing.assert_allclose(design @ step, framed, rtol=0, atol=1e-14)
     np.testing.assert_allclose(step, [0.5, -0.2], rtol=0, atol=2e-5)
-    assert np.abs(found.smooth).max() == 0.0  # without forms there is no discrepancy
-    assert (found.discrepancy.form, found.discrepancy.tau, found.discrepancy.probability) == (None, 0.0, 0.0)
-
-
-def test_rows_that_may_not_be_used_do_not_matter():
-    linear, _, _ = problem(2, (1,))
-    use = np.arange(ROWS) % 4 > 0
-    spoilt = replace(linear, gap=linear.gap.copy())
-    spoilt.gap[~use] += 1.0
-    plain, other = (explained(own, rows=use) for own in (linear, spoilt))
-    np.testing.assert_array_equal(other.values[1][0], plain.values[1][0])
-    assert not other.outliers.any()
-    # what an explanation would say of them is said all the same
-    np.testing.assert_allclose((other.remainder - plain.remainder)[~use], 1.0, atol=1e-9)
-    assert other.far(~use).sum() == (~use).sum()
-    assert plain.far(~use).sum() <= 1
+    assert np.abs(found.smooth).max() == 0.0  # without kernels there is no discrepancy
+    assert (found.discrepancy.kernel, found.discrepancy.tau, found.discrepancy.probability) == (None, 0.0, 0.0)
 
 
 def test_settings_of_one_effect_are_never_together_and_share_its_prior():
@@ -93,8 +79,8 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
     assert not any({1, 3} <= set(c.blocks) for c in found.combinations)
     assert found.probability([1, 3]) == pytest.approx(1.0, abs=1e-3)
     assert found.probabilities.sum() == pytest.approx(1.0)
-    assert settings_of_one(("a", "b", "c", "b")) == {frozenset({1, 3})}
-    assert settings_of_one(("a", "b")) == frozenset()
+    assert exclusive_settings(("a", "b", "c", "b")) == {frozenset({1, 3})}
+    assert exclusive_settings(("a", "b")) == frozenset()
 
 
 def test_log_priors_are_those_of_effects_and_not_of_settings():
@@ -152,7 +138,7 @@ def alike(copies, size, seed=5):
     pose = np.repeat(np.arange(ROWS // copies), copies)
     steady = columns_of(rng.normal(size=(len(linear.gap) // copies, 3, 2))[pose], np.full(2, 3e-5))
     shared = size * rng.normal(size=(ROWS // copies, 3))[pose]
-    each = Form("poses", pose.astype(float), np.eye(3), anew=True)
+    each = Kernel("poses", pose.astype(float), np.eye(3), grouped=True)
     return Linear(linear.gap + shared, linear.frames, (steady,)), each
 
 
@@ -161,8 +147,8 @@ def test_rows_of_one_pose_that_err_alike_count_less():
     beliefs = []
     for seed in range(12):
         linear, each = alike(10, 4e-5, seed)
-        told, plain = explained(linear, forms=(each,)), explained(linear)
-        assert told.discrepancy.form is each
+        told, plain = explained(linear, kernels=(each,)), explained(linear)
+        assert told.discrepancy.kernel is each
         assert told.discrepancy.probability > 0.99
         assert 1.0 <= told.discrepancy.tau <= 4.0  # twice the noise
         beliefs.append((plain.probability([0]), told.probability([0])))
@@ -174,7 +160,7 @@ def test_rows_of_one_pose_that_err_alike_count_less():
 def test_the_discrepancy_is_what_poses_share_and_part_of_the_remainder():
     # the discrepancy is a part of the remainder and what poses share
     linear, each = alike(10, 2e-4)
-    found = explained(linear, forms=(each,))
+    found = explained(linear, kernels=(each,))
     for pose in range(8):
         own = slice(10 * pose, 10 * pose + 10)
         assert np.ptp(found.smooth[own], axis=0).max() < 1e-12
@@ -189,9 +175,9 @@ def test_the_discrepancy_is_what_poses_share_and_part_of_the_remainder():
 
 
 def test_where_the_search_starts_does_not_matter():
-    linear, _, spoilt = problem(6, (0, 2), 6)
+    linear, _, _ = problem(6, (0, 2), 6)
     plain = explained(linear)
-    begun = explained(linear, starts=[(1,), (0, 1)], outliers=np.roll(spoilt, 1))
+    begun = explained(linear, starts=[(1,), (0, 1)])
     assert begun.best.blocks == plain.best.blocks
     np.testing.assert_array_equal(begun.outliers, plain.outliers)
     assert begun.best.log_evidence == pytest.approx(plain.best.log_evidence, abs=1e-2)

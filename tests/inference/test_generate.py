@@ -8,14 +8,14 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.prune import grown
+from thermal_robot.diagnosis.prune import forward_selection
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.generate import HeldOut, candidates, discovered, events, gathered, listed, where
+from thermal_robot.inference.generate import HeldOut, candidates, clustered_outliers, discovered, events, listed, where
 from thermal_robot.inference.grouping import each
-from thermal_robot.inference.screening import Thin
+from thermal_robot.inference.screening import RowSample
 from thermal_robot.kinematics import exp6
 
 LISTED = ("joint_offset", "joint_gain", "backlash")
@@ -29,7 +29,7 @@ def known(campaign, effects=LISTED):
 
 def lawful(own, number=1):
     """The fit with a law among its effects, where one is worth its place; else the fit itself."""
-    return grown(own, number, lambda _: None) or own
+    return forward_selection(own, number, lambda _: None) or own
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_noise_makes_no_law(rv_m2):
     worth = []
     for seed in range(30):
         own = known(simulate(rv_m2, samples=80, seed=seed, noise=NOISE)[0], ("joint_offset",))
-        wider = grown(own, 1, lambda _: None)
+        wider = forward_selection(own, 1, lambda _: None)
         if wider is not None:
             worth.append((seed, [e.name for e, _ in wider.effects]))
     assert worth == []
@@ -121,7 +121,7 @@ def test_repeats_of_few_poses_make_no_law_of_what_a_pose_brings(rv_m2, seeds):
         shared = np.repeat(2.0 * NOISE * rng.normal(size=(40, 3)), 3, axis=0)
         single = plain.position + shared + NOISE * rng.normal(size=(120, 3))
         own = known(replace(plain, position=single, rows=np.arange(2, 122)), ("joint_offset",))
-        wider = grown(own, 1, lambda _: None)
+        wider = forward_selection(own, 1, lambda _: None)
         if wider is not None:
             worth.append((seed, [(e.name, getattr(e, "quantity", "")) for e, _ in wider.effects]))
     assert worth == []
@@ -133,12 +133,12 @@ def test_what_a_known_effect_and_a_zero_do_is_no_law(rv_m2):
     levels = Discovered(
         place="joint_3", quantity="approach.joint_3", shape="levels", marks=(-1.0, 1.0), origin=-1.0, span=2.0
     )
-    thin = Thin.of(known(campaign))
-    assert listed(thin, levels)
-    assert not listed(thin, replace(levels, place="joint_2"))
-    assert not listed(thin, replace(STEP, span=3600.0))
+    sample = RowSample.of(known(campaign))
+    assert listed(sample, levels)
+    assert not listed(sample, replace(levels, place="joint_2"))
+    assert not listed(sample, replace(STEP, span=3600.0))
     for fewer in (("joint_offset", "joint_gain"), ("joint_gain", "backlash")):
-        assert not listed(Thin.of(known(campaign, fewer)), levels)
+        assert not listed(RowSample.of(known(campaign, fewer)), levels)
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow), 4])
@@ -150,7 +150,7 @@ def test_a_known_effect_that_is_at_work_in_one_joint_or_several_leaves_nothing_t
     ((effect, _),) = own.effects
     assert effect.name == "backlash"
     assert effect.places == faulty or seed != 4
-    assert grown(own, 1, lambda _: None) is None
+    assert forward_selection(own, 1, lambda _: None) is None
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.slow)])
@@ -279,7 +279,7 @@ def test_rows_set_aside_near_each_other_are_told_from_single_ones():
     known = fit(data, choose(("backlash",), (), ()))
     aside = np.zeros(ROWS, dtype=bool)
     aside[[3, 30, 33, 34, 36, 80]] = True
-    assert np.flatnonzero(gathered(known, aside)).tolist() == [30, 33, 34, 36]
+    assert np.flatnonzero(clustered_outliers(known, aside)).tolist() == [30, 33, 34, 36]
 
 
 @pytest.mark.parametrize(

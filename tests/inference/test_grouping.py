@@ -10,7 +10,7 @@ from simulate import commands
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference.grouping import (
     blocks,
-    in_a_row,
+    consecutive_outliers,
     in_order,
     near_repeats,
     neighbourhoods,
@@ -97,14 +97,14 @@ def test_rows_follow_each_other_by_the_clock_and_stand_in_a_row_where_three_do(r
     time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
     aside = np.isin(np.arange(12), [0, 1, 2, 4, 9, 10, 11])
     # by the clock: rows 0, 2, 4 at 0, 1, 2; rows 10, 1 at 5 and 6; rows 9, 11 at 10 and 11
-    own = in_a_row(clocked(rv_m2, time=time), aside)
+    own = consecutive_outliers(clocked(rv_m2, time=time), aside)
     np.testing.assert_array_equal(np.flatnonzero(own), [0, 2, 4])
     # as they stand in the file: 0, 1, 2; then 4 alone; 9, 10, 11
-    np.testing.assert_array_equal(np.flatnonzero(in_a_row(clocked(rv_m2), aside)), [0, 1, 2, 9, 10, 11])
+    np.testing.assert_array_equal(np.flatnonzero(consecutive_outliers(clocked(rv_m2), aside)), [0, 1, 2, 9, 10, 11])
     for few in ([], [3], [3, 4], [3, 5, 7], [0, 1, 3, 4]):
-        assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), few)).any()
+        assert not consecutive_outliers(clocked(rv_m2), np.isin(np.arange(12), few)).any()
     # the first rows do not follow the last
-    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 1, 11])).any()
+    assert not consecutive_outliers(clocked(rv_m2), np.isin(np.arange(12), [0, 1, 11])).any()
 
 
 @on_arms

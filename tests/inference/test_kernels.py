@@ -12,7 +12,14 @@ from simulate import simulate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.kernels import Form, Grouped, Smooth, Spectrum, decomposed, forms
+from thermal_robot.inference.kernels import (
+    GroupKernel,
+    Kernel,
+    KernelCovariance,
+    SmoothKernel,
+    decomposed,
+    discrepancy_kernels,
+)
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.registration import register
 from thermal_robot.inference.weights import Noise
@@ -46,37 +53,37 @@ ANEW = {
 
 
 def form_of(name, rng):
-    """The form of a case; its groups, if it is anew in each."""
+    """The kernel of a case; its groups, if it has any."""
     first, *functions, measures, components, by_row = {**SMOOTH, **ANEW}[name]
     rows = first if functions else len(first)
     moves = rng.normal(size=(rows, measures, components) if by_row else (measures, components))
     if functions:
-        return Form(name, rng.normal(size=(rows, *functions)), moves), None
-    return Form(name, first.astype(float), moves, anew=True), first
+        return Kernel(name, rng.normal(size=(rows, *functions)), moves), None
+    return Kernel(name, first.astype(float), moves, grouped=True), first
 
 
 class Case:
-    """A form's decompositions and its dense covariances: of the rows in use, and of all rows with them.
+    """A kernel's decompositions and its dense covariances: of the rows in use, and of all rows with them.
 
-    Two rows weigh nothing. Of a form that is anew the last row's group weighs nothing either; it is decomposed by
+    Two rows weigh nothing. Of a grouped kernel the last row's group weighs nothing either; it is decomposed by
     groups and with a function for each group.
     """
 
     def __init__(self, name):
         self.rng = np.random.default_rng([4, len(name)])
-        form, groups = form_of(name, self.rng)
-        rows, self.measures = len(form.functions), form.moves.shape[-2]
+        kernel, groups = form_of(name, self.rng)
+        rows, self.measures = len(kernel.functions), kernel.moves.shape[-2]
         noise = np.repeat(self.rng.uniform(0.5, 2.0, self.measures // 3), 3)
         weights = self.rng.uniform(0.3, 1.0, rows)
         weights[[1, 4]] = 0.0
         if groups is not None and len(set(groups)) > 1:
             weights[groups == groups[10]] = 0.0
-        self.spectra, each = [decomposed(form, weights, noise)], form
+        self.spectra, each = [decomposed(kernel, weights, noise)], kernel
         if groups is not None:
-            each = replace(form, functions=np.eye(groups.max() + 1)[groups], anew=False)
+            each = replace(kernel, functions=np.eye(groups.max() + 1)[groups], grouped=False)
             # written out by row: where moves are the same for all, a spectrum takes another way
-            written = np.broadcast_to(form.moves, (rows, *form.moves.shape[-2:]))
-            self.spectra.append(Spectrum.of(replace(each, moves=written), weights, noise))
+            written = np.broadcast_to(kernel.moves, (rows, *kernel.moves.shape[-2:]))
+            self.spectra.append(SmoothKernel.of(replace(each, moves=written), weights, noise))
         root, used = np.repeat(np.sqrt(weights), self.measures), np.repeat(weights > 0, self.measures)
         across = dense(each, noise) * root  # of all rows with those in use, weighed
         self.inside, self.across = (root[:, None] * across)[np.ix_(used, used)], across[:, used]
@@ -104,7 +111,7 @@ def test_products_and_the_mean_are_those_of_the_dense_covariance(case, tau, chun
     expected = stack.T @ np.linalg.solve(case.covariance(tau), stack)
     mean = tau**2 * case.across @ np.linalg.solve(case.covariance(tau), left)
     for own in case.spectra:
-        smooth = Smooth(own, tau)
+        smooth = KernelCovariance(own, tau)
         close(smooth.products(stack), expected)
         # from some columns that were carried over once
         some = [along[:, [4, 1]] for along in own.along(stack)]
@@ -119,7 +126,7 @@ def test_whitened_columns_the_determinant_and_what_is_followed_are_those_of_the_
     covariance = case.covariance(tau)
     whitened = np.linalg.inv(np.real(sqrtm(covariance))) @ case.stack
     for own in case.spectra:
-        smooth = Smooth(own, tau)
+        smooth = KernelCovariance(own, tau)
         close(smooth.whitened(case.stack), whitened, 1e-8)
         close(smooth.whitened(case.stack).T @ smooth.whitened(case.stack), smooth.products(case.stack))
         assert smooth.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-10)
@@ -132,7 +139,7 @@ def test_whitened_columns_the_determinant_and_what_is_followed_are_those_of_the_
 def test_a_spectrum_puts_the_covariance_together(name, tau):
     case = Case(name)
     (spectrum,) = case.spectra
-    assert isinstance(spectrum, Spectrum)
+    assert isinstance(spectrum, SmoothKernel)
     close(spectrum.spread(tau, case.stack), case.stack.T @ case.covariance(tau) @ case.stack)
     vectors, variance = spectrum.eigen(tau, 1e-8)
     assert (variance > 1e-8).all()
@@ -143,43 +150,43 @@ def test_a_spectrum_puts_the_covariance_together(name, tau):
     assert few.shape[1] == len(large) < len(variance)
     # no columns, as where both frames are known and no effect is found, have no products
     none = case.stack[:, :0]
-    assert Smooth(spectrum, tau).products(none).shape == spectrum.spread(tau, none).shape == (0, 0)
-    assert Smooth(spectrum, tau).whitened(none).shape == none.shape
+    assert KernelCovariance(spectrum, tau).products(none).shape == spectrum.spread(tau, none).shape == (0, 0)
+    assert KernelCovariance(spectrum, tau).whitened(none).shape == none.shape
 
 
 @pytest.mark.parametrize("name", ANEW)
 @pytest.mark.parametrize("tau", TAUS)
 def test_what_some_rows_have_in_common_is_that_of_their_own_covariance(name, tau):
     case = Case(name)
-    assert isinstance(case.spectra[0], Grouped)
+    assert isinstance(case.spectra[0], GroupKernel)
     rows = case.rng.random(len(case.stack) // case.measures) < 0.7
     own, columns = np.repeat(rows, case.measures), case.stack.reshape(len(rows), case.measures, -1)
     some, covariance = case.stack[own], case.covariance(tau)[np.ix_(own, own)]
     expected = some.T @ some - some.T @ np.linalg.solve(covariance, some)
     for spectrum in case.spectra:
-        close(Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
-        assert not Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e9).any()
+        close(KernelCovariance(spectrum, tau).reduction(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
+        assert not KernelCovariance(spectrum, tau).reduction(rows, lambda which: columns[which], 1e9).any()
     # what lies below a floor is left out of both alike
     floor = float(np.median(np.linalg.eigvalsh(tau**2 * case.inside)[-4:]))
-    close(*(Smooth(s, tau).taken(rows, lambda which: columns[which], floor) for s in case.spectra))
+    close(*(KernelCovariance(s, tau).reduction(rows, lambda which: columns[which], floor) for s in case.spectra))
 
 
 def test_of_a_group_that_no_row_in_use_has_nothing_is_known():
     """Its mean is that of the prior, nought; the other groups' is not."""
     case = Case("groups of several sizes, mixed")
     grouped = case.spectra[0]
-    mean = Smooth(grouped, 3.0).mean(case.stack[:, 0])
+    mean = KernelCovariance(grouped, 3.0).mean(case.stack[:, 0])
     alone = ~np.isin(grouped.groups, grouped.group)
     assert alone.any()
     assert (mean[alone] == 0.0).all()
     assert (np.abs(mean[~alone]).max(axis=1) > 1e-3).all()
     # a row that is set aside errs as the others of its group where the moves are the same
     case = Case("the same moves for all rows")
-    mean = Smooth(case.spectra[0], 3.0).mean(case.stack[:, 0])
+    mean = KernelCovariance(case.spectra[0], 3.0).mean(case.stack[:, 0])
     for group in range(4):
         assert np.ptp(mean[case.spectra[0].groups == group], axis=0).max() < 1e-12
     # where no row is in use there is nothing
-    empty = Grouped.of(grouped.everywhere, grouped.groups, np.zeros(12), np.ones(3))
+    empty = GroupKernel.of(grouped.everywhere, grouped.groups, np.zeros(12), np.ones(3))
     assert (empty.log_det(3.0), empty.degrees(3.0)) == (0.0, 0.0)
     assert (empty.mean(3.0, np.zeros(0)) == 0.0).all()
 
@@ -188,21 +195,21 @@ def test_of_a_group_that_no_row_in_use_has_nothing_is_known():
 def test_a_unit_of_a_form_is_the_noise(name):
     """Whatever the units of functions and moves: the discrepancy's mean square is τ² times the noise's."""
     rng = np.random.default_rng(3)
-    form, groups = form_of(name, rng)
-    count, measures = len(form.functions), form.moves.shape[-2]
+    kernel, groups = form_of(name, rng)
+    count, measures = len(kernel.functions), kernel.moves.shape[-2]
     noise = np.repeat(rng.uniform(0.5, 2.0, measures // 3), 3)
     for factor in (1.0, 1e-5):
-        functions = form.functions if groups is not None else 7.0 * form.functions
-        other = replace(form, moves=factor * form.moves, functions=functions)
-        smooth = Smooth(decomposed(other, np.ones(count), noise), 2.0)
+        functions = kernel.functions if groups is not None else 7.0 * kernel.functions
+        other = replace(kernel, moves=factor * kernel.moves, functions=functions)
+        smooth = KernelCovariance(decomposed(other, np.ones(count), noise), 2.0)
         covariance = np.linalg.inv(smooth.products(np.eye(count * measures)))
         assert (np.diag(covariance) - 1.0).mean() == pytest.approx(4.0, rel=1e-8)
 
 
-def one_hot(form):
-    """A form that is anew, with a function for each pose or visit."""
-    assert form.anew
-    return replace(form, functions=np.eye(form.functions.max().astype(int) + 1)[form.functions.astype(int)])
+def one_hot(kernel):
+    """A kernel of groups: one for each pose or visit."""
+    assert kernel.grouped
+    return replace(kernel, functions=np.eye(kernel.functions.max().astype(int) + 1)[kernel.functions.astype(int)])
 
 
 def campaign_of(name, repeats=1, **told):
@@ -217,7 +224,7 @@ def seen(campaign):
 @pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
 @pytest.mark.parametrize(("repeats", "stated"), [(1, True), (1, False), (3, True), (3, False)])
 def test_a_campaign_allows_what_it_can_tell(repeats, stated, turning):
-    """What is smooth, anywhere, in one joint, or at the base, always; what is anew, where it is told from noise.
+    """What is smooth, anywhere, in one joint, or at the base, always; what is grouped, where it is told from noise.
 
     What a pose brings is, by a stated noise or by repeats; what a visit brings, by repeats.
     """
@@ -225,33 +232,33 @@ def test_a_campaign_allows_what_it_can_tell(repeats, stated, turning):
     if not stated:
         campaign = replace(campaign, noise_position=None)
     joints = campaign.robot.joint_names
-    found = forms(seen(campaign))
-    names = [form.name for form in found]
+    found = discrepancy_kernels(seen(campaign))
+    names = [kernel.name for kernel in found]
     assert len(names) == len(set(names))
-    smooth = {form.name for form in found if not form.anew}
+    smooth = {kernel.name for kernel in found if not kernel.grouped}
     tool = {f"tool, {length:g}" for length in settings.LENGTHS}
     assert smooth == {*tool, "places", *(f"places, {place}" for place in (*joints, "base"))}
-    anew = {form.name for form in found if form.anew}
+    grouped = {kernel.name for kernel in found if kernel.grouped}
     poses = {"poses", *(f"poses, {place}" for place in (*joints, "base"))} if stated or repeats > 1 else set()
     visits = {f"visits, {place}" for place in (*joints, "base")} if repeats > 1 else set()
-    assert anew == poses | visits
-    for form in found:
-        if "," in form.name and form.name not in tool:
-            assert form.place == (("base" if form.name.endswith("base") else "joint"), form.name.split(", ")[1])
+    assert grouped == poses | visits
+    for kernel in found:
+        if "," in kernel.name and kernel.name not in tool:
+            assert kernel.place == (("base" if kernel.name.endswith("base") else "joint"), kernel.name.split(", ")[1])
         else:
-            assert form.place == ("", "")
+            assert kernel.place == ("", "")
     measures = 3 if turning is None else 6
-    for form in found:
-        assert len(form.functions) == campaign.samples
-        assert form.moves.shape[-2] == measures
-        assert np.isfinite(form.functions).all()
+    for kernel in found:
+        assert len(kernel.functions) == campaign.samples
+        assert kernel.moves.shape[-2] == measures
+        assert np.isfinite(kernel.functions).all()
 
 
 def test_a_joint_that_never_moves_does_not_scatter(rv_m2):
     campaign = simulate(rv_m2, samples=40, seed=1, noise=NOISE)[0]
     q = campaign.q.copy()
     q[:, 2] = 0.3
-    names = {form.name for form in forms(observe(replace(campaign, q=q), Frames.declared(campaign)))}
+    names = {kernel.name for kernel in discrepancy_kernels(observe(replace(campaign, q=q), Frames.declared(campaign)))}
     assert "poses, joint_2" in names
     assert "poses, joint_3" not in names
 
@@ -260,9 +267,11 @@ def test_a_joint_that_never_moves_does_not_scatter(rv_m2):
 def test_a_second_joint_errs_beside_the_first_and_independently_of_it(part):
     """Their covariances add up; the second's root mean square at the target is so many times the first's."""
     campaign, noise = campaign_of("ur10"), np.full(3, NOISE)
-    one, other = (f for f in forms(seen(campaign)) if f.name in ("poses, elbow_joint", "poses, wrist_1_joint"))
-    both = one.beside(other, part)
-    assert (both.name, both.several, both.anew) == ("poses, elbow_joint, wrist_1_joint", True, True)
+    one, other = (
+        f for f in discrepancy_kernels(seen(campaign)) if f.name in ("poses, elbow_joint", "poses, wrist_1_joint")
+    )
+    both = one.with_joint(other, part)
+    assert (both.name, both.several, both.grouped) == ("poses, elbow_joint, wrist_1_joint", True, True)
     expected = (dense(one_hot(one), noise) + part**2 * dense(one_hot(other), noise)) / (1.0 + part**2)
     np.testing.assert_allclose(dense(one_hot(both), noise), expected, rtol=0, atol=1e-10)
 
@@ -272,17 +281,17 @@ def test_visits_of_a_pose_share_what_the_pose_brings_and_not_what_a_visit_brings
     noise = np.full(3, NOISE)
     same = np.repeat(np.repeat(np.kron(np.eye(20), np.ones((3, 3))), 3, axis=0), 3, axis=1)
     own = np.repeat(np.repeat(np.eye(60), 3, axis=0), 3, axis=1)
-    for form in forms(seen(campaign)):
-        if form.anew:
-            found = np.abs(dense(one_hot(form), noise)) > 1e-12
-            assert not found[(same if form.name.startswith("poses") else own) == 0.0].any()
+    for kernel in discrepancy_kernels(seen(campaign)):
+        if kernel.grouped:
+            found = np.abs(dense(one_hot(kernel), noise)) > 1e-12
+            assert not found[(same if kernel.name.startswith("poses") else own) == 0.0].any()
             assert found.any()
 
 
 def bare(campaign):
     """The problem with frames alone."""
     observed = seen(campaign)
-    return Linear(observed.gap, frame_columns(observed)[0], ()), forms(observed)
+    return Linear(observed.gap, frame_columns(observed)[0], ()), discrepancy_kernels(observed)
 
 
 def test_a_smooth_error_of_one_joint_is_followed(rv_m2):
@@ -303,14 +312,14 @@ def test_a_smooth_error_of_one_joint_is_followed(rv_m2):
         return np.sqrt(((flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]) ** 2).mean())
 
     assert apart(moved) > 2.0 * NOISE
-    smooth = explain(linear, Noise(NOISE), forms=[form for form in offered if not form.anew])
+    smooth = explain(linear, Noise(NOISE), kernels=[kernel for kernel in offered if not kernel.grouped])
     assert smooth.discrepancy.probability > 0.999
-    assert smooth.discrepancy.form.name == "places, joint_3"
+    assert smooth.discrepancy.kernel.name == "places, joint_3"
     assert apart(smooth.smooth - moved) < 0.5 * NOISE
     # that the joint errs anew in every pose is no rival of what is smooth
-    found = explain(linear, Noise(NOISE), forms=offered)
-    assert found.discrepancy.form.name == "places, joint_3"
-    assert found.discrepancy.forms["places, joint_3"] > 0.99
+    found = explain(linear, Noise(NOISE), kernels=offered)
+    assert found.discrepancy.kernel.name == "places, joint_3"
+    assert found.discrepancy.kernels["places, joint_3"] > 0.99
     assert apart(found.smooth - moved) < 0.5 * NOISE
 
 
@@ -323,16 +332,16 @@ def test_noise_is_not_followed(draws):
     rng = np.random.default_rng(11)
     for _ in range(draws):
         drawn = replace(linear, gap=NOISE * rng.normal(size=linear.gap.shape))
-        beliefs.append(explain(drawn, Noise(NOISE), forms=offered).discrepancy.probability)
+        beliefs.append(explain(drawn, Noise(NOISE), kernels=offered).discrepancy.probability)
     assert np.mean(np.array(beliefs) < 0.5) >= 0.95, np.sort(beliefs)[-10:]
 
 
 @pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
-@pytest.mark.parametrize("number", [0, 3, 4, -1], ids=["tool", "places", "one place", "anew"])
+@pytest.mark.parametrize("number", [0, 3, 4, -1], ids=["tool", "places", "one place", "grouped"])
 def test_a_form_over_the_noise_of_each_row_is_the_dense_one_over_it(rv_m2, number, turning):
     """K of rows in units of their own noise is D⁻¹ K D⁻¹, up to its mean on the diagonal."""
     data = replace(simulate(rv_m2, samples=12, seed=2, turning=turning)[0], priors={})
-    form = forms(observe(data, register(data)))[number]
+    kernel = discrepancy_kernels(observe(data, register(data)))[number]
     measures = 3 if turning is None else 6
     relative = np.ones((12, measures))
     relative[:, :3] = np.random.default_rng(0).uniform(0.3, 3.0, (12, 1))
@@ -340,13 +349,13 @@ def test_a_form_over_the_noise_of_each_row_is_the_dense_one_over_it(rv_m2, numbe
 
     def dense_of(one):
         spectrum = decomposed(one, np.ones(12), noise)
-        return spectrum.spread(1.0, np.eye(12 * measures)) if isinstance(spectrum, Spectrum) else grouped(spectrum)
+        return spectrum.spread(1.0, np.eye(12 * measures)) if isinstance(spectrum, SmoothKernel) else grouped(spectrum)
 
     def grouped(found):
         inverse = found.whitened(1.0, np.eye(12 * measures))
         return np.linalg.inv(inverse @ inverse)
 
-    plain, over = (dense_of(one) - np.eye(12 * measures) for one in (form, form.over(relative)))
+    plain, over = (dense_of(one) - np.eye(12 * measures) for one in (kernel, kernel.over(relative)))
     expected = plain / np.outer(relative.ravel(), relative.ravel())
     np.testing.assert_allclose(over / np.trace(over), expected / np.trace(expected), atol=1e-9)
-    assert form.over(None) is form
+    assert kernel.over(None) is kernel

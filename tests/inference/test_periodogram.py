@@ -17,7 +17,7 @@ def drawn(seed, reach=3.0, order=None, size=0.0):
     if order is not None:
         gap = gap + size * np.cos(order * q + rng.uniform(0.0, 6.0))[:, None] * moves[:, :, 0]
     target = Target.of(gap, design)
-    return q, moves, target, target.seat(moves)
+    return q, moves, target, target.statistics(moves)
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-9, 1e-6, 1e-5])
@@ -32,8 +32,8 @@ def test_orders_end_where_a_joint_creeps_or_a_screw_begins():
     # a slide is searched down to the lead of a screw
     rng = np.random.default_rng(3)
     for period in (0.005, 0.02, 0.11):
-        q, _, _, seat = drawn(int(1e4 * period), reach=0.8, order=2.0 * np.pi / period, size=2e-4)
-        found = peak(seat, q, orders(q, slides=True))
+        q, _, _, statistics = drawn(int(1e4 * period), reach=0.8, order=2.0 * np.pi / period, size=2e-4)
+        found = peak(statistics, q, orders(q, slides=True))
         assert 2.0 * np.pi / found == pytest.approx(period, rel=1e-3)
     assert len(orders(np.zeros(ROWS))) == 0
     assert independent(orders(np.zeros(ROWS))) == 0.0
@@ -56,11 +56,11 @@ def wave(q, order):
 
 
 def test_each_order_gains_what_its_fit_gains():
-    q, moves, target, seat = drawn(0)
+    q, moves, target, statistics = drawn(0)
     grid = orders(q)
-    gains = periodogram(seat, q, grid)
+    gains = periodogram(statistics, q, grid)
     for k in range(0, len(grid), 37):
-        alone = target.worth(moves * wave(q, grid[k])[:, None, :]).gain
+        alone = target.score(moves * wave(q, grid[k])[:, None, :]).gain
         assert gains[k] == pytest.approx(alone, rel=1e-6, abs=1e-6)
 
 
@@ -68,18 +68,18 @@ def test_what_the_design_can_do_is_no_wave():
     q, moves, target, _ = drawn(1)
     order = 7.3
     whole = Target.of(target.white.reshape(ROWS, 3), moves * wave(q, order)[:, None, 1:])
-    assert periodogram(whole.seat(moves), q, np.array([order]))[0] == -np.inf
-    assert np.isfinite(periodogram(whole.seat(moves), q, np.array([order + 2.0]))[0])
+    assert periodogram(whole.statistics(moves), q, np.array([order]))[0] == -np.inf
+    assert np.isfinite(periodogram(whole.statistics(moves), q, np.array([order + 2.0]))[0])
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_peak_is_the_order_that_was_put_in(seed):
     order = float(np.random.default_rng([seed, 1]).uniform(1.0, 199.0))
-    q, moves, target, seat = drawn(seed, order=order, size=2e-4)
-    found = peak(seat, q, orders(q))
+    q, moves, target, statistics = drawn(seed, order=order, size=2e-4)
+    found = peak(statistics, q, orders(q))
     assert abs(found - order) < 0.02
-    assert target.worth(moves * wave(q, found)[:, None, :]).gain >= (
-        target.worth(moves * wave(q, order)[:, None, :]).gain - 1e-3
+    assert target.score(moves * wave(q, found)[:, None, :]).gain >= (
+        target.score(moves * wave(q, order)[:, None, :]).gain - 1e-3
     )
 
 
@@ -87,9 +87,9 @@ def test_in_noise_the_choice_of_an_order_is_paid_for():
     """Of sixty periodograms of noise not one gains more than its share of the orders allows."""
     worths = []
     for seed in range(60):
-        q, moves, target, seat = drawn(100 + seed)
+        q, moves, target, statistics = drawn(100 + seed)
         grid = orders(q)
-        best = target.worth(moves * wave(q, peak(seat, q, grid))[:, None, :]).gain
+        best = target.score(moves * wave(q, peak(statistics, q, grid))[:, None, :]).gain
         worths.append(best - np.log(independent(grid)))
     assert max(worths) < 2.0
     assert np.median(worths) < -2.0

@@ -17,9 +17,9 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.grouping import in_a_row
+from thermal_robot.inference.grouping import consecutive_outliers
 from thermal_robot.inference.registration import register
-from thermal_robot.inference.screening import Target, Thin, scan, shaped, shapes
+from thermal_robot.inference.screening import RowSample, Target, scan, shaped, shapes
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 
@@ -55,7 +55,7 @@ def test_place_and_quantity_come_first(scanned, name):
     assert (first.kind, first.place, first.quantity) == (law.kind, law.place, law.quantity)
     assert found[0].gain > 20.0
     # but for six whose best shape is worth more than they are, each is worth less than the one before
-    assert sum(after.worth > before.worth for before, after in pairwise(found)) <= 6
+    assert sum(after.net_gain > before.net_gain for before, after in pairwise(found)) <= 6
 
 
 def test_every_candidate_is_counted_and_segments_are_tried_with_what_speaks_elsewhere(scanned):
@@ -71,7 +71,7 @@ def test_every_candidate_is_counted_and_segments_are_tried_with_what_speaks_else
         by_kind.setdefault(kind or (wave if item.law.shape == "harmonic" else "plain"), item.tried)
     assert len(by_kind) == 6
     assert sum(by_kind.values()) == pytest.approx(6 * tried, rel=0.01)
-    assert all(item.worth == pytest.approx(item.gain - np.log(item.tried)) for item in found)
+    assert all(item.net_gain == pytest.approx(item.gain - np.log(item.tried)) for item in found)
     links = {item.law.quantity for item in found if item.law.kind == "link"}
     assert "none" in links  # a constant of a segment: its geometry
     assert law.quantity in links
@@ -87,7 +87,7 @@ def test_in_noise_no_law_gains_much(rv_m2):
     gains = []
     for seed in range(6):
         here, target = seen(simulate(rv_m2, seed=seed, noise=NOISE)[0])
-        gains.append(max(item.worth for item in scan(here, [target])[0][0]))
+        gains.append(max(item.net_gain for item in scan(here, [target])[0][0]))
     assert max(gains) < 3.0
     assert np.median(gains) < 0.0
 
@@ -111,11 +111,11 @@ def test_no_shape_gains_over_a_straight_line_where_the_law_is_straight(scanned):
         _, here, target, found = scanned[name]
         values = quantities(here)[found[0].law.quantity]
         straight = replace(found[0].law, shape="ramp", marks=())
-        gains = {law.shape: target.worth(block(here, law).columns).gain for law in shapes(found[0].law, values)}
+        gains = {law.shape: target.score(block(here, law).columns).gain for law in shapes(found[0].law, values)}
         best = shaped(here, target, found[0].law)
-        assert best.worth >= max(gains.values()) - np.log(best.tried) - 1e-6
+        assert best.net_gain >= max(gains.values()) - np.log(best.tried) - 1e-6
         assert best.law.shape == "ramp"
-        assert best.gain < target.worth(block(here, straight).columns).gain + 3.0
+        assert best.gain < target.score(block(here, straight).columns).gain + 3.0
         assert gains["ramp"] > gains["smooth"]
         # no step, no bump explains it as well
         assert max(gains["step"], gains["bump"]) < gains["ramp"] - 10.0
@@ -133,7 +133,7 @@ def test_a_wheel_on_the_motor_is_found_with_its_order(rv_m2):
     again = scan(blind, [target])[0][0][0]
     assert (again.law.place, again.law.shape) == ("joint_2", "harmonic")
     assert again.law.marks[0] == pytest.approx(51.0, abs=0.06)
-    assert again.worth < scan(here, [target])[0][0][0].worth
+    assert again.net_gain < scan(here, [target])[0][0][0].net_gain
     # a smooth law of that joint is told its waves where their orders are known
     smooth = replace(first, shape="smooth", marks=(-1.0, -0.5, 0.0, 0.5, 1.0))
     assert shaped(here, target, smooth).law.marks == (51.0,)
@@ -215,9 +215,9 @@ def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, seeds, name):
         assert {first.quantity, first.by} == {law.quantity, law.by}
         best = shaped(here, target, first)
         # the shape that was put in is at least as good as any other of its parameters, and it is one that is tried
-        truth = target.worth(block(here, law).columns).gain
+        truth = target.score(block(here, law).columns).gain
         assert best.gain > truth - 10.0
-        assert best.worth > 50.0
+        assert best.net_gain > 50.0
         if name == "jump":
             assert best.law.describe().startswith(f"the zero of {in_words('joint', law.place)} jumped at time")
 
@@ -271,7 +271,7 @@ def test_a_wave_of_any_order_comes_first_with_its_order(arm, seeds, reach):
         assert (first.law.place, first.law.quantity, first.law.shape) == (joint, joint, "harmonic")
         assert abs(first.law.marks[0] - order) < 0.02
         # it stands on the peak: the true order gains no more
-        assert first.gain >= target.worth(block(here, law).columns).gain - 0.01
+        assert first.gain >= target.score(block(here, law).columns).gain - 0.01
         assert first.gain > 100.0
 
 
@@ -292,7 +292,7 @@ def test_gains_in_a_scan_are_those_of_one_law_alone_whatever_else_is_scanned(rv_
     assert {bool(i.law.of) for i in found[0]} == {True, False}
     for own, one in zip(found, (target, other), strict=True):
         for item in own[::7]:
-            assert item.gain == pytest.approx(one.worth(block(here, item.law).columns).gain, rel=1e-6, abs=1e-6)
+            assert item.gain == pytest.approx(one.score(block(here, item.law).columns).gain, rel=1e-6, abs=1e-6)
     assert found[0][0].gain != found[1][0].gain
 
 
@@ -401,43 +401,43 @@ def known(rv_m2):
 @pytest.mark.parametrize("enough", [90, 1000])
 def test_above_a_limit_rows_are_drawn_once_in_order_and_stand_for_all(known, monkeypatch, enough):
     e, clock = known.explanation, known.campaign.covariates["time"]
-    sound = Thin.of(known).target(e.best.blocks).white
+    sound = RowSample.of(known).target(e.best.blocks).white
     monkeypatch.setattr(settings, "ENOUGH_ROWS", enough)
-    thin = Thin.of(known)
-    assert thin.observations.campaign.samples == min(enough, 150)
-    rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in thin.observations.q]
+    sample = RowSample.of(known)
+    assert sample.observations.campaign.samples == min(enough, 150)
+    rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in sample.observations.q]
     assert rows == sorted(set(rows))
-    np.testing.assert_array_equal(thin.linear.gap, e.linear.gap[rows])
-    np.testing.assert_array_equal(thin.linear.frames, e.linear.frames[rows])
-    for own, whole in zip(thin.linear.blocks, e.linear.blocks, strict=True):
+    np.testing.assert_array_equal(sample.linear.gap, e.linear.gap[rows])
+    np.testing.assert_array_equal(sample.linear.frames, e.linear.frames[rows])
+    for own, whole in zip(sample.linear.blocks, e.linear.blocks, strict=True):
         np.testing.assert_array_equal(own.columns, whole.columns[rows])
     # the knocked rows follow each other, scattered gross errors do not
-    aside = in_a_row(known.campaign, e.outliers)
-    np.testing.assert_array_equal(thin.changed, aside[rows])
+    aside = consecutive_outliers(known.campaign, e.outliers)
+    np.testing.assert_array_equal(sample.changed, aside[rows])
     assert aside[np.argsort(clock)[60:64]].all()
     assert aside.sum() < e.outliers.sum()
     # the corrected model is the same: its gap at these rows is the one it had among all
-    np.testing.assert_allclose(thin.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(sample.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
     # the same campaign always gets the same rows
-    np.testing.assert_array_equal(Thin.of(known).observations.q, thin.observations.q)
+    np.testing.assert_array_equal(RowSample.of(known).observations.q, sample.observations.q)
     assert np.mean(clock[rows] < np.median(clock)) == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(90))
     # four of its standard deviations: that of a normal law's median of |x|, 1.17/√n of it
-    own = thin.target(e.best.blocks).white
+    own = sample.target(e.best.blocks).white
     assert np.median(np.abs(own)) == pytest.approx(np.median(np.abs(sound)), rel=4.0 * 1.17 / np.sqrt(own.size))
 
 
 def test_targets_hold_what_is_left_beside_some_blocks(known):
-    thin = Thin.of(known)
+    sample = RowSample.of(known)
     blocks = known.explanation.best.blocks
     assert blocks
-    calm = replace(thin, changed=np.zeros(150, dtype=bool))
-    before, after = calm.target(()), thin.target(blocks)
-    frames = thin.linear.frames.shape[2]
+    calm = replace(sample, changed=np.zeros(150, dtype=bool))
+    before, after = calm.target(()), sample.target(blocks)
+    frames = sample.linear.frames.shape[2]
     assert before.basis.shape[1] == frames
     assert after.basis.shape[1] > frames
-    columns = thin.linear.blocks[blocks[0]].columns
-    assert before.worth(columns).gain > 50.0
+    columns = sample.linear.blocks[blocks[0]].columns
+    assert before.score(columns).gain > 50.0
     # rows that changed weigh fully, however far they are
-    assert (after.root[thin.changed].min(axis=0) >= after.root.max(axis=0) * (1.0 - 1e-9)).all()
-    spoilt = known.explanation.outliers & ~thin.changed
+    assert (after.root[sample.changed].min(axis=0) >= after.root.max(axis=0) * (1.0 - 1e-9)).all()
+    spoilt = known.explanation.outliers & ~sample.changed
     assert after.root[spoilt].max() < 0.2 * after.root.max()

@@ -110,7 +110,7 @@ def test_without_some_blocks_it_is_the_search_that_never_had_them():
 
 def test_every_neighbour_of_a_combination_is_weighed():
     search = alike(5)
-    found = search.weigh((0, 1))
+    found = search.evaluate_neighbours((0, 1))
     seen = {c for c in search.seen if len(set(c) ^ {0, 1}) == 1}
     assert {(0,), (1,), *(tuple(sorted((0, 1, k))) for k in range(2, 7))} <= seen
     exact = Search(search.gram, search.log_prior)
@@ -145,7 +145,7 @@ def test_a_gain_to_first_order_is_the_exact_one_where_a_block_explains_little(be
     assert abs(np.mean(errors)) < 0.15
 
 
-def sided(seed, push):
+def constrained(seed, push):
     """Three blocks of one parameter that cannot be negative; the data push each by so many of its sizes."""
     linear, whitening = small_problem(seed, rows=40, present=(), noise=0.3)
     one = (Parameter("size", "m", 2.0, "joint", "joint", (), positive=True),)
@@ -159,7 +159,7 @@ def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all(
     """So large ones come first: they are within a tenth, or two nats, of what they gain."""
     for seed in range(10):
         plain = small_problem(seed, rows=40, present=(2,), noise=0.3)
-        first, exact = gains_of(*(sided(seed, (0.0, 0.0, 1.0)) if positive else plain), ())[2]
+        first, exact = gains_of(*(constrained(seed, (0.0, 0.0, 1.0)) if positive else plain), ())[2]
         assert exact > 20.0
         assert abs(first - exact) < max(0.1 * exact, 2.0)
 
@@ -168,7 +168,7 @@ def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all(
 def test_a_block_that_is_pushed_below_zero_costs_what_the_exact_one_costs(pushed):
     """It stays at zero: what it could explain with the other sign is no gain, and its prior still has to be paid."""
     for seed in range(10):
-        first, exact = np.transpose(gains_of(*sided(seed, (0.0, pushed, pushed)), ()))
+        first, exact = np.transpose(gains_of(*constrained(seed, (0.0, pushed, pushed)), ()))
         assert (first[1:] < 0.5).all()
         assert np.abs(first - exact).max() < 0.5
 
@@ -176,7 +176,7 @@ def test_a_block_that_is_pushed_below_zero_costs_what_the_exact_one_costs(pushed
 def test_what_is_held_at_zero_hides_nothing_from_a_further_block():
     """Beside a block held at zero a second one, much like it but free, brings what it brings alone."""
     for seed in range(10):
-        linear, whitening = sided(seed, (0.0, -1.0, 0.0))
+        linear, whitening = constrained(seed, (0.0, -1.0, 0.0))
         held = linear.blocks[1]
         like = replace(linear.blocks[2], bare=(), source=held.columns + 0.01 * linear.blocks[2].columns)
         linear = Linear(linear.gap, linear.frames, (linear.blocks[0], held, like))

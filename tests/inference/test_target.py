@@ -30,7 +30,7 @@ def squares(gap, columns):
 def test_in_noise_p_values_are_uniform_the_share_is_zero_and_the_evidence_falls():
     # in noise every p value is as likely the share is zero and the evidence falls
     rng = np.random.default_rng(0)
-    noise = [plain(gap, design).worth(further) for gap, design, further in (drawn(rng) for _ in range(200))]
+    noise = [plain(gap, design).score(further) for gap, design, further in (drawn(rng) for _ in range(200))]
     assert kstest([w.p_value for w in noise], "uniform").pvalue > 0.01
     shares = np.array([w.share for w in noise])
     assert abs(shares.mean()) < 4.0 * shares.std() / np.sqrt(len(shares))
@@ -42,7 +42,7 @@ def test_in_noise_p_values_are_uniform_the_share_is_zero_and_the_evidence_falls(
     found = []
     for _ in range(200):
         gap, design, further = drawn(rng)
-        found.append(Target.of(gap, design).worth(further).p_value)
+        found.append(Target.of(gap, design).score(further).p_value)
     assert np.mean(np.array(found) < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 200)
 
 
@@ -58,14 +58,14 @@ def test_the_gain_is_that_of_the_bayes_information_criterion_and_the_p_value_tha
         n = own.freedom
         assert n == 3 * rows - DESIGN
         falls = (n * np.log(before / n)) - (n * np.log(after / n) + FURTHER * np.log(n))
-        worth = own.worth(further)
+        worth = own.score(further)
         assert worth.gain == pytest.approx(0.5 * falls, rel=1e-6, abs=1e-9)
         ratio = (before - after) / FURTHER / (after / (n - FURTHER))
         assert worth.p_value == pytest.approx(f_law.sf(ratio, FURTHER, n - FURTHER), rel=1e-6)
         # units do not matter, neither of further columns nor of the design
         units = 10.0 ** np.array([-6.0, 0.0, 3.0, 6.0])
-        assert plain(gap, design * units).worth(further).gain == pytest.approx(worth.gain, rel=1e-6, abs=1e-9)
-        assert own.worth(further * [1e-6, 1.0, 1e6]).p_value == pytest.approx(worth.p_value, rel=1e-6)
+        assert plain(gap, design * units).score(further).gain == pytest.approx(worth.gain, rel=1e-6, abs=1e-9)
+        assert own.score(further * [1e-6, 1.0, 1e6]).p_value == pytest.approx(worth.p_value, rel=1e-6)
 
 
 def test_the_share_is_that_of_what_is_left():
@@ -74,13 +74,13 @@ def test_the_share_is_that_of_what_is_left():
     for _ in range(60):
         gap, design, further = drawn(rng, 200)
         # as much as the noise: half of the mean square
-        shares.append(plain(gap + 1e-5 * further[:, :, 0], design).worth(further).share)
+        shares.append(plain(gap + 1e-5 * further[:, :, 0], design).score(further).share)
     assert np.mean(shares) == pytest.approx(0.5, abs=4.0 * np.std(shares) / np.sqrt(60))
 
 
 def test_columns_that_explain_everything_leave_nothing():
     gap, design, further = drawn(np.random.default_rng(4))
-    exact = plain(1e-3 * further @ [1.0, -2.0, 0.5] + 1e-15 * gap, design).worth(further)
+    exact = plain(1e-3 * further @ [1.0, -2.0, 0.5] + 1e-15 * gap, design).score(further)
     assert exact.share == pytest.approx(1.0)
     assert exact.p_value < 1e-100
     assert np.isfinite(exact.gain)
@@ -89,13 +89,13 @@ def test_columns_that_explain_everything_leave_nothing():
 def test_what_the_design_holds_already_and_too_few_equations_are_worth_nothing():
     gap, design, further = drawn(np.random.default_rng(5))
     own = plain(gap, design)
-    assert own.worth(design) == NOTHING
-    assert own.worth(design[:, :, :2] @ [[1.0], [3.0]]) == NOTHING
+    assert own.score(design) == NOTHING
+    assert own.score(design[:, :, :2] @ [[1.0], [3.0]]) == NOTHING
     # beside further columns it does not count as one
-    assert own.worth(np.concatenate([design, further], axis=2)).gain == pytest.approx(own.worth(further).gain, rel=1e-6)
+    assert own.score(np.concatenate([design, further], axis=2)).gain == pytest.approx(own.score(further).gain, rel=1e-6)
     few = plain(gap[:4], np.zeros((4, 3, 0)))
     for columns, worth in ((7, False), (8, True)):
-        assert (few.worth(np.random.default_rng(6).normal(size=(4, 3, columns))) == NOTHING) == worth
+        assert (few.score(np.random.default_rng(6).normal(size=(4, 3, columns))) == NOTHING) == worth
 
 
 def test_rows_far_from_the_rest_weigh_little_unless_they_are_trusted():
@@ -106,12 +106,12 @@ def test_rows_far_from_the_rest_weigh_little_unless_they_are_trusted():
     gap = gap + 1e-2 * step[:, :, 0]
     robust = Target.of(gap, design)
     trusted = Target.of(gap, design, spoilt)
-    assert trusted.worth(step).gain > 100.0
-    assert robust.worth(step).gain < 0.5 * trusted.worth(step).gain
+    assert trusted.score(step).gain > 100.0
+    assert robust.score(step).gain < 0.5 * trusted.score(step).gain
     # what else is there is seen beside them all the same
     shifted = Target.of(gap + 1e-5 * further[:, :, 0], design)
-    assert shifted.worth(further[:, :, :1]).gain > 50.0
-    assert np.abs(plain(gap + 1e-5 * further[:, :, 0], design).worth(further[:, :, :1]).gain) < 10.0
+    assert shifted.score(further[:, :, :1]).gain > 50.0
+    assert np.abs(plain(gap + 1e-5 * further[:, :, 0], design).score(further[:, :, :1]).gain) < 10.0
 
 
 @pytest.mark.parametrize("components", [1, 6])
@@ -125,12 +125,12 @@ def test_a_seat_tells_of_many_laws_what_the_target_tells_of_each(components):
     laws += [np.repeat(laws[0], 2, axis=1), np.zeros((ROWS, 1)), laws[1][:, :1]]
     loud = Target.of(gap + 3e-5 * moves[:, :, 0] * laws[1][:, :1], design)
     for own in (target, loud):
-        expected = [own.worth((law[:, None, :, None] * moves[:, :, None, :]).reshape(ROWS, 3, -1)).gain for law in laws]
-        np.testing.assert_allclose(own.seat(moves).gains(laws), expected, rtol=1e-9)
-    assert loud.seat(moves).gains(laws)[-1] > 10.0
-    assert target.seat(moves).gains(laws)[-2] == -np.inf
+        expected = [own.score((law[:, None, :, None] * moves[:, :, None, :]).reshape(ROWS, 3, -1)).gain for law in laws]
+        np.testing.assert_allclose(own.statistics(moves).gains(laws), expected, rtol=1e-9)
+    assert loud.statistics(moves).gains(laws)[-1] > 10.0
+    assert target.statistics(moves).gains(laws)[-2] == -np.inf
     # what the design can do does not count
-    assert target.seat(design[:, :, :1]).gains([np.ones((ROWS, 1))])[0] == -np.inf
+    assert target.statistics(design[:, :, :1]).gains([np.ones((ROWS, 1))])[0] == -np.inf
 
 
 def test_rows_count_by_their_own_noise():
@@ -138,7 +138,7 @@ def test_rows_count_by_their_own_noise():
     rng = np.random.default_rng(5)
     relative = np.repeat(rng.uniform(0.1, 10.0, (80, 1)), 3, axis=1)
     gap, design, law = rng.normal(size=(80, 3)), rng.normal(size=(80, 3, 4)), rng.normal(size=(80, 3, 2))
-    even = Target.of(gap, design).worth(law)
-    own = Target.of(gap * relative, design * relative[:, :, None], relative=relative).worth(law * relative[:, :, None])
+    even = Target.of(gap, design).score(law)
+    own = Target.of(gap * relative, design * relative[:, :, None], relative=relative).score(law * relative[:, :, None])
     assert own.gain == pytest.approx(even.gain, rel=1e-9)
     assert own.p_value == pytest.approx(even.p_value, rel=1e-9)

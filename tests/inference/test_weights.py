@@ -6,9 +6,9 @@ import pytest
 from thermal_robot.inference.weights import (
     Noise,
     distance_limit,
+    noise_estimate,
     reweigh,
     robust_noise,
-    settled_noise,
 )
 
 SIGMA = np.repeat([2e-5, 3e-5], 3)  # m, rad
@@ -63,13 +63,13 @@ def test_a_stated_noise_counts_whatever_is_left():
     """What is more in the remainder is something else, and has a form of its own."""
     position, orientation = 2e-5, 3e-5
     for left in ([2.2e-5, 1e-5], [5e-5, 3e-5], [1e-3, 1e-3]):
-        same, held = settled_noise(np.array(left), STATED, 6)
+        same, held = noise_estimate(np.array(left), STATED, 6)
         np.testing.assert_array_equal(same, SIGMA)
         assert held > 0.0
-    half, free = settled_noise(np.array([5e-5, 4e-5]), Noise(position), 6)
+    half, free = noise_estimate(np.array([5e-5, 4e-5]), Noise(position), 6)
     np.testing.assert_array_equal(half, np.repeat([position, 4e-5], 3))
     assert free == 0.0
-    own, free = settled_noise(np.array([1e-5]), Noise(), 3)
+    own, free = noise_estimate(np.array([1e-5]), Noise(), 3)
     np.testing.assert_array_equal(own, [1e-5] * 3)
     assert free == 0.0
     assert STATED.parts(3) == (position,)
@@ -83,25 +83,25 @@ def test_a_stated_noise_counts_whatever_is_left():
 def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others_and_a_quarter_at_most():
     # where more than noise is left rows are far only if far from the others
     rng = np.random.default_rng(8)
-    rows, use = 10.0 * noise_of(rng, 400), np.ones(400, dtype=bool)
-    whitening, aside = reweigh(rows, STATED, use, 0.0, 3)
+    rows = 10.0 * noise_of(rng, 400)
+    whitening, aside = reweigh(rows, STATED, 0.0, 3)
     assert not aside.any()
     np.testing.assert_array_equal(whitening.noise, SIGMA[:3])
     rows[:5] += 500.0 * SIGMA[:3]
-    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 0.0, 3)[1]), np.arange(5))
+    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, 0.0, 3)[1]), np.arange(5))
     # no more than a quarter is set aside and these are the worst
     rng = np.random.default_rng(4)
     rows = noise_of(rng, 100)
     rows[:40] += np.arange(100.0, 140.0)[:, None] * SIGMA[:3]
-    whitening, aside = reweigh(rows, STATED, np.ones(100, dtype=bool), 0.0, 3)
+    whitening, aside = reweigh(rows, STATED, 0.0, 3)
     np.testing.assert_array_equal(aside, np.isin(np.arange(100), np.arange(15, 40)))
     assert 0.0 < whitening.weights[:15].max() < whitening.weights[40:].min()
     # What is left where two thirds of the equations were taken up is smaller: as much is then less likely noise.
     rng = np.random.default_rng(5)
-    rows, use = noise_of(rng, 300) / np.sqrt(3.0), np.ones(300, dtype=bool)
+    rows = noise_of(rng, 300) / np.sqrt(3.0)
     rows[0] = 3.0 * SIGMA[:3]
-    assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
-    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
+    assert not reweigh(rows, STATED, 0.0, 3)[1].any()
+    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, 2.0 / 3.0, 3)[1]), [0])
 
 
 @measured
@@ -110,16 +110,14 @@ def test_gross_errors_are_set_aside_and_sound_rows_weigh_fully(measures):
     rows = noise_of(rng, 5000, measures)
     gross = np.arange(5000) % 10 == 0
     rows[gross] += 50.0 * SIGMA[:measures]
-    # rows that are not used are neither weighed nor set aside
-    use = np.arange(5000) % 7 > 0
-    whitening, aside = reweigh(rows, STATED, use, 0.0, measures)
-    np.testing.assert_array_equal(aside, gross & use)
-    np.testing.assert_array_equal(whitening.weights > 0.0, use & ~gross)
-    sound = whitening.weights[use & ~gross]
+    whitening, aside = reweigh(rows, STATED, 0.0, measures)
+    np.testing.assert_array_equal(aside, gross)
+    np.testing.assert_array_equal(whitening.weights > 0.0, ~gross)
+    sound = whitening.weights[~gross]
     assert sound.max() == 1.0
     assert np.mean(sound < 1.0) == pytest.approx(0.01, abs=0.005)
     # the further out, the less: past the bend the pull of a row no longer grows
-    distance = np.linalg.norm(rows[use & ~gross] / SIGMA[:measures], axis=1)
+    distance = np.linalg.norm(rows[~gross] / SIGMA[:measures], axis=1)
     bent = sound < 1.0
     np.testing.assert_allclose(np.ptp((sound * distance)[bent]), 0.0, atol=1e-9)
     assert distance[bent].min() > distance[~bent].max()
@@ -134,7 +132,7 @@ def test_rows_with_a_noise_of_their_own_are_judged_by_it(measures):
     noise = Noise(None, None, relative)
     rows = relative * noise_of(rng, 900, measures)
     rows[0] += 40.0 * relative[0] * SIGMA[:measures]  # less than the noise of the last ones
-    white, aside = reweigh(rows, noise, np.ones(900, dtype=bool), 0.0, measures)
+    white, aside = reweigh(rows, noise, 0.0, measures)
     np.testing.assert_allclose(white.noise, SIGMA[:measures], rtol=0.1)
     assert np.flatnonzero(aside).tolist() == [0]
     np.testing.assert_allclose((rows[1:] / white.sigma()[1:]).std(axis=0), 1.0, atol=0.1)

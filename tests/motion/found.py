@@ -14,7 +14,7 @@ from thermal_robot.motion import Channel, Motion, MotionLog, Servo, motion_from_
 from thermal_robot.motion.effects import EFFECTS, SHARED_TITLES, TITLES
 from thermal_robot.motion.model import SHARED, ServoModel
 from thermal_robot.motion.moves import moves
-from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms, told
+from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms, with_summary
 
 JOINTS = ("joint_2", "joint_3")
 STEP, SECONDS, COUNT = 0.02, 8.0, 2 * np.pi / 4096
@@ -114,7 +114,7 @@ def found(stated=False, flagged=False, rivals=(), scale=1.0, seed=4):
         )
     verdict = tuple(one.name for one in effects if one.status in ("found", "confounded"))
     names = {(p.effect, JOINTS[p.joint]): v for p, v in zip(model.parameters, values, strict=True) if v}
-    return told(
+    return with_summary(
         MotionDiagnosis(
             log, gaps, held, tuple(effects), verdict, 0.93, left, names, curves, {}, (), log.notes, (),
             shares={"joint_2": 0.6, "joint_3": 0.35}, moves=moves(model, values),
@@ -126,7 +126,7 @@ def nothing():
     """A diagnosis that tells no effect."""
     whole = found()
     quiet = tuple(one for one in whole.effects if one.status not in ("found", "confounded"))
-    return told(replace(whole, effects=quiet, verdict=(), moves={}))
+    return with_summary(replace(whole, effects=quiet, verdict=(), moves={}))
 
 
 def table_of(log):

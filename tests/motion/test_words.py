@@ -7,7 +7,7 @@ import pytest
 from motion.found import COUNT, TRUE, found, nothing
 
 from thermal_robot.diagnosis.values import HeldOut
-from thermal_robot.motion.result import told
+from thermal_robot.motion.result import with_summary
 
 CASES = {
     "plain": lambda: found(),
@@ -15,7 +15,7 @@ CASES = {
     "a remainder": lambda: found(flagged=True),
     "rivals": lambda: found(rivals=(("lag", ("delay", "armature")), ("coulomb", ("dead_zone",)))),
     "nothing": nothing,
-    "no joint": lambda: told(replace(found(), joints={}, verdict=(), effects=())),
+    "no joint": lambda: with_summary(replace(found(), joints={}, verdict=(), effects=())),
 }
 
 
@@ -39,7 +39,7 @@ def test_the_fewest_causes_that_hold_95_percent_are_named():
     d = found()
     sizes = {"lag": 0.97, "coulomb": 0.01, "droop": 0.01}
     less = tuple(replace(one, shrinkage=sizes.get(one.name, one.shrinkage)) for one in d.effects)
-    text = told(replace(d, effects=less)).summary
+    text = with_summary(replace(d, effects=less)).summary
     assert "lag of the servos and 2 smaller ones" in text
     assert "Coulomb" not in text
 
@@ -47,7 +47,7 @@ def test_the_fewest_causes_that_hold_95_percent_are_named():
 def test_a_fit_that_harms_motions_held_out_says_so():
     d = found()
     worse = HeldOut("motion", 3, 0.01, 0.02, -3.0, (-4.0, -2.0))
-    assert "no better" in told(replace(d, held_out=worse)).summary
+    assert "no better" in with_summary(replace(d, held_out=worse)).summary
 
 
 def test_what_moves_a_joint_by_less_than_twice_its_noise_is_not_shown():
@@ -112,7 +112,7 @@ def test_a_text_is_at_most_96_columns_wide(case):
 
 
 def test_kinds_without_a_verdict_are_listed():
-    d = told(replace(found(), refused={"free fall": 5.0}))
+    d = with_summary(replace(found(), refused={"free fall": 5.0}))
     assert "free fall: 5.0 times what the other kinds leave" in str(d)
     assert "free fall" in d.advice
 

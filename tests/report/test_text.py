@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, Locati
 from thermal_robot.effects.law_words import Size
 from thermal_robot.report import calibration_text, comparison_headline, comparison_text, fleet_text, text, words
 from thermal_robot.report.text_campaigns import changes, comparison_tables, failures, fleet_headline, fleet_tables
-from thermal_robot.report.words import NO_BREAK, STATUS, bound, by_status, facts, needs, sentences, told_as
+from thermal_robot.report.words import NO_BREAK, STATUS, bound, by_status, displayed_status, facts, needs, sentences
 
 
 def section(written, heading):
@@ -69,7 +69,7 @@ def test_what_is_not_found_and_yet_probable_is_in_question_and_shown_between():
         (replace(doubtful, probability=None), "not_found"),
         (replace(doubtful, status="confounded"), "confounded"),
     ):
-        assert told_as(finding) == told
+        assert displayed_status(finding) == told
     base = case("confounded")
     shown = by_status(replace(base, effects=(*base.effects[::-1], doubtful)))
     assert sorted(f.name for f in shown) == sorted(f.name for f in (*base.effects, doubtful))

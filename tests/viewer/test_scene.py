@@ -11,7 +11,7 @@ import pytest
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.datasets import demo_campaign
-from thermal_robot.diagnosis.result import told
+from thermal_robot.diagnosis.result import with_summary
 from thermal_robot.diagnosis.values import DataFault, Misfit
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation, tool_poses
@@ -80,7 +80,7 @@ def test_without_a_diagnosis_or_where_the_table_does_not_fit_there_is_the_gap_al
     with pytest.raises(CampaignError, match="nothing was measured"):
         scene_of_campaign(replace(demo_campaign(), position=None))
     fault = DataFault(("shifted rows",), "rows are shifted", "shift them back", 0.1, 1e-4)
-    unusable = told(replace(found, misfit=Misfit(fault)))
+    unusable = with_summary(replace(found, misfit=Misfit(fault)))
     scene = scene_of_diagnosis(unusable)
     assert scene.summary == unusable.reason
     assert "Shift them back" in scene.summary

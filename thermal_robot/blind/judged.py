@@ -248,7 +248,7 @@ _HALL = "hall"
 def _compared(record: Record) -> Marks:
     """Score a comparison of two campaigns, of the format ``thermal-robot/comparison/1``."""
     truth, told = record["truth"], said(record)
-    right, others = _parted(truth, told["changes"])
+    right, others = _true_and_false(truth, told["changes"])
     kept = set(truth["effects"]) <= set(told["verdict"]["effects"])
     found_ = _yes(found=bool(right)) if truth["changes"] else {}
     exact = all(all(given) for given in found_.values()) and not others
@@ -258,7 +258,7 @@ def _compared(record: Record) -> Marks:
 def _followed(record: Record) -> Marks:
     """Score the result of a robot over time, of the format ``thermal-robot/wear/1``."""
     truth, rings = record["truth"], [p for p in said(record)["parameters"] if p["alarm"]]
-    right, others = _parted(truth, rings)
+    right, others = _true_and_false(truth, rings)
     if not truth["changes"]:
         return _yes(exact=not others, false_alarm=bool(others))
     [change] = truth["changes"]
@@ -276,7 +276,7 @@ def _followed(record: Record) -> Marks:
     return {**_yes(exact=bool(right) and way and day and not others), **answers}
 
 
-def _parted(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[Plain]]:
+def _true_and_false(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[Plain]]:
     """Split reported changes into true and false ones."""
     true = {(c["effect"], c["place"]["name"]) for c in truth["changes"]}
     right = [one for one in told if (one["effect"], one["place"]) in true]

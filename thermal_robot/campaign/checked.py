@@ -34,7 +34,7 @@ def first_beyond(values: Array, most: float = LARGEST) -> int | None:
     return first_true(~(np.abs(values) <= most))
 
 
-def settled(values: Array) -> Array:
+def without_rounding(values: Array) -> Array:
     """Set negligibly small numbers to 0; the array itself where there are none."""
     vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
@@ -64,7 +64,7 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
         if row is not None:
             found, expected = f"{array[row]} at index {row}", "a finite number in every place"
             raise CampaignError(file, "not a figure of a campaign", column=key, found=found, expected=expected)
-        array = settled(array)
+        array = without_rounding(array)
     if array.flags.writeable:
         array = array.copy()
         array.flags.writeable = False

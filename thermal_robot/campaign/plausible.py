@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK, axes_of, listed
 from thermal_robot.campaign.names import POSITION as XYZ
-from thermal_robot.campaign.table import told_rows
+from thermal_robot.campaign.table import listed_rows
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.kinematics import align, tool_poses
 
@@ -64,12 +64,12 @@ def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Ite
             told = [_figure(value / scale) for value in points[rows][0]]
             one = len(set(told)) == 1
             same = f"{' = '.join(names)} = {told[0]}" if one else f"({', '.join(names)}) = ({', '.join(told)})"
-            yield rows, f"{same} in {told_rows(campaign.rows[rows])}: was the beam lost?"
+            yield rows, f"{same} in {listed_rows(campaign.rows[rows])}: was the beam lost?"
     for k, name in enumerate(names):
         for rows in (group & seen for group in figures[k]):
             if _moved(q, rows) and _astray(away[:, k], rows, seen, ASTRAY_FIGURE):
-                told_by = f"{_figure(points[rows, k][0] / scale)} in {told_rows(campaign.rows[rows])}"
-                yield rows, f"{name} is {told_by}: a mark of a missing value?"
+                marked = f"{_figure(points[rows, k][0] / scale)} in {listed_rows(campaign.rows[rows])}"
+                yield rows, f"{name} is {marked}: a mark of a missing value?"
 
 
 def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
@@ -133,7 +133,7 @@ def doubled(campaign: Campaign) -> Iterator[str]:
         yield f"rows {campaign.rows[original[again][0]]} and {rows[0]} are the same in every column: a copy, no repeat"
     elif len(rows):
         first = campaign.rows[np.unique(original[again])]
-        yield f"{told_rows(rows)} are the same in every column as {told_rows(first)}: copies, no repeats"
+        yield f"{listed_rows(rows)} are the same in every column as {listed_rows(first)}: copies, no repeats"
 
 
 def _originals(campaign: Campaign) -> NDArray[np.int64]:

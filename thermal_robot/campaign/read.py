@@ -30,7 +30,7 @@ from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, named, recognise
 from thermal_robot.campaign.settings import MOVES, SAME_CONFIGURATION, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
-from thermal_robot.campaign.targets import FEWEST, Posed, posed, telling, told_by
+from thermal_robot.campaign.targets import FEWEST, Posed, posed, propagated_sigma, telling
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import SI, Units, covariate_scale
 from thermal_robot.campaign.ur_kinematics import with_kinematics
@@ -201,7 +201,7 @@ def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | Non
     """Stated noise of a campaign and its targets; of several targets, propagated to their pose."""
     place, turn, targets = settings.noise_position, settings.noise_orientation, told.targets if told else None
     if targets is not None:
-        place, turn = (None, None) if place is None else told_by(place, targets)
+        place, turn = (None, None) if place is None else propagated_sigma(place, targets)
     each = _noise_of_rows(table, settings) if columns.has_noise else None
     known = {"noise_of_rows": each, "targets": targets, "noise_orientation": turn}
     return {"noise_position": place if each is None else None, **known}
@@ -276,7 +276,7 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
         warnings.append('where several targets sit on the tool is fitted: tool = "known" counts as "unknown"')
     if not kept.all():
         few = f"fewer than {FEWEST} targets, or targets on a line"
-        warnings.append(f"{table.told(~kept)} left out: {few} tell no pose")
+        warnings.append(f"{table.listed_rows(~kept)} left out: {few} tell no pose")
     taken = table.take(kept)
     return taken, seen, [*warnings, *_doubts(taken, seen, settings)]
 
@@ -300,7 +300,7 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
     astray = told.deviation > ASTRAY * max(sigma, noise or 0.0)
     if astray.any():
         found.append(
-            f"the targets do not keep their places on the tool in {table.told(astray)}, by up to "
+            f"the targets do not keep their places on the tool in {table.listed_rows(astray)}, by up to "
             f"{float(told.deviation.max()) / scale:.3g} {unit}: is one of them exchanged for another, or has one moved?"
         )
     if noise and sigma > LOOSE * noise:

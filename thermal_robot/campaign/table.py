@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.checked import first_true, settled
+from thermal_robot.campaign.checked import first_true, without_rounding
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
@@ -70,9 +70,9 @@ class Table:
         row = self.header if index is None else int(self.rows[index])
         return CampaignError(self.file, problem, row=row, column=column, **told)
 
-    def told(self, chosen: NDArray[np.bool_]) -> str:
+    def listed_rows(self, chosen: NDArray[np.bool_]) -> str:
         """Count chosen rows (N,) and list a few of their numbers: ``3 rows (4, 7, 9)``."""
-        return told_rows(self.rows[chosen])
+        return listed_rows(self.rows[chosen])
 
     def numbers(self, column: str, *, gaps: bool = False) -> Array:
         """Column as (N,) numbers in the file's unit; with ``gaps`` empty cells are NaN.
@@ -92,7 +92,7 @@ class Table:
         values = np.array(held, dtype=np.float64)
         wrong = first_true(~(np.abs(values) <= LARGEST) & ~(gaps & np.isnan(values)))
         if wrong is None:
-            return settled(values)
+            return without_rounding(values)
         value, cell = values[wrong], cells[wrong]
         unfilled = len(values) > 1 and bool(np.isnan(values).all())
         empty = "the column is still to be filled in" if unfilled else "a value is missing"
@@ -168,7 +168,7 @@ def _number(cell: str, comma: bool) -> float | None:
     return None if "_" in cell else value  # Python reads 1_000 as a number; no instrument writes it
 
 
-def told_rows(numbers: NDArray[np.int64]) -> str:
+def listed_rows(numbers: NDArray[np.int64]) -> str:
     """Count rows and list a few of their numbers: ``3 rows (4, 7, 9)``."""
     more = "" if len(numbers) <= _FEW else " …"
     return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"

@@ -152,10 +152,10 @@ def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float |
     ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
     alike = bool(sigmas.min() == sigmas.max())
-    return told_by(float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean())), targets)
+    return propagated_sigma(float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean())), targets)
 
 
-def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
+def propagated_sigma(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
     """Propagate the standard deviation of a point to positions, m, and with several targets to rotations, rad."""
     return (sigma, None) if targets is None else (sigma * float(targets.typical[0]), sigma * float(targets.typical[1]))
 

@@ -138,8 +138,6 @@ def set_damping(joint: Any, damping: float) -> None:
 _BESIDE, _ASKEW = 0.02, 0.05
 """m and rad by which the axes of the two nominal robots may differ: more than any two models of one robot do, less than
 those of another robot, or of one whose zeros stand elsewhere."""
-_OTHER_WAYS = dict.fromkeys(("euler", "axisangle", "xyaxes", "zaxis"))
-"""In which a body may be turned; a quaternion takes the place of each."""
 _BEYOND = (
     "An MJCF could hold zero offsets as a joint's ref, which would move a simulation's start, too: they are in the",
     "places of bodies. A joint's stiffness is a spring beside its motor, and no compliance of a gear behind it.",

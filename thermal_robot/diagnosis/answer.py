@@ -16,7 +16,7 @@ from thermal_robot.diagnosis.data_checks import cautions
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.gauges import unseen
 from thermal_robot.diagnosis.next_measurement import wanted
-from thermal_robot.diagnosis.residual_tests import Examined
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.uncertainty import registered, uncertainty
 from thermal_robot.diagnosis.values import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
@@ -115,7 +115,7 @@ class Conclusion:
     fit: Fit
     laws: tuple[Discovery, ...]
     unexplained: Unexplained
-    left: Examined
+    left: ResidualAnalysis
     chance: RandomGap
     refused: Mapping[str, Refused]
     misfit: Misfit | None = None
@@ -198,7 +198,7 @@ def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...]
     return tuple(capped), [note]
 
 
-def _gap(fit: Fit, left: Examined, shrinkage: Shrinkage) -> Gap:
+def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
     before, after = (seen.gap[~fit.explanation.outliers] for seen in (fit.nominal, fit.corrected))
     turned, schemes = before.shape[1] == 6, worst_folds(fit)
     return Gap(

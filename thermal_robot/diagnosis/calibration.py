@@ -14,18 +14,18 @@ from threadpoolctl import ThreadpoolController
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.answer import model_of
-from thermal_robot.diagnosis.data_checks import as_counted, usable
+from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
-from thermal_robot.diagnosis.findings import estimates, told_inside
-from thermal_robot.diagnosis.residual_tests import Examined, examine
-from thermal_robot.diagnosis.uncertainty import as_remainder_says
+from thermal_robot.diagnosis.findings import divided_effects, estimates
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, analyse_residual
+from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit_named
 from thermal_robot.observables import components
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,8 +97,8 @@ class Calibration:
     fit: Fit
 
     @cached_property
-    def _examined(self) -> Examined:
-        return examine(self.fit)
+    def _examined(self) -> ResidualAnalysis:
+        return analyse_residual(self.fit)
 
     @property
     def unexplained(self) -> bool:
@@ -111,9 +111,9 @@ class Calibration:
 
         With an :attr:`unexplained` residual, the standard deviations are inflated for it.
         """
-        fit = as_remainder_says(self.fit) if self.unexplained else self.fit
+        fit = inflated_for_structure(self.fit) if self.unexplained else self.fit
         titles = {name: own[0].title for name, own in fit.variants.items()}
-        inside, found = told_inside(fit), []
+        inside, found = divided_effects(fit), []
         for block, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True):
             for name, part in inside.items():
                 if part.container == effect.name:
@@ -148,7 +148,7 @@ class Calibration:
         return f"Calibration({self.campaign!r}: {', '.join(self.names)})"
 
     def __str__(self) -> str:
-        return registered().calibration_text(self)
+        return registered_renderer().calibration_text(self)
 
 
 def calibrate(
@@ -209,7 +209,7 @@ def calibrate(
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
-        fit = fit_named(as_counted(campaign), chosen, progress)
+        fit = fit_named(with_corrected_signs(campaign), chosen, progress)
     campaign, e = fit.campaign, fit.explanation
     before, after = (seen.gap[~e.outliers] for seen in (fit.nominal, fit.corrected))
     poses = components(campaign) == 6

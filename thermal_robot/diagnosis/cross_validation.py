@@ -33,7 +33,7 @@ from thermal_robot.inference.algebra import equations_of, ridge, whitener
 from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import STAND, Labels, blocks, each, held_together, neighbourhoods
+from thermal_robot.inference.grouping import STAND, Labels, blocks, each, held_out_groups, neighbourhoods
 from thermal_robot.inference.kernels import chunks
 from thermal_robot.inference.problem import Linear, Whitening
 
@@ -91,13 +91,13 @@ class Model:
         return tuple(np.arange(a, b) for a, b in pairwise(ends))
 
     @cached_property
-    def tight(self) -> Array:
+    def prior_precision(self) -> Array:
         """(K − flat,) prior precision of each parameter, SI."""
         own = [(b.sizes * scale) ** -2.0 for b, scale in zip(self.linear.blocks, self.scales, strict=True)]
         return np.concatenate([*own, np.zeros(0)])
 
     @cached_property
-    def _known(self) -> dict[bytes, Array]:
+    def _cached_products(self) -> dict[bytes, Array]:
         return {}
 
     @cached_property
@@ -111,46 +111,48 @@ class Model:
         V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
         """
         key = rows.tobytes()
-        if key not in self._known:
+        if key not in self._cached_products:
             used, smooth = rows & self._used, self.whitening.smooth
             # the sums over most rows are those over all less those over the others
             most = 2 * used.sum() > self._used.sum()
             products = self._of_all - self._summed(self._used & ~rows) if most else self._summed(used)
             if smooth is not None:
                 which = np.flatnonzero(self._used)
-                products = products - smooth.taken(used[which], lambda n: self._white(which[n]), settings.UNHEARD)
+                products = products - smooth.reduction(
+                    used[which], lambda n: self._white(which[n]), settings.KERNEL_FLOOR
+                )
             hidden = np.flatnonzero(~self._touched[used].any(axis=0))  # a difference of sums leaves rounding there
             products[:, hidden], products[:, :, hidden] = 0.0, 0.0
-            self._known[key] = products
-        return self._known[key]
+            self._cached_products[key] = products
+        return self._cached_products[key]
 
     @cached_property
     def _touched(self) -> Rows:
         """(N, flat) which rows have to do with which of the frames' columns."""
         return np.asarray((self.linear.frames != 0.0).any(axis=1))
 
-    def alone(self, test: Rows) -> NDArray[np.int64]:
+    def own_artefacts(self, test: Rows) -> NDArray[np.int64]:
         """Return the numbers of the frames' columns that only rows held out have to do with: their own artefacts."""
         others = self._touched[~test & self._used].any(axis=0)
         return np.flatnonzero(self._touched[test].any(axis=0) & ~others)
 
-    def judged(self, test: Rows) -> Array:
+    def test_columns(self, test: Rows) -> Array:
         """(n, m, K + 1) columns and gap of rows held out, less what artefacts of theirs alone take up of each.
 
         Where a stand stands is no property of the robot: of a stand held out, its rows are judged by how they spread.
         """
         key = test.tobytes()
-        if key not in self._told:
-            found, own = self.linear.stack[test], self.alone(test)
+        if key not in self._test_columns:
+            found, own = self.linear.stack[test], self.own_artefacts(test)
             if len(own):
                 root = np.sqrt(self.whitening.weights[test])[:, None, None] / self.whitening.sigma(test)[:, :, None]
                 white = equations_of(found * root)
                 found = found - found[:, :, own] @ np.linalg.lstsq(white[:, own], white, rcond=settings.ALIAS)[0]
-            self._told[key] = found
-        return self._told[key]
+            self._test_columns[key] = found
+        return self._test_columns[key]
 
     @cached_property
-    def _told(self) -> dict[bytes, Array]:
+    def _test_columns(self) -> dict[bytes, Array]:
         return {}
 
     @cached_property
@@ -180,7 +182,7 @@ class Model:
     def determines(self, rows: Rows) -> bool:
         """Tell whether some rows determine as much of the frames as all rows do, but what the others alone share."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
-        return bool(some.shape[1] + len(self.alone(~rows)) >= every.shape[1])
+        return bool(some.shape[1] + len(self.own_artefacts(~rows)) >= every.shape[1])
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
         """Numbers (k + 1,) of the columns of the frames, of some blocks and of the gap."""
@@ -190,7 +192,7 @@ class Model:
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> Array:
         """Ridge estimates (S, k + 1), −θ and 1, on each subset of rows; the noise is that of all rows."""
         picked = self.columns(chosen)
-        tight = self.tight[picked[self.flat : -1] - self.flat]
+        tight = self.prior_precision[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
         whole = self.whole[own]
         equations = max(int(self._used.sum()) * self.linear.measures - self.whitening.unseen, 1) / len(whole)
@@ -211,14 +213,14 @@ def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class CrossValidation:
     """Leave-one-fold-out fits and their residuals on the fold; ``tests`` are the rows (N,) of each fold."""
 
     model: Model
     tests: tuple[Rows, ...]
 
     @classmethod
-    def over(cls, model: Model, tests: Sequence[Rows]) -> Walk:
+    def over(cls, model: Model, tests: Sequence[Rows]) -> CrossValidation:
         """Cross-validate over all folds that have rows and whose other rows determine the frames."""
         kept = [t for t in tests if (t & model.kept).any() and (~t).sum() > 1]
         return cls(model, tuple(t for t in kept if model.determines(~t)))
@@ -241,7 +243,8 @@ class Walk:
         for test, fit, resting in zip(self.tests, fits, shared, strict=True):
             judged = test & model.kept
             left = (
-                model.judged(test)[judged[test], :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
+                model.test_columns(test)[judged[test], :3][:, :, picked]
+                @ np.vstack([fit, fit + resting[:, None] * moved]).T
             )
             squares = (left**2).sum(axis=1)
             squares[np.arange(len(squares)), 1 + model.block[judged]] = 0.0
@@ -250,7 +253,7 @@ class Walk:
 
     def residuals(self, chosen: Sequence[int]) -> Array:
         """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
-        picked, stack = self.model.columns(chosen), self.model.judged
+        picked, stack = self.model.columns(chosen), self.model.test_columns
         fits = self.model.fits([~test for test in self.tests], chosen)
         return np.concatenate([stack(test)[:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
 
@@ -278,13 +281,13 @@ def share(part: Array, whole: Array) -> Share:
     if len(without) < 2:
         return value, (-np.inf, 1.0)
     if value >= 1.0 or without.max() >= 1.0:
-        half = _half(without)
+        half = _half_width(without)
         return value, (value - half, value + half)
-    wider = float(np.expm1(_half(np.log1p(-without))))
+    wider = float(np.expm1(_half_width(np.log1p(-without))))
     return value, (value - (1.0 - value) * wider, value + (1.0 - value) * wider / (1.0 + wider))
 
 
-def _half(values: Array) -> float:
+def _half_width(values: Array) -> float:
     """Half width of the 95 % jackknife interval of a figure from its (B,) leave-one-block-out values.
 
     Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance told by B values of kurtosis κ has
@@ -321,11 +324,12 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
     Frames and parameters are refitted to the training rows. The selection stays that of all rows: effects, laws,
     constants, prior scales, linearisation point, noise, outliers. The estimate is then that of the saved model; an
-    effect selected from noise alone seems to gain a little: :func:`~thermal_robot.diagnosis.prune.earned` requires
-    more. The intervals are those of fresh rows of the same kind under the saved model, noise included. Raises
+    effect selected from noise alone seems to gain a little:
+    :func:`~thermal_robot.diagnosis.prune.held_out_tests` requires more. The intervals are those of fresh rows of the
+    same kind under the saved model, noise included. Raises
     :class:`EstimationError` if all rows repeat one pose.
     """
-    block, scheme = held_together(fit.campaign)
+    block, scheme = held_out_groups(fit.campaign)
     count = int(block.max()) + 1
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
@@ -342,20 +346,20 @@ def shrinkage(
     ``before`` is the problem at the nominal robot with the blocks of the best combination, in their order; rows of one
     ``block`` (N,) are held out together.
     """
-    best, beside = explanation.best.blocks, _beside(explanation, families)
+    best, beside = explanation.best.blocks, _outside_model(explanation, families)
     model, players = Model.of(explanation, block, beside), frozenset(range(len(best)))
     parts = model.partial(before, [explanation.values[b][0] for b in best])
-    part, whole = (Walk.over(m, each(block)) for m in (parts, model))
+    part, whole = (CrossValidation.over(m, each(block)) for m in (parts, model))
 
-    def walk(chosen: frozenset[int]) -> Walk:
+    def validation(chosen: frozenset[int]) -> CrossValidation:
         return whole if chosen and players <= chosen else part
 
     @cache
     def squares(chosen: frozenset[int]) -> Array:
-        return walk(chosen).squares(sorted(chosen))
+        return validation(chosen).squares(sorted(chosen))
 
     def left(chosen: frozenset[int]) -> Array:
-        own = walk(chosen)
+        own = validation(chosen)
         found = np.full(explanation.linear.gap.shape, np.nan)
         found[own.numbers] = own.residuals(sorted(chosen))
         return found
@@ -375,7 +379,7 @@ def shrinkage(
     return Shrinkage(overall, far, near, shares, after)
 
 
-def _beside(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
+def _outside_model(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
     """Most probable setting beside the model, and its scale, of each effect outside the model."""
     best = explanation.best.blocks
     found: dict[int, float] = {}
@@ -410,20 +414,20 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     found = []
     for name, words, tests in schemes(fit):
         bare, full = (plain, model) if name == "time" else rest
-        walk = Walk.over(full, tests)
-        if walk.tests:
-            before = Walk(bare, walk.tests).squares(())
-            after = walk.squares(range(len(full.spans))) if full.spans else before
-            found.append(_scheme(name, words, walk, before, after))
+        validation = CrossValidation.over(full, tests)
+        if validation.tests:
+            before = CrossValidation(bare, validation.tests).squares(())
+            after = validation.squares(range(len(full.spans))) if full.spans else before
+            found.append(_scheme(name, words, validation, before, after))
     return tuple(sorted(found, key=lambda f: -f.rms_after))
 
 
-def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> FoldScheme:
-    rows, *without = walk.counts
+def _scheme(name: str, words: str, validation: CrossValidation, before: Array, after: Array) -> FoldScheme:
+    rows, *without = validation.counts
     far, near = (float(np.sqrt(of[0] / rows)) for of in (before, after))
     shrinkage = float(1.0 - after[0] / before[0]) if before[0] > 0.0 else 0.0
     uncertainty = float(np.sqrt(jackknife(np.sqrt(after[1:] / np.maximum(without, 1.0)))))
-    return FoldScheme(name, words, len(walk.tests), int(rows), far, near, shrinkage, uncertainty)
+    return FoldScheme(name, words, len(validation.tests), int(rows), far, near, shrinkage, uncertainty)
 
 
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
@@ -461,8 +465,8 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     session = campaign.labels.get("session")
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
-    if held_together(campaign)[1] == STAND:
-        yield STAND, "one stand after the other", each(held_together(campaign)[0])
+    if held_out_groups(campaign)[1] == STAND:
+        yield STAND, "one stand after the other", each(held_out_groups(campaign)[0])
     temperature = _temperature(campaign)
     if temperature is not None and np.ptp(temperature) > 0.0:
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)

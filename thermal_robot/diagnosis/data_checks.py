@@ -23,7 +23,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.campaign import GRAVITY, turned_round
 from thermal_robot.campaign.plausible import copies, marks
-from thermal_robot.campaign.table import told_rows
+from thermal_robot.campaign.table import listed_rows
 from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.faults import Readings
@@ -33,12 +33,12 @@ from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.exact import heard
-from thermal_robot.inference.explain import Explanation, explain, log_priors, settings_of_one
+from thermal_robot.inference.exact import downweighted
+from thermal_robot.inference.explain import Explanation, exclusive_settings, explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import in_order
 from thermal_robot.inference.problem import Linear, contained, gram
-from thermal_robot.inference.registration import Placed, register
+from thermal_robot.inference.registration import BaseAndTarget, register
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.weights import Noise
 from thermal_robot.kinematics import gravity_torques
@@ -74,7 +74,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     if not far.any():
         return campaign, ()
     out, notes = np.zeros(len(order), dtype=bool), []
-    found = [*_still(readings, far, near), *_behind(readings, far, near, frames)]
+    found = [*_frozen_runs(readings, far, near), *_lagging_runs(readings, far, near, frames)]
     for rows, words in sorted(found, key=lambda run: -len(run[0])):
         if not out[rows].any():
             out[rows] = True
@@ -85,7 +85,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     return campaign.take(np.sort(order[~out])) if notes else campaign, tuple(notes)
 
 
-def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
+def _frozen_runs(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
     """Yield runs in which the measured position stays the same while the commands change."""
     k, rows = 0, len(far)
     while k < rows - 1:
@@ -98,7 +98,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
         k += stays + 1
 
 
-def _behind(readings: Readings, far: Flags, near: float, frames: Placed) -> Iterator[tuple[Rows, str]]:
+def _lagging_runs(readings: Readings, far: Flags, near: float, frames: BaseAndTarget) -> Iterator[tuple[Rows, str]]:
     """Yield short runs in which the measured pose belongs to the command of a row up to some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)
@@ -121,10 +121,10 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     notes += contradicted(campaign)
     again, (lost, _) = copies(campaign), marks(campaign)
     if again.any():
-        rows = told_rows(campaign.rows[again])
+        rows = listed_rows(campaign.rows[again])
         notes.append(f"{rows} repeat another one to the last digit: these copies are left out")
     if lost.any():
-        rows = told_rows(campaign.rows[lost])
+        rows = listed_rows(campaign.rows[lost])
         what = "a mark of a missing value, or a robot that stood still"
         notes.append(f"{rows} measured one place or figure to the last digit, {what}: they are left out")
     out = again | lost
@@ -152,7 +152,7 @@ def contradicted(campaign: Campaign) -> list[str]:
     return found
 
 
-def as_counted(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
+def with_corrected_signs(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
     """Reverse quantities that were recorded with the opposite sign, with a note; ``own`` are the user's effects."""
     tried: set[str] = set()
     while (quantity := _against(campaign, own, tried)) is not None:
@@ -192,7 +192,7 @@ def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str 
     either = tuple(replace(b, bare=tuple(replace(p, positive=False) for p in b.bare)) for b in blocks)
     families = [b.effect.name for b in blocks]
     free = explain(replace(linear, blocks=either), Noise.of(campaign), families=families)
-    against = [q for q, z in _votes(free, sides).items() if q not in tried and _agree(z)]
+    against = [q for q, z in _sign_scores(free, sides).items() if q not in tried and _agree(z)]
     if not against:
         return None
     read, clear = _keeping_signs(linear, free), {}
@@ -228,7 +228,7 @@ def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDA
     return Linear(seen.gap, frame_columns(seen)[0], tuple(blocks)), sides
 
 
-def _votes(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
+def _sign_scores(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
     """Z scores, by quantity, of the parameters whose sign that quantity decides."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():
@@ -248,9 +248,9 @@ def _agree(z: Array) -> bool:
 
 def _keeping_signs(linear: Linear, free: Explanation) -> Combination:
     """Most probable combination whose parameters keep their signs; rows set aside count with their weights."""
-    problem = gram(linear, replace(heard(free), smooth=None))
+    problem = gram(linear, replace(downweighted(free), smooth=None))
     effects = [item.effect for item in linear.blocks]
-    apart = contained(problem) | settings_of_one([effect.name for effect in effects])
+    apart = contained(problem) | exclusive_settings([effect.name for effect in effects])
     search = Search(problem, log_priors(effects), apart)
     return search.climb(free.best.blocks if search.allowed(free.best.blocks) else ())
 

@@ -15,12 +15,12 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.cross_validation import held_out
-from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
-from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.prune import beside_scatter, concluded, grown, pruned
-from thermal_robot.diagnosis.residual_tests import examine
-from thermal_robot.diagnosis.result import Diagnosis, told
-from thermal_robot.diagnosis.uncertainty import as_remainder_says
+from thermal_robot.diagnosis.data_checks import not_executed, usable, with_corrected_signs
+from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, mismatch
+from thermal_robot.diagnosis.prune import concluded, forward_selection, pruned, selected_with_scatter
+from thermal_robot.diagnosis.residual_tests import analyse_residual
+from thermal_robot.diagnosis.result import Diagnosis, with_summary
+from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.diagnosis.updated import prepare
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
@@ -78,7 +78,7 @@ def diagnose(
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
     require("diagnose(), effects", effects, (list, tuple), "a list of your own effects; names go to only")
     require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
-    only, without = asked_for(only, without)
+    only, without = effect_names(only, without)
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
@@ -110,7 +110,7 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-        prepare(diagnosis := told(found))
+        prepare(diagnosis := with_summary(found))
         return diagnosis
 
 
@@ -131,7 +131,7 @@ def solvable(campaign: Campaign) -> Iterator[None]:
         ) from error
 
 
-def asked_for(only: Iterable[str] | None, without: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def effect_names(only: Iterable[str] | None, without: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the names of effects to consider, none for all, and those to leave out; refuse what names nothing."""
     if only is not None and not (only := _names("only", only)):
         raise CampaignError("diagnose(), only", "names no effect", expected="at least one, or only left out for all")
@@ -152,10 +152,10 @@ def _concluded(
     campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
 ) -> Conclusion:
     """Explain the gap, unless robot and table do not match: data faults are tested before faults of the robot."""
-    misfit = unfit(campaign, progress)
+    misfit = mismatch(campaign, progress)
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
-        last = _explained(fit(as_counted(campaign, own), candidates, progress), progress)
+        last = _explained(fit(with_corrected_signs(campaign, own), candidates, progress), progress)
         # no further query comes: what was weighed would fill memory
         last = replace(last, fit=replace(last.fit, explanation=replace(last.fit.explanation, searched=None)))
         misfit = another_motion(last.fit)
@@ -168,17 +168,17 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
     fit = known
     for number in range(1, 1 if of_model(known.campaign) else settings.SELECTIONS):
-        wider = grown(fit, number, progress)
+        wider = forward_selection(fit, number, progress)
         if wider is None:
             break
         fit = wider
     fit, refused = pruned(fit, progress)
     chance = random_gap(fit)
     if chance.explains_size:
-        return beside_scatter(fit, chance, refused, progress)
-    left = examine(fit, progress)
+        return selected_with_scatter(fit, chance, refused, progress)
+    left = analyse_residual(fit, progress)
     if left.unexplained.flagged:
-        fit = as_remainder_says(fit)
+        fit = inflated_for_structure(fit)
     return concluded(fit, left, chance, refused)
 
 

@@ -42,7 +42,7 @@ class Inside:
     unseen: tuple[str, ...]
 
 
-def told_inside(fit: Fit) -> dict[str, Inside]:
+def divided_effects(fit: Fit) -> dict[str, Inside]:
     """Fitted effects that are reported in parts, by name, with these parts."""
     found = {}
     for effect, _ in fit.effects:
@@ -81,7 +81,7 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
     """Covariance matrix of the identified parameters, by (effect, parameter), in products of SI units.
 
     Deviations are those of :func:`estimates`, inflated for the residual
-    (:func:`~thermal_robot.diagnosis.uncertainty.as_remainder_says`); correlations those of the ``joint`` (K, K)
+    (:func:`~thermal_robot.diagnosis.uncertainty.inflated_for_structure`); correlations those of the ``joint`` (K, K)
     posterior of all frames and parameters, those of the effects last, frames marginalised.
     """
     import pandas as pd
@@ -191,7 +191,7 @@ def findings(
     and quantity of each discovered law.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
-    apart, inside = confounding(fit, explained), told_inside(fit)
+    apart, inside = confounding(fit, explained), divided_effects(fit)
     found = []
     for name in dict.fromkeys(fit.families):
         if name in explained:

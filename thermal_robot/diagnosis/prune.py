@@ -12,8 +12,8 @@ from scipy.special import expit, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.attribution import without_laws
-from thermal_robot.diagnosis.cross_validation import Model, Walk, schemes
-from thermal_robot.diagnosis.residual_tests import Examined, examine
+from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, schemes
+from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, analyse_residual
 from thermal_robot.diagnosis.values import Dependence, Location, Refused, Unexplained
 from thermal_robot.effects import Effect, JointRipple
 from thermal_robot.effects.law import PREFIX
@@ -28,7 +28,7 @@ from thermal_robot.inference.scatter import RandomGap, random_gap
 from thermal_robot.inference.weights import Noise
 
 
-def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
+def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: add unlisted terms in competition with all known effects; ``None`` if none is selected.
 
     Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. One
@@ -59,14 +59,14 @@ def _ripple(fit: Fit) -> JointRipple | None:
     return None if not found.orders or alike(found, ripple_of(fit)) else found
 
 
-def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
+def attributed_to_laws(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
     """Residual of the known effects, with the places and quantities of the laws that explain it.
 
     Without laws, the place is that of a per-pose or per-visit discrepancy, if any.
     """
-    form = discrepancy.form
-    if not found and left.flagged and form is not None and form.anew and form.place[0]:
-        return replace(left, locations=(Location(*form.place, discrepancy.forms[form.name]),), depends_on=())
+    kernel = discrepancy.kernel
+    if not found and left.flagged and kernel is not None and kernel.grouped and kernel.place[0]:
+        return replace(left, locations=(Location(*kernel.place, discrepancy.kernels[kernel.name]),), depends_on=())
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}
@@ -87,7 +87,7 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
     )
 
 
-def beside_scatter(
+def selected_with_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
     """Repeat the model selection with the joints' scatter (``chance``) in the covariance of the noise.
@@ -116,19 +116,19 @@ def beside_scatter(
     floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
-        left = examine(fit, progress).unexplained
-    return concluded(fit, Examined(left, floor, "scatter"), chance, refused)
+        left = analyse_residual(fit, progress).unexplained
+    return concluded(fit, ResidualAnalysis(left, floor, "scatter"), chance, refused)
 
 
-def concluded(fit: Fit, left: Examined, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
+def concluded(fit: Fit, left: ResidualAnalysis, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
     """Conclusion of a fit: discovered laws are separated from what known effects explain."""
     laws = discovered(fit)
-    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
+    unexplained = attributed_to_laws(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
 @dataclass(frozen=True)
-class Gained:
+class DensityGain:
     """Held-out log predictive density of one effect under one cross-validation scheme.
 
     ``nats`` is its gain over all rows held out, with its 95 % ``interval``; ``share`` is 1 − (rms with it / rms without
@@ -141,18 +141,18 @@ class Gained:
     interval: tuple[float, float]
 
 
-_NOT_ASKED = Gained("time", 0.0, 0.0, (-np.inf, np.inf))
+_NOT_ASKED = DensityGain("time", 0.0, 0.0, (-np.inf, np.inf))
 
 
 @dataclass(frozen=True)
-class Earned:
+class HeldOutTest:
     """Cross-validation of one effect against the refitted model without it.
 
     ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme with the smallest upper bound.
     """
 
-    blocked: Gained
-    hardest: Gained
+    blocked: DensityGain
+    hardest: DensityGain
 
     @property
     def clearly(self) -> bool:
@@ -170,7 +170,7 @@ class Earned:
         return self.blocked.interval[0] > 0.0 and not self.harms
 
 
-def earned(fit: Fit) -> dict[str, Earned]:
+def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
     """Cross-validate every effect and law of a fit: paired differences of held-out log predictive densities.
 
     The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
@@ -184,30 +184,30 @@ def earned(fit: Fit) -> dict[str, Earned]:
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
-    walks = [(name, Walk.over(model, tests)) for name, _, tests in schemes(fit)]
+    walks = [(name, CrossValidation.over(model, tests)) for name, _, tests in schemes(fit)]
     every = range(len(model.spans))
-    found: dict[str, list[Gained]] = {effect.name: [] for effect, _ in fit.effects}
-    for name, walk in walks:
-        if not walk.tests:
+    found: dict[str, list[DensityGain]] = {effect.name: [] for effect, _ in fit.effects}
+    for name, validation in walks:
+        if not validation.tests:
             continue
-        judged = model.kept[walk.numbers]
-        number = walk.numbers[judged]
+        judged = model.kept[validation.numbers]
+        number = validation.numbers[judged]
         noise = model.whitening.sigma(number) * fit.explanation.best.noise
-        left = walk.residuals(every)[judged] / noise
+        left = validation.residuals(every)[judged] / noise
         for k, (effect, _) in enumerate(fit.effects):
             if name != "time" and is_event(effect):
                 continue
-            without = walk.residuals([b for b in every if b != k])[judged] / noise
-            found[effect.name].append(_gained(name, left, without, block[number]))
-    return {name: _earned(own) for name, own in found.items()}
+            without = validation.residuals([b for b in every if b != k])[judged] / noise
+            found[effect.name].append(_density_gain(name, left, without, block[number]))
+    return {name: _held_out_test(own) for name, own in found.items()}
 
 
-def _earned(found: Sequence[Gained]) -> Earned:
+def _held_out_test(found: Sequence[DensityGain]) -> HeldOutTest:
     blocked = next((gained for gained in found if gained.scheme == "time"), _NOT_ASKED)
-    return Earned(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
+    return HeldOutTest(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
 
 
-def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> Gained:
+def _density_gain(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> DensityGain:
     after, before = (left**2).sum(axis=1), (without**2).sum(axis=1)
     total = float(before.sum())
     share = 1.0 - float(after.sum()) / total if total > 0.0 else 0.0
@@ -215,9 +215,9 @@ def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) 
     parts = np.bincount(block, density)[np.unique(block)]
     nats, count = float(parts.sum()), len(parts)
     if count < 2:
-        return Gained(scheme, share, nats, (-np.inf, np.inf))
+        return DensityGain(scheme, share, nats, (-np.inf, np.inf))
     half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(count * parts.var(ddof=1)))
-    return Gained(scheme, share, nats, (nats - half, nats + half))
+    return DensityGain(scheme, share, nats, (nats - half, nats + half))
 
 
 def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
@@ -243,11 +243,11 @@ def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Re
 
 def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     """Terms to remove next, which do not obey the rule, with the reason for each."""
-    table = earned(fit)
+    table = held_out_tests(fit)
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
         return harmful
-    odds, sure = in_place(fit), determined(fit)
+    odds, sure = odds_in_place(fit), determined(fit)
     laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
     poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
     out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}
@@ -262,7 +262,7 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     return {worst: Refused(min(fit.probability(worst), 1.0 if worst in sure else settings.PRIOR_PROBABILITY))}
 
 
-def in_place(fit: Fit) -> dict[str, float]:
+def odds_in_place(fit: Fit) -> dict[str, float]:
     """Posterior odds of each effect and law against nothing in its place; of a law also against its alternatives.
 
     Alternatives of an effect do not count here: they are reported as confounded. The odds of a law include those of its
@@ -287,7 +287,7 @@ def determined(fit: Fit) -> set[str]:
     return found
 
 
-def _refused(judged: Earned) -> Refused:
+def _refused(judged: HeldOutTest) -> Refused:
     """Cross-validation result of a removed effect: probability from its prior and held-out densities, and share.
 
     The probability is at most the prior's, whatever other blocks of rows gain.

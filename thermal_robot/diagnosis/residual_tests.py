@@ -20,8 +20,8 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import in_a_row, in_order
-from thermal_robot.inference.screening import Target, Worth, harmonics, smooth_columns
+from thermal_robot.inference.grouping import consecutive_outliers, in_order
+from thermal_robot.inference.screening import Score, Target, harmonics, smooth_columns
 from thermal_robot.inference.weights import distance_limit
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
@@ -110,7 +110,7 @@ def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 @dataclass(frozen=True)
-class Examined:
+class ResidualAnalysis:
     """Residual analysis: whether the residual is noise, where it enters and what it follows.
 
     ``floor``: one sigma per axis of instrument and repeatability together, m, by its ``source``: ``stated``,
@@ -122,7 +122,7 @@ class Examined:
     source: str
 
 
-def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Examined:
+def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> ResidualAnalysis:
     """Residual analysis of a fit: several tests for noise with Bonferroni correction.
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
@@ -145,7 +145,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     p_value = min(1.0, count * min(test.p for test in (*rest, *aside)))
     told, of_aside = (tuple(t.reason for t in tests if count * t.p < settings.LEVEL) for tests in (rest, aside))
     if not (told or of_aside) or rms <= settings.ROUNDING:
-        return Examined(Unexplained(False, 0.0, p_value), floor, source)
+        return ResidualAnalysis(Unexplained(False, 0.0, p_value), floor, source)
     likeness = min(max(test.share for test in rest), 1.0)
     # what neighbours or a law have in common is no noise, however small beside the stated one
     beyond2 = max(rms**2 - 3.0 * floor**2, likeness * rms**2)
@@ -157,7 +157,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     # what the rest follows is said only where the rest is no noise
     followed = (locations, depends) if told else ((), ())
     left_over = Unexplained(True, float(np.sqrt(beyond2)), p_value, (*told, *of_aside), *followed)
-    return Examined(left_over, floor, source)
+    return ResidualAnalysis(left_over, floor, source)
 
 
 def _too_large(fit: Fit, left: Residual) -> Outcome:
@@ -218,21 +218,21 @@ class LawTest(NamedTuple):
 
     place: tuple[str, str]
     quantity: str
-    worth: Worth
+    score: Score
 
 
 def _laws(fit: Fit, left: Residual) -> tuple[Outcome, tuple[Location, ...], tuple[Dependence, ...]]:
     """F tests of smooth laws of quantities at places (Bonferroni); places and quantities, most probable first."""
     every = _smooth_laws(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
-    tested = sorted((law for law in every if np.isfinite(law.worth.gain)), key=lambda law: -law.worth.gain)
+    tested = sorted((law for law in every if np.isfinite(law.score.gain)), key=lambda law: -law.score.gain)
     if not tested:
         return Outcome(), (), ()
     best: dict[tuple[str, str], float] = {}
     depends: dict[str, tuple[float, LawTest]] = {}
     for law in tested:
-        best.setdefault(law.place, law.worth.gain)
-        p = law.worth.p_value * len(tested)
-        if law.worth.share > settings.MATERIAL_SHARE and p < 2.0 * settings.INTERVAL[0]:
+        best.setdefault(law.place, law.score.gain)
+        p = law.score.p_value * len(tested)
+        if law.score.share > settings.MATERIAL_SHARE and p < 2.0 * settings.INTERVAL[0]:
             depends.setdefault(law.quantity, (min(1.0, p), law))
     # posterior probability of the best law at each place
     shares = zip(best, softmax(list(best.values())), strict=True)
@@ -242,9 +242,9 @@ def _laws(fit: Fit, left: Residual) -> tuple[Outcome, tuple[Location, ...], tupl
     p, first = next(iter(depends.values()))
     kind, name = first.place
     at = in_words("joint", name) if kind == "joint" else f"the {name}"
-    told = f"a law of {first.quantity} at {at} explains {percent(first.worth.share, 0)} of what remains"
+    told = f"a law of {first.quantity} at {at} explains {percent(first.score.share, 0)} of what remains"
     followed = tuple(Dependence(quantity, p) for quantity, (p, _) in depends.items())[: settings.NAMED]
-    return Outcome(p, told, first.worth.share), locations, followed
+    return Outcome(p, told, first.score.share), locations, followed
 
 
 def _smooth_laws(observations: Observations, left: Residual) -> Iterator[LawTest]:
@@ -262,7 +262,7 @@ def _smooth_laws(observations: Observations, left: Residual) -> Iterator[LawTest
         for quantity, law in laws:
             if law.shape[1] and law.shape[1] * sensitivity.shape[2] <= left.target.freedom // 3:
                 columns = (sensitivity[:, :, :, None] * law[:, None, None, :]).reshape(len(left.rows), m, -1)
-                yield LawTest(place, quantity, left.target.worth(columns))
+                yield LawTest(place, quantity, left.target.score(columns))
 
 
 def _in_a_row(fit: Fit) -> Outcome:
@@ -274,7 +274,7 @@ def _in_a_row(fit: Fit) -> Outcome:
         return Outcome()
     # what chance gives has a Poisson law
     p = 1.0 - float(pdtr(follow - 1, count * (count - 1) / samples))
-    together = int(in_a_row(fit.campaign, fit.explanation.outliers).sum())
+    together = int(consecutive_outliers(fit.campaign, fit.explanation.outliers).sum())
     return Outcome(p, f"{together} of the {count} rows that were set aside follow each other: something changed there")
 
 

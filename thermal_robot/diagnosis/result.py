@@ -1,6 +1,6 @@
 """The diagnosis as one frozen value, its tables and its JSON.
 
-This module knows nothing of reports: whoever is registered in :mod:`thermal_robot.teller` puts it into words.
+This module knows nothing of reports: whoever is registered in :mod:`thermal_robot.renderer` puts it into words.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from thermal_robot.diagnosis.values import (
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_rpy
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,10 +46,10 @@ if TYPE_CHECKING:
 SCHEMA = "thermal-robot/diagnosis/2"
 
 
-def told(diagnosis: Diagnosis) -> Diagnosis:
+def with_summary(diagnosis: Diagnosis) -> Diagnosis:
     """Diagnosis with its summary and advice in words."""
-    teller = registered()
-    return replace(diagnosis, summary=teller.headline(diagnosis), advice=teller.advice(diagnosis))
+    renderer = registered_renderer()
+    return replace(diagnosis, summary=renderer.headline(diagnosis), advice=renderer.advice(diagnosis))
 
 
 def estimate_table(estimates: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
@@ -181,7 +181,7 @@ class Diagnosis:
         """
         from thermal_robot.diagnosis.attribution import explained
 
-        return registered().explain_figure(explained(self._fitted(), effect))
+        return registered_renderer().explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
         """Optimal design: samples that best separate the leading explanations.
@@ -384,10 +384,10 @@ class Diagnosis:
         return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"
 
     def __str__(self) -> str:
-        return registered().text(self)
+        return registered_renderer().text(self)
 
     def _repr_html_(self) -> str:
-        return registered().fragment(self)
+        return registered_renderer().fragment(self)
 
 
 def _gap_as_json(gap: Gap) -> dict[str, Any]:

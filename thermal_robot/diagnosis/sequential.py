@@ -38,7 +38,7 @@ from thermal_robot.inference.exact import corrected_observations
 from thermal_robot.inference.kernels import chunks
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations, parameter_values
 from thermal_robot.inference.registration import moved
-from thermal_robot.inference.weights import Noise, distance_limit, far_scale, judged, tail_weight
+from thermal_robot.inference.weights import Noise, distance_limit, huber_weight, judged, outlier_scale
 from thermal_robot.observations import Frames
 
 
@@ -99,7 +99,7 @@ class WeightedRows:
             distance2 = ((relative_residual(campaign, point, choice) / sigma) ** 2).sum(axis=1)
             limit = distance_limit(choice.measures, rows)
         aside = distance2 > limit
-        return cls(campaign, np.where(aside, 0.0, tail_weight(distance2, choice.measures)), aside)
+        return cls(campaign, np.where(aside, 0.0, huber_weight(distance2, choice.measures)), aside)
 
     @classmethod
     def joined(cls, *batches: WeightedRows) -> WeightedRows:
@@ -167,8 +167,8 @@ class Guard:
 
     Steps up to √(δᵀAδ) = ``reach`` are safe, A (k, k) the ``metric``, positive. ``share`` and ``typical``: how far a
     step of 1 moves a row, at most and in the root mean square, in units of the noise, of the median row and over all;
-    limits may move by as much beside. ``sigma`` (m,): the unit of distances. ``medians`` (G,) and ``bend``: median
-    distance, and that from which on a row is in the tail. ``quiet``: noise is stated, and no more than its slack
+    limits may move by as much beside. ``sigma`` (m,): the unit of distances. ``medians`` (G,): median distance;
+    ``huber_threshold``: that from which on a row is in the tail. ``quiet``: noise is stated, and no more than its slack
     remains, so that medians bear on nothing.
     """
 
@@ -178,7 +178,7 @@ class Guard:
     typical: float
     sigma: Array
     medians: Array
-    bend: float
+    huber_threshold: float
     quiet: bool
 
     def distances(self, stack: Array) -> Array:
@@ -189,16 +189,20 @@ class Guard:
     def scores(self, stack: Array, weights: Array) -> Array:
         """Trust-region radius (N,) up to which each row, (N, m, K + 1), keeps its weight; −1 where it has none."""
         parts = self.distances(stack)
-        score = (self.bend - np.linalg.norm(parts, axis=1)) / (moves(stack, self.metric, self.sigma) + self.share)
+        score = (self.huber_threshold - np.linalg.norm(parts, axis=1)) / (
+            moves(stack, self.metric, self.sigma) + self.share
+        )
         if not self.quiet:
             wide = 2.0 * own_settings.WIDE * self.typical  # the row and the median
             score = np.minimum(score, np.abs(parts - self.medians).min(axis=1) / wide)
         return np.where((score > 0.0) & (weights >= 1.0), score, -1.0)
 
-    def holds(self, step: Array, sigma: Array, medians: Array, bend: float, rms: Array) -> bool:
+    def holds(self, step: Array, sigma: Array, medians: Array, huber_threshold: float, rms: Array) -> bool:
         """Whether a fit is in the trust region: step (k,), noise, limits in its units, rms (G,) per axis, m and rad."""
         far, ratio = float(np.sqrt(step @ self.metric @ step)), sigma[::3] / self.sigma[::3]
-        within = far <= self.reach and bool(np.abs(bend * ratio - self.bend).max() <= self.share * self.reach)
+        within = far <= self.reach and bool(
+            np.abs(huber_threshold * ratio - self.huber_threshold).max() <= self.share * self.reach
+        )
         if self.quiet:
             return within and bool((rms <= settings.NOISE_SLACK * sigma[::3]).all())
         apart = np.abs(medians * ratio - self.medians).max()
@@ -251,8 +255,9 @@ class State:
     """State of the iteration: point, step (k,) since the sums were linearised, rows kept one by one, noise.
 
     ``sigma`` (m,) and ``held``: whitening noise and its prior's degrees of freedom. ``leverage``: share of the
-    equations that is fitted. ``best``: prior scales and noise, if known. ``medians`` (G,) and ``bend``, in units of
-    ``sigma``: median distance of rows, and that from which on one counts less; ``steady``: the median is a row's.
+    equations that is fitted. ``best``: prior scales and noise, if known. ``medians`` (G,) and ``huber_threshold``, in
+    units of ``sigma``: median distance of rows, and that from which on one counts less;
+    ``steady``: the median is a row's.
     """
 
     point: Point
@@ -263,7 +268,7 @@ class State:
     leverage: float
     best: Combination | None = None
     medians: Array = field(default_factory=lambda: np.zeros(1))
-    bend: float = np.inf
+    huber_threshold: float = np.inf
     steady: bool = True
 
 
@@ -307,7 +312,7 @@ class Fitted(State):
         return np.asarray(found + np.diag(np.r_[np.full(len(found) - len(prior), frames), prior] ** -2.0))
 
 
-def settled(choice: Choice, sums: Sums, begin: State) -> Fitted:
+def converged_fit(choice: Choice, sums: Sums, begin: State) -> Fitted:
     """Fit a choice to summed and single rows by fixed-point iteration; the result does not depend on the start."""
     for _ in range(own_settings.REST_ROUNDS):
         found, size = _round(choice, sums, begin)
@@ -375,9 +380,11 @@ def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
     stated = replace(choice.noise, relative=rows.campaign.relative_noise)
     sigma, held, distance2 = judged(gap, measured, stated, state.leverage, measures)
     aside = distance2 > distance_limit(measures, total)
-    rows = WeightedRows(rows.campaign, np.where(aside, 0.0, tail_weight(distance2, measures)), aside)
-    edge = bend(measures, state.leverage, sigma, far_scale(measured, sigma))
-    return replace(state, rows=rows, sigma=sigma, held=held, medians=medians / sigma[::3], bend=edge, steady=steady)
+    rows = WeightedRows(rows.campaign, np.where(aside, 0.0, huber_weight(distance2, measures)), aside)
+    edge = huber_threshold(measures, state.leverage, sigma, outlier_scale(measured, sigma))
+    return replace(
+        state, rows=rows, sigma=sigma, held=held, medians=medians / sigma[::3], huber_threshold=edge, steady=steady
+    )
 
 
 def axis_noise(medians: Array, leverage: float) -> Array:
@@ -385,7 +392,7 @@ def axis_noise(medians: Array, leverage: float) -> Array:
     return np.asarray(medians / np.sqrt(float(chdtri(3, 0.5)) * (1.0 - leverage)))
 
 
-def bend(measures: int, leverage: float, sigma: Array, scale: Array) -> float:
+def huber_threshold(measures: int, leverage: float, sigma: Array, scale: Array) -> float:
     """Huber's threshold, in units of the noise, at the distance beyond which a row is down-weighted."""
     return float(np.sqrt(chdtri(measures, settings.BEND_LEVEL) * (1.0 - leverage)) * (scale / sigma).min())
 
@@ -415,7 +422,7 @@ class Sequential:
         aside, kept, sums = rows.aside.copy(), np.arange(len(rows.aside)), summed(choice, rows.take(slice(0)), begin)
         if len(kept) > 2 * own_settings.KEPT:
             sums, kept = split(choice, begin)
-        fitted = settled(choice, sums, replace(begin, rows=rows.take(kept)))
+        fitted = converged_fit(choice, sums, replace(begin, rows=rows.take(kept)))
         aside[kept] = fitted.rows.aside  # rows in the sums are not set aside, or keep what they had
         return cls(choice, begin.point, sums, fitted, batches, aside[len(aside) - len(batches[-1].aside) :], anew)
 
@@ -427,7 +434,9 @@ class Sequential:
     def plus(self, new: WeightedRows) -> Sequential:
         """Add rows; summed rows are revisited only where ``anew`` says so."""
         batches, old = (*self.batches, new), len(self.fitted.rows.aside)
-        fitted = settled(self.choice, self.sums, replace(self.fitted, rows=WeightedRows.joined(self.fitted.rows, new)))
+        fitted = converged_fit(
+            self.choice, self.sums, replace(self.fitted, rows=WeightedRows.joined(self.fitted.rows, new))
+        )
         grown = replace(self, fitted=fitted, batches=batches, aside=fitted.rows.aside[old:], anew=False)
         summing = bool(self.sums.counts[0])
         holds = not summing or (fitted.steady and self._holds(fitted))
@@ -451,7 +460,7 @@ class Sequential:
     def _holds(self, fitted: Fitted) -> bool:
         """Whether summed rows keep their weights, and the curvature up to the new point is negligible."""
         guard, axis = self.sums.guard, fitted.rms / np.sqrt(3.0)
-        near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.bend, axis)
+        near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.huber_threshold, axis)
         return near and self._bent(fitted) < own_settings.CURVED
 
     def _bent(self, fitted: Fitted) -> float:
@@ -522,4 +531,4 @@ def _guarded(choice: Choice, begin: State) -> tuple[WeightedRows, Guard | None]:
     left = axis_noise(found.medians * found.sigma[::3], begin.leverage)
     quiet = found.held > 0.0 and bool((left < settings.NOISE_SLACK * found.sigma[::3]).all())
     share, typical = float(np.median(moves(stack, metric, found.sigma))), len(rows.aside) ** -0.5
-    return found.rows, Guard(metric, 0.0, share, typical, found.sigma, found.medians, found.bend, quiet)
+    return found.rows, Guard(metric, 0.0, share, typical, found.sigma, found.medians, found.huber_threshold, quiet)

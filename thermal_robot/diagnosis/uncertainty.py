@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings as diagnosis_settings
-from thermal_robot.diagnosis.cross_validation import Model, Walk, jackknife
+from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, jackknife
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
@@ -38,18 +38,18 @@ from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import blocks, each, neighbourhoods
-from thermal_robot.inference.kernels import Form, Spectrum
+from thermal_robot.inference.kernels import Kernel, SmoothKernel
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
-def as_remainder_says(fit: Fit) -> Fit:
+def inflated_for_structure(fit: Fit) -> Fit:
     """Inflate the parameter covariances of a fit for structure in its residual; the values stay."""
     e = fit.explanation
     if not e.best.blocks:
         return fit
     model = _model(fit)
-    said, wider = _said(fit, model), dict(e.values)
+    said, wider = _other_covariances(fit, model), dict(e.values)
     for b, span in zip(e.best.blocks, model.spans, strict=True):
         values, covariance = e.values[b]
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
@@ -58,36 +58,36 @@ def as_remainder_says(fit: Fit) -> Fit:
     return replace(fit, explanation=replace(e, values=wider))
 
 
-def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
+def variance_inflation(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
     """Variance inflation factor (K,) of parameters over independent rows, by which their information is divided.
 
     ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
     """
     model = replace(_model(fit), linear=linear, scales=(1.0,) * len(linear.blocks))
-    return _times(1.0 / (1.0 + information), axes, _said(fit, model))
+    return _inflation_factors(1.0 / (1.0 + information), axes, _other_covariances(fit, model))
 
 
 def _model(fit: Fit) -> Model:
     return Model.of(fit.explanation, blocks(fit.campaign))
 
 
-def _said(fit: Fit, model: Model) -> list[Array]:
+def _other_covariances(fit: Fit, model: Model) -> list[Array]:
     """Parameter covariances (P, P) beside the posterior's: jackknife over blocks of rows, and sandwich."""
     found, e = [], fit.explanation
     for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
         rows = [~group for group in each(labels) if model.determines(~group)]
         if len(rows) > 1:
             found.append(jackknife(model.fits(rows, range(len(model.spans)))[:, model.flat : -1]))
-    if form := _smooth(e):
+    if kernel := _smooth(e):
         stack = _independent(model)
         columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
-        found.append(_sandwich(e, form, columns, model.tight))
+        found.append(_sandwich(e, kernel, columns, model.prior_precision))
     return found
 
 
-def _smooth(e: Explanation) -> Form | None:
+def _smooth(e: Explanation) -> Kernel | None:
     """Smooth discrepancy of an explanation; ``None`` without one, or if it is drawn anew in every pose or visit."""
-    return None if e.discrepancy.form is None or e.discrepancy.form.anew else e.discrepancy.form
+    return None if e.discrepancy.kernel is None or e.discrepancy.kernel.grouped else e.discrepancy.kernel
 
 
 def _independent(model: Model) -> Array:
@@ -95,10 +95,10 @@ def _independent(model: Model) -> Array:
     return whitened(model.linear, replace(model.whitening, smooth=None))[:, :-1]
 
 
-def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array:
+def _sandwich(e: Explanation, kernel: Kernel, columns: Array, tight: Array) -> Array:
     """Sandwich covariance (K, K) A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K), prior precisions Λ⁻¹ (K,)."""
     variance = e.best.noise**2
-    spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
+    spectrum = SmoothKernel.of(kernel.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
     alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
     inner = _posterior(columns.T @ columns / variance, tight)
     return _symmetric(inner @ (alike + np.diag(tight)) @ inner)
@@ -121,12 +121,12 @@ def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
     """Covariance (P, P), in units of the prior deviations, raised along its axes to the largest of the others."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
-    times = _times(variance, axes, said)
+    times = _inflation_factors(variance, axes, said)
     wide = np.where(variance < 1.0, 1.0 / (1.0 + (1.0 / variance - 1.0) / times), variance)
     return np.asarray((axes * wide) @ axes.T)
 
 
-def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
+def _inflation_factors(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
     """Variance inflation factors (P,), at least 1, along principal axes: largest of some covariances over variance."""
     most = np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0)
     return np.asarray(most / variance)
@@ -146,7 +146,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
         relative = campaign.relative_noise[rows, 0]
         quiet = relative <= np.median(relative)
         share = float(np.sqrt((relative[quiet] ** 2).mean()))
-    total = _size(left[quiet], told[quiet], ~e.outliers[rows[quiet]])
+    total = _conformal_size(left[quiet], told[quiet], ~e.outliers[rows[quiet]])
     noise = share * (campaign.noise_position or floor)
     beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
     values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
@@ -170,23 +170,23 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     The second is the sandwich; ``None`` without a smooth discrepancy.
     """
     e = fit.explanation
-    tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.tight])
-    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
+    tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.prior_precision])
+    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.prior_precision), dtype=bool)])
     own = np.ix_(moving, moving)
-    form = _smooth(e)
-    wider = None if form is None else _sandwich(e, form, _independent(model), tight)[own]
+    kernel = _smooth(e)
+    wider = None if kernel is None else _sandwich(e, kernel, _independent(model), tight)[own]
     return _posterior(model.whole[0][:-1, :-1] / e.best.noise**2, tight)[own], wider
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
     """Held-out residuals (H, 3), m, measurement frame, with their row numbers; residuals of all rows without folds."""
-    walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
-    if not walk.tests:
+    validation, base = CrossValidation.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
+    if not validation.tests:
         return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
-    return walk.residuals(range(len(model.spans)))[:, :3] @ base.T, walk.numbers
+    return validation.residuals(range(len(model.spans)))[:, :3] @ base.T, validation.numbers
 
 
-def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
+def _conformal_size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
     """Conformal residual size (3,) per axis: with the parameters' variance, 1.96 of it hold 95 % of the residuals.
 
     The ratio of the axes is that of their rms without outliers; outliers count in the 95 %.

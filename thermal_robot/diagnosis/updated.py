@@ -237,7 +237,7 @@ def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
         tuple(_without_columns(fit, e.linear.blocks[b], e.linear.blocks[b].effect) for b in further),
         e.linear.measures,
         Noise(fit.campaign.noise_position, fit.campaign.noise_orientation),
-        None if e.discrepancy.form is None else judge,
+        None if e.discrepancy.kernel is None else judge,
     )
     return choice, runners
 

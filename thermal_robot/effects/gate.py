@@ -42,7 +42,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     finite responses of the shape that :class:`Response` states. Raises :class:`EffectError` otherwise, or if the effect
     raises anything: the effect, the parameter, what was found and what was expected.
     """
-    if not _is_what_it_holds(effect):
+    if not _equal_by_fields(effect):
         return _kept(effect, _parameters(effect, observations), observations.robot)
     whole, asked = placed(effect), observations.parameters
     found = asked.pop(whole) if whole in asked else _parameters(whole, observations)
@@ -52,7 +52,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     return _kept(effect, found, observations.robot)
 
 
-def _is_what_it_holds(effect: Any) -> bool:
+def _equal_by_fields(effect: Any) -> bool:
     """Whether equality of effects compares all of their fields, so that they can be hashed."""
     try:
         hash(effect)

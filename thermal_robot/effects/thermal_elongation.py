@@ -47,7 +47,7 @@ class History:
         """
         t, u = np.array(self.times), np.array(self.temperatures)
         rate = np.diff(u) / np.diff(t)
-        behind = np.array(_behind(self, lag))
+        behind = np.array(_temperature_lag(self, lag))
         i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
         late = times >= t[-1]
         rate = np.append(rate, 0.0)[i]
@@ -59,7 +59,7 @@ class History:
 
 
 @lru_cache(maxsize=_FOLLOWED)
-def _behind(history: History, lag: float) -> tuple[float, ...]:
+def _temperature_lag(history: History, lag: float) -> tuple[float, ...]:
     """Temperature lag (K,) of a body behind the record at its points, K."""
     t, u = np.array(history.times), np.array(history.temperatures)
     behind = [0.0]

@@ -43,15 +43,15 @@ from thermal_robot.fleet.compare_joint import Change as Differs
 from thermal_robot.fleet.compare_joint import Joint, joint
 from thermal_robot.fleet.compare_sums import (
     Candidate,
-    Known,
+    ModelAsFit,
     Ranges,
     Sums,
     candidates,
+    identifiable,
     is_model,
     observed,
     poses,
     sums,
-    told,
 )
 from thermal_robot.fleet.comparison import Change, Comparison, Parameter, Predicted, Status
 from thermal_robot.fleet.comparison import Effect as Compared
@@ -122,15 +122,17 @@ def compare(
         raise CampaignError(
             CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more"
         )
-    found: list[Diagnosis | Known] = []
+    found: list[Diagnosis | ModelAsFit] = []
     for number, campaign in enumerate(campaigns, 1):
         told_on = _after(f"campaign {number} of {len(campaigns)}: ", progress)
         opened = _opened(campaign, effects)
-        if not isinstance(opened, (Diagnosis, Known)):
+        if not isinstance(opened, (Diagnosis, ModelAsFit)):
             opened = diagnose(opened, only=only, without=without, effects=effects, progress=told_on)
         found.append(opened)
     called = _called(found, names)
-    found = [replace(d, campaign=name) if isinstance(d, Known) else d for d, name in zip(found, called, strict=True)]
+    found = [
+        replace(d, campaign=name) if isinstance(d, ModelAsFit) else d for d, name in zip(found, called, strict=True)
+    ]
     fits = [_usable(diagnosis, name) for diagnosis, name in zip(found, called, strict=True)]
     _require_same_robot([one.model.robot for one in found], called)
     with threadpool_limits(1):
@@ -140,15 +142,15 @@ def compare(
 def _opened(given: Any, effects: Sequence[Effect]) -> Any:
     """Load the path of a model file; anything else is returned unchanged."""
     if is_model(given):
-        return Known.of(CorrectedModel.load(given, effects), Path(given).name)
-    return Known.of(given, given.robot.name) if isinstance(given, CorrectedModel) else given
+        return ModelAsFit.of(CorrectedModel.load(given, effects), Path(given).name)
+    return ModelAsFit.of(given, given.robot.name) if isinstance(given, CorrectedModel) else given
 
 
 def _after(stage: str, progress: Callable[[str], None]) -> Callable[[str], None]:
     return lambda words: progress(stage + words)
 
 
-def _called(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[str, ...]:
+def _called(found: Sequence[Diagnosis | ModelAsFit], names: Sequence[str]) -> tuple[str, ...]:
     """Return the unique name of each campaign."""
     require(f"{CALL}, names", names, (list, tuple), "a name for each campaign")
     if names and len(names) != len(found):
@@ -159,8 +161,8 @@ def _called(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[s
     return tuple(f"{name} ({k})" if own.count(name) > 1 else name for k, name in enumerate(own, 1))
 
 
-def _usable(diagnosis: Diagnosis | Known, name: str) -> Fit | Known:
-    if isinstance(diagnosis, Known):
+def _usable(diagnosis: Diagnosis | ModelAsFit, name: str) -> Fit | ModelAsFit:
+    if isinstance(diagnosis, ModelAsFit):
         return diagnosis
     if not diagnosis.usable:
         raise CampaignError(name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable")
@@ -170,19 +172,19 @@ def _usable(diagnosis: Diagnosis | Known, name: str) -> Fit | Known:
 
 
 def _compared(
-    found: Sequence[Diagnosis | Known],
-    fits: Sequence[Fit | Known],
+    found: Sequence[Diagnosis | ModelAsFit],
+    fits: Sequence[Fit | ModelAsFit],
     names: tuple[str, ...],
     progress: Callable[[str], None],
 ) -> Comparison:
     progress("what each campaign says")
     listed: Sequence[Candidate] = candidates(found, fits, names)
-    said = [sums(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
-    listed, said, not_told = _kept(listed, said)
+    statistics = [sums(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
+    listed, statistics, not_told = _kept(listed, statistics)
     progress("what is shared, what differs")
-    together = joint(listed, said)
+    together = joint(listed, statistics)
     progress("predictions")
-    effects = sorted(_effects(listed, together, said, names), key=lambda e: (_ORDER.index(e.status), e.name))
+    effects = sorted(_effects(listed, together, statistics, names), key=lambda e: (_ORDER.index(e.status), e.name))
     pairs = combinations(zip(found, names, strict=True), 2)
     return Comparison(
         campaigns=names,
@@ -198,29 +200,31 @@ def _compared(
     )
 
 
-def _kept(listed: Sequence[Candidate], said: Sequence[Sums]) -> tuple[Sequence[Candidate], list[Sums], tuple[str, ...]]:
+def _kept(
+    listed: Sequence[Candidate], statistics: Sequence[Sums]
+) -> tuple[Sequence[Candidate], list[Sums], tuple[str, ...]]:
     """Parameters that the campaigns determine, renumbered, and the names of the others."""
-    kept = told(said)
+    kept = identifiable(statistics)
     start, left, result = 0, [], []
     for item in listed:
-        own = [k for k in range(len(item.told)) if start + k in kept]
-        left += [f"{item.name}: {p.name}" for k, p in enumerate(item.told) if k not in own]
+        own = [k for k in range(len(item.compared)) if start + k in kept]
+        left += [f"{item.name}: {p.name}" for k, p in enumerate(item.compared) if k not in own]
         at = tuple(kept.index(start + k) for k in own)
-        result.append(replace(item, told=tuple(item.told[k] for k in own), sizes=item.sizes[own], at=at))
-        start += len(item.told)
-    return result, [one.some(kept) for one in said], tuple(left)
+        result.append(replace(item, compared=tuple(item.compared[k] for k in own), sizes=item.sizes[own], at=at))
+        start += len(item.compared)
+    return result, [one.some(kept) for one in statistics], tuple(left)
 
 
 def _effects(
-    listed: Sequence[Candidate], together: Joint, said: Sequence[Sums], names: Sequence[str]
+    listed: Sequence[Candidate], together: Joint, statistics: Sequence[Sums], names: Sequence[str]
 ) -> list[Compared]:
     """Comparison of each effect, given those at work or named."""
-    status = [_judged(n, item, together, said, names) for n, item in enumerate(listed)]
+    status = [_judged(n, item, together, statistics, names) for n, item in enumerate(listed)]
     result = []
     for number, item in enumerate(listed):
         beside = [i for i, (word, _) in zip(listed, status, strict=True) if word != "absent" or i is item]
         kept = sorted(k for i in beside for k in i.at)
-        some, own = [one.some(kept) for one in said], [kept.index(k) for k in item.at]
+        some, own = [one.some(kept) for one in statistics], [kept.index(k) for k in item.at]
         chi2, degrees, p_value = _equal(some, own) if own else (0.0, 0, 1.0)
         word, reason = status[number]
         result.append(
@@ -263,11 +267,11 @@ def _change(item: Candidate, some: Sequence[Differs], together: Joint, names: Se
         title=item.title,
         kind=kind,
         place=place,
-        parameters=tuple(item.told[k].name for k in own),
+        parameters=tuple(item.compared[k].name for k in own),
         groups=tuple(tuple(names[c] for c in group) for group in groups),
         since=names[min(groups[1])] if steps else "",
         values=tuple(single.tolist()),
-        unit=item.told[own[0]].unit if len(own) == 1 else "",
+        unit=item.compared[own[0]].unit if len(own) == 1 else "",
         chi2=sum(differs.chi2 for differs in some),
         degrees=sum(differs.degrees for differs in some),
         p_value=min(1.0, best.p_value * together.looked_at),
@@ -276,10 +280,10 @@ def _change(item: Candidate, some: Sequence[Differs], together: Joint, names: Se
 
 
 def _judged(
-    number: int, item: Candidate, found: Joint, said: Sequence[Sums], names: Sequence[str]
+    number: int, item: Candidate, found: Joint, statistics: Sequence[Sums], names: Sequence[str]
 ) -> tuple[Status, str]:
     """Status of an effect, and the reason where it is contradicted or not compared."""
-    tell = [c for c, one in enumerate(said) if one.tells(item.at)]
+    tell = [c for c, one in enumerate(statistics) if one.informs(item.at)]
     at_work = any(part.effect == number for part in found.parts)
     if not any(item.named) and (len(tell) < 2 or not at_work):
         return "absent", ""
@@ -292,7 +296,7 @@ def _judged(
         return "shared", ""
     whole, agreed, needed = 0.0, 0.0, set()
     for own in item.places.values():
-        metric = np.sum([said[c].some(own).matrix for c in tell], axis=0)
+        metric = np.sum([statistics[c].some(own).matrix for c in tell], axis=0)
         values = {c: found.values[c, own] for c in tell}
         size = {c: _length(value, metric) for c, value in values.items()}
         needed |= {c for c in tell if size[c] > 0.0}
@@ -329,17 +333,19 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _parameters(item: Candidate, said: Sequence[Sums], own: list[int], names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Estimates of an effect's parameters by each campaign alone; ``own`` are their indices in ``said``."""
-    values, stds = np.full((2, len(said), len(own)), np.nan)
-    for c, one in enumerate(said):
+def _parameters(
+    item: Candidate, statistics: Sequence[Sums], own: list[int], names: Sequence[str]
+) -> tuple[Parameter, ...]:
+    """Estimates of an effect's parameters by each campaign alone; ``own`` are their indices in ``statistics``."""
+    values, stds = np.full((2, len(statistics), len(own)), np.nan)
+    for c, one in enumerate(statistics):
         covariance, seen = one.inverse
         spread = np.sqrt(np.maximum(np.diag(covariance)[own], 0.0))
         known = (seen[own] > settings.SEEN) & (spread < settings.TOLD)
         values[c, known] = ((covariance @ one.vector)[own] * item.sizes)[known]
         stds[c, known] = (spread * item.sizes)[known]
     found = []
-    for k, p in enumerate(item.told):
+    for k, p in enumerate(item.compared):
         plain = [tuple(None if np.isnan(v) else float(v) for v in column[:, k]) for column in (values, stds)]
         tests = _differ(values[:, k], stds[:, k], names)
         found.append(Parameter(p.name, p.kind, p.place, p.unit, plain[0], plain[1], **tests))
@@ -366,12 +372,12 @@ def _differ(values: Array, stds: Array, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _equal(said: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]:
+def _equal(statistics: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, float]:
     """Chi-square test of equality of some parameters in all campaigns: χ², degrees of freedom, p-value."""
-    others = [k for k in range(len(said[0].vector)) if k not in set(own)]
+    others = [k for k in range(len(statistics[0].vector)) if k not in set(own)]
     chi2, degrees, longest = 0.0, 0, 0.0
     together, score = np.zeros((len(own),) * 2), np.zeros(len(own))
-    for one in said:
+    for one in statistics:
         inverse, _ = one.some(others).inverse
         cross = one.matrix[np.ix_(own, others)] @ inverse
         left = one.matrix[np.ix_(own, own)] - cross @ one.matrix[np.ix_(others, own)]
@@ -393,7 +399,7 @@ def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int
     return float((along**2 / value[seen]).sum()), int(seen.sum())
 
 
-def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) -> Predicted:
+def _predicted(a: Diagnosis | ModelAsFit, b: Diagnosis | ModelAsFit, names: tuple[str, str]) -> Predicted:
     """Cross-prediction by the models of two campaigns."""
     nothing = Predicted(names, 0, 0.0, 0.0, 0.0, True)
     if a.model.simulated or b.model.simulated:
@@ -404,7 +410,7 @@ def _predicted(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str
     joints = a.model.robot.joint_names
     common = _common(joints, *(spread.ranges for spread in spreads))
     low, high = np.array([common[name] for name in joints]).T
-    rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, Known)]
+    rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, ModelAsFit)]
     q = np.concatenate(rows) if rows else np.zeros((0, len(low)))
     if not rows and (low <= high).all():  # neither has its rows
         q = poses(a.model, common)
@@ -466,8 +472,8 @@ def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Ar
     turned = model.frames.base[:3, :3]
     moved = sensitivity(at, [effect for effect, _ in model.effects])
     moved = _left(np.einsum("ji,njk->nik", turned, moved), gauge)
-    told = ((moved @ spread.covariance) * moved).sum(axis=2)
-    return np.asarray(np.maximum(told, 0.0) + (turned.T**2) @ spread.beyond**2)
+    compared = ((moved @ spread.covariance) * moved).sum(axis=2)
+    return np.asarray(np.maximum(compared, 0.0) + (turned.T**2) @ spread.beyond**2)
 
 
 def _require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:

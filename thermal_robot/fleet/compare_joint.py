@@ -35,7 +35,7 @@ Choice = tuple[Place, tuple[int, ...], tuple[int, ...], bool, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class JointBlock:
     """One block of the joint fit: parameters of an effect, shared by all campaigns or different in some.
 
     ``effect`` is its number in the list of those compared, ``place`` kind and name, empty for all its places;
@@ -55,7 +55,7 @@ class Part:
     basis: Array
     positive: NDArray[np.bool_]
 
-    def excludes(self, other: Part) -> bool:
+    def excludes(self, other: JointBlock) -> bool:
         """Whether two parts exclude each other: settings of one effect that share parameters and campaigns.
 
         One parameter may differ in two sets of campaigns, but not both alone and with its place in the same campaign.
@@ -73,34 +73,34 @@ class Problem:
     ``total`` is y'y in the range of the columns, ``equations`` its dimension, summed over the campaigns.
     """
 
-    parts: tuple[Part, ...]
-    said: Sequence[Sums]
+    parts: tuple[JointBlock, ...]
+    statistics: Sequence[Sums]
     total: float
     equations: float
 
     @classmethod
-    def of(cls, listed: Sequence[Candidate], said: Sequence[Sums]) -> Problem:
+    def of(cls, listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Problem:
         """Joint problem of the effects that are compared."""
         parts = []
         for number, item in enumerate(listed):
-            for place, own, where, shared, prior in _choices(item, said) if item.at else ():
-                held = np.array([p.positive for k, p in zip(item.at, item.told, strict=True) if k in own]) & shared
-                value, axes = np.linalg.eigh(np.sum([said[c].some(own).matrix for c in where], axis=0))
+            for place, own, where, shared, prior in _choices(item, statistics) if item.at else ():
+                held = np.array([p.positive for k, p in zip(item.at, item.compared, strict=True) if k in own]) & shared
+                value, axes = np.linalg.eigh(np.sum([statistics[c].some(own).matrix for c in where], axis=0))
                 basis = np.eye(len(own)) if held.any() else axes[:, value > inference.INFORMATION_FLOOR]
                 spread = item.effect.size_spread if shared else settings.CHANGE_SPREAD
                 positive = (held @ basis).astype(bool)
                 if basis.shape[1]:
-                    parts.append(Part(number, place, own, where, shared, prior, spread, basis, positive))
-        total = sum(float(one.vector @ one.inverse[0] @ one.vector) for one in said)
-        equations = float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in said))
-        return cls(tuple(parts), said, total, equations)
+                    parts.append(JointBlock(number, place, own, where, shared, prior, spread, basis, positive))
+        total = sum(float(one.vector @ one.inverse[0] @ one.vector) for one in statistics)
+        equations = float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in statistics))
+        return cls(tuple(parts), statistics, total, equations)
 
-    def gram(self, parts: Sequence[Part]) -> Gram:
+    def gram(self, parts: Sequence[JointBlock]) -> Gram:
         """Return the normal equations of a selection of parts."""
         ends = np.cumsum([0, *(part.basis.shape[1] for part in parts)]).tolist()
         slices = tuple(slice(a, b) for a, b in pairwise(ends))
         matrix, vector = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
-        for c, one in enumerate(self.said):
+        for c, one in enumerate(self.statistics):
             across = np.zeros((len(one.vector), ends[-1]))
             for part, own in zip(parts, slices, strict=True):
                 if c in part.where:
@@ -113,7 +113,7 @@ class Problem:
         ranks = tuple(basis.shape[1] for basis in bases)
         return Gram(matrix, vector, self.total, slices, bases, positive, ranks, spreads, self.equations, settings.HELD)
 
-    def better(self, held: Sequence[Part], bases: Sequence[Combination], best: float) -> list[Part]:
+    def better(self, held: Sequence[JointBlock], bases: Sequence[Combination], best: float) -> list[JointBlock]:
         """Parts that improve a combination, added or in place of one of its blocks.
 
         All are scored to first order; for each place the first that improves the exact evidence is returned, in the
@@ -122,7 +122,7 @@ class Problem:
         them: the best combination, those as near, and those without one of its blocks. ``best`` is the log evidence of
         the best.
         """
-        found: dict[tuple[int, Place], Part] = {}
+        found: dict[tuple[int, Place], JointBlock] = {}
         alike = {(p.effect, p.parameters, p.where): p for p in self.parts if not p.shared}
         for part, base in self._promising(held, bases, best):
             if (part.effect, part.place) in found:
@@ -131,7 +131,7 @@ class Problem:
             own = self._beside(inside, base, part, best)
             if own <= best + inference.BETTER:
                 continue
-            others = tuple(c for c in range(len(self.said)) if c not in part.where)
+            others = tuple(c for c in range(len(self.statistics)) if c not in part.where)
             small = alike.get((part.effect, part.parameters, others), part)
             fewer = (len(others), others) < (len(part.where), part.where) and small not in held
             fewer = fewer and self._beside(inside, base, small, own) > own - inference.NEARLY
@@ -140,10 +140,10 @@ class Problem:
         return [part for part in self.parts if part in chosen]
 
     def _promising(
-        self, held: Sequence[Part], bases: Sequence[Combination], best: float
-    ) -> list[tuple[Part, Combination]]:
+        self, held: Sequence[JointBlock], bases: Sequence[Combination], best: float
+    ) -> list[tuple[JointBlock, Combination]]:
         """Parts with a first-order gain, the largest first, each with the combination that it joins."""
-        found: dict[Part, tuple[float, Combination]] = {}
+        found: dict[JointBlock, tuple[float, Combination]] = {}
         used = sorted({b for base in bases for b in base.blocks})
         others = [part for part in self.parts if part not in held]
         for first in range(0, len(others), settings.AT_ONCE):
@@ -159,7 +159,7 @@ class Problem:
                         found[part] = promised, base
         return [(part, base) for part, (_, base) in sorted(found.items(), key=lambda item: -item[1][0])]
 
-    def _beside(self, inside: Sequence[Part], base: Combination, part: Part, wanted: float) -> float:
+    def _beside(self, inside: Sequence[JointBlock], base: Combination, part: JointBlock, wanted: float) -> float:
         """Log evidence of a combination with one more part; stopped early where clearly below ``wanted``."""
         parts = [*inside, part]
         prior, start = sum(p.log_prior for p in parts), _numbered(base, base.blocks)
@@ -176,9 +176,9 @@ def _numbered(base: Combination, used: Sequence[int]) -> Combination:
     return replace(base, blocks=tuple(at[b] for b in base.blocks), scales={at[b]: base.scales[b] for b in base.blocks})
 
 
-def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
+def _choices(item: Candidate, statistics: Sequence[Sums]) -> Iterator[Choice]:
     """Yield the alternatives of an effect: shared, in all places and in each, then different by place and parameter."""
-    everywhere, some, places = tuple(range(len(said))), some_of(len(said)), item.places
+    everywhere, some, places = tuple(range(len(statistics))), campaign_subsets(len(statistics)), item.places
     among = len(places) if len(places) > 1 else 0
     shared: list[tuple[Place, tuple[int, ...]]] = [(("", ""), item.at)]
     shared += [(place, tuple(inside)) for place, inside in places.items() if among]
@@ -186,7 +186,7 @@ def _choices(item: Candidate, said: Sequence[Sums]) -> Iterator[Choice]:
         yield place, own, everywhere, True, log_odds() + float(np.log(share_of_places(min(k, 1), among)))
     odds = settings.CHANGED / (1.0 - settings.CHANGED)
     for place, own, share in _differing(item):
-        tells = [one.tells(own) for one in said]
+        tells = [one.informs(own) for one in statistics]
         prior = float(np.log(odds * share / len(some)))
         for where in some:
             # where campaigns on one side alone tell any of its parameters, nobody knows that it changed
@@ -206,7 +206,7 @@ def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]
             yield from ((place, (k,), each / (2.0 * len(inside))) for k in inside)
 
 
-def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
+def campaign_subsets(campaigns: int) -> tuple[tuple[int, ...], ...]:
     """Subsets of campaigns that may differ from the others: all, or with many campaigns singles and splits in order."""
     every = range(campaigns)
     if campaigns <= settings.FEW:
@@ -219,7 +219,7 @@ def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
 class Change:
     """Part that differs: chi-square, degrees of freedom, p-value, and posterior probability."""
 
-    part: Part
+    part: JointBlock
     chi2: float
     degrees: int
     p_value: float
@@ -235,16 +235,16 @@ class Joint:
     the places that were compared.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[JointBlock, ...]
     changes: tuple[Change, ...]
     values: Array
     probability: tuple[float, ...]
     looked_at: int
 
 
-def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
+def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
     """Bayesian model selection over campaigns: which parameters they share and which differ."""
-    problem = Problem.of(listed, said)
+    problem = Problem.of(listed, statistics)
     looked_at = len({(p.effect, p.parameters) for p in problem.parts if not p.shared})
     parts, search, best = _searched(problem, [any(item.named) for item in listed])
     best, changes = _standing(search, parts, best, looked_at)
@@ -253,13 +253,17 @@ def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
     def probability(blocks: set[int]) -> float:
         return min(float(sum(w for c, w in weighed if not blocks.isdisjoint(c.blocks))), 1.0)
 
-    def alike(part: Part) -> set[int]:
+    def alike(part: JointBlock) -> set[int]:
         own = set(part.parameters)
         return {k for k, p in enumerate(parts) if not p.shared and own & set(p.parameters)}
 
     changes = tuple(replace(c, probability=probability(alike(c.part))) for c in changes)
     of_effects = ({k for k, p in enumerate(parts) if p.effect == e} for e in range(len(listed)))
-    at_work, values, start = tuple(parts[b] for b in best.blocks), np.zeros((len(said), len(said[0].vector))), 0
+    at_work, values, start = (
+        tuple(parts[b] for b in best.blocks),
+        np.zeros((len(statistics), len(statistics[0].vector))),
+        0,
+    )
     for part in at_work:
         end = start + part.basis.shape[1]
         values[np.ix_(part.where, part.parameters)] += part.basis @ best.values[start:end]
@@ -267,7 +271,7 @@ def joint(listed: Sequence[Candidate], said: Sequence[Sums]) -> Joint:
     return Joint(at_work, changes, values, tuple(map(probability, of_effects)), looked_at)
 
 
-def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Search, Combination]:
+def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[JointBlock], Search, Combination]:
     """Parts that were evaluated together, the search over them, and the best combination.
 
     All parts, where they are few. Otherwise the shared ones first; others join while their first-order gain is
@@ -299,7 +303,7 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[Part], Sear
 
 
 def _standing(
-    search: Search, parts: Sequence[Part], best: Combination, looked_at: int
+    search: Search, parts: Sequence[JointBlock], best: Combination, looked_at: int
 ) -> tuple[Combination, tuple[Change, ...]]:
     """Backward elimination of differences that are insignificant after correction for the number of places."""
     while True:
@@ -313,7 +317,7 @@ def _standing(
         best = max((search.evaluate(blocks) for blocks in tried), key=lambda c: c.log_evidence)
 
 
-def _change(search: Search, parts: Sequence[Part], best: Combination, number: int) -> Change:
+def _change(search: Search, parts: Sequence[JointBlock], best: Combination, number: int) -> Change:
     """Score test of a differing part, given all others of the best explanation, without its prior."""
     start = sum(parts[b].basis.shape[1] for b in best.blocks[: best.blocks.index(number)])
     own = slice(start, start + parts[number].basis.shape[1])

@@ -31,7 +31,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.uncertainty import exceeding
+from thermal_robot.diagnosis.uncertainty import variance_inflation
 from thermal_robot.effects import Effect, Parameter, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
@@ -53,7 +53,7 @@ Ranges = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class ModelAsFit:
     """Model file in place of a diagnosis and its fit, named ``campaign``.
 
     ``corrected`` are observations of the corrected model at poses within the ranges that were measured, for the rows
@@ -68,7 +68,7 @@ class Known:
     samples: int = 0
 
     @classmethod
-    def of(cls, model: CorrectedModel, name: str) -> Known:
+    def of(cls, model: CorrectedModel, name: str) -> ModelAsFit:
         """Wrap a model under a name.
 
         Raises
@@ -141,7 +141,7 @@ def observed(model: CorrectedModel, q: Array, ranges: Ranges) -> Observations:
 class Candidate:
     """An effect that is compared, in all its places and in one setting.
 
-    ``told`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
+    ``compared`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
     among all that are compared. Of each campaign ``parameters`` are the same with their responses there, empty where it
     lacks what they need; ``named``: whether its diagnosis names the effect. A discovered law has its campaign's name
     appended to its name and title.
@@ -150,7 +150,7 @@ class Candidate:
     name: str
     title: str
     effect: Effect
-    told: tuple[Parameter, ...]
+    compared: tuple[Parameter, ...]
     sizes: Array
     parameters: tuple[tuple[Parameter, ...], ...]
     named: tuple[bool, ...]
@@ -160,13 +160,13 @@ class Candidate:
     def places(self) -> dict[tuple[str, str], list[int]]:
         """Indices of the compared parameters by kind and name of their place."""
         found: dict[tuple[str, str], list[int]] = {}
-        for number, parameter in zip(self.at, self.told, strict=True):
+        for number, parameter in zip(self.at, self.compared, strict=True):
             found.setdefault((parameter.kind, parameter.place), []).append(number)
         return found
 
 
 def candidates(
-    found: Sequence[Diagnosis | Known], fits: Sequence[Fit | Known], names: Sequence[str]
+    found: Sequence[Diagnosis | ModelAsFit], fits: Sequence[Fit | ModelAsFit], names: Sequence[str]
 ) -> tuple[Candidate, ...]:
     """Effects to compare, those that may be re-zeroed between campaigns first.
 
@@ -184,14 +184,14 @@ def candidates(
         known = next((c for c, own in enumerate(parameters) if own), None)
         if known is None or (law and not any(named)):
             continue
-        told = tuple(replace(p, responses=()) for p in parameters[known])
-        kept = tuple(own if [p.name for p in own] == [p.name for p in told] else () for own in parameters)
+        compared = tuple(replace(p, responses=()) for p in parameters[known])
+        kept = tuple(own if [p.name for p in own] == [p.name for p in compared] else () for own in parameters)
         title = f"{called(effect)} ({key.split(' of ')[1]})" if isinstance(effect, Discovered) else effect.title
-        listed.append(Candidate(key, title, effect, told, _sizes(effect, fits[known], told), kept, named))
+        listed.append(Candidate(key, title, effect, compared, _sizes(effect, fits[known], compared), kept, named))
     return tuple(sorted(listed, key=lambda c: (isinstance(c.effect, Discovered), not c.effect.told_inside, c.name)))
 
 
-def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
+def _settings(fits: Sequence[Fit | ModelAsFit], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
     """Yield each effect once, in all its places and in the setting of the most certain fit.
 
     A setting that reads more columns, such as a clock, takes precedence.
@@ -213,7 +213,7 @@ def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tup
         yield from ((f"{e.name} of {campaign}", e) for e, _ in fit.effects if isinstance(e, Discovered))
 
 
-def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
+def _parameters(effect: Effect, fit: Fit | ModelAsFit) -> tuple[Parameter, ...]:
     """Parameters of an effect in a campaign, as reported; empty where the campaign lacks its columns."""
     observations = fit.corrected
     try:
@@ -227,16 +227,16 @@ def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
         return ()  # a law of what only another campaign recorded
 
 
-def _there(effect: Effect, fit: Fit | Known) -> Effect:
+def _there(effect: Effect, fit: Fit | ModelAsFit) -> Effect:
     """Effect as it is in a campaign; a model has no record to take over."""
     recorded = isinstance(fit, Fit) or isinstance(effect, OfPosition)  # these have nothing of it but their range
     return gate.elsewhere(effect, fit.corrected) if recorded else effect
 
 
-def _sizes(effect: Effect, fit: Fit | Known, told: Sequence[Parameter]) -> Array:
+def _sizes(effect: Effect, fit: Fit | ModelAsFit, compared: Sequence[Parameter]) -> Array:
     own = block(fit.corrected, _there(effect, fit))
-    alike = [p.name for p in own.bare] == [p.name for p in told]
-    return own.sizes if alike else np.array([p.size for p in told])
+    alike = [p.name for p in own.bare] == [p.name for p in compared]
+    return own.sizes if alike else np.array([p.size for p in compared])
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,34 +257,36 @@ class Sums:
         """Return the normal equations with the other parameters fixed at zero."""
         return Sums(self.matrix[np.ix_(kept, kept)], self.vector[list(kept)])
 
-    def tells(self, own: Sequence[int]) -> bool:
+    def informs(self, own: Sequence[int]) -> bool:
         """Whether it contains information on some parameters."""
         return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > inference.INFORMATION_FLOOR)
 
 
-def sums(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate], number: int) -> Sums:
+def sums(found: Diagnosis | ModelAsFit, fit: Fit | ModelAsFit, listed: Sequence[Candidate], number: int) -> Sums:
     """Return the normal equations of campaign ``number`` in the parameters of the listed effects."""
     columns = [_columns(fit.corrected, item, number) for item in listed]
-    if isinstance(found, Known) or isinstance(fit, Known):
-        assert isinstance(fit, Known)
+    if isinstance(found, ModelAsFit) or isinstance(fit, ModelAsFit):
+        assert isinstance(fit, ModelAsFit)
         return _of_model(fit, listed, number, [equations_of(own) for own in columns])
     at, e = fit.corrected, fit.explanation
     gap = at.gap + sum((block(at, effect).columns @ values for effect, values in fit.effects), np.zeros_like(at.gap))
-    blocks = (Block(i.effect, i.told, own, np.ones(len(i.told))) for i, own in zip(listed, columns, strict=True))
+    blocks = (
+        Block(i.effect, i.compared, own, np.ones(len(i.compared))) for i, own in zip(listed, columns, strict=True)
+    )
     linear = Linear(gap, frame_columns(at)[0], tuple(blocks))
     stack = whitened(linear, e.whitening)
     matrix, vector = _projected(stack.T @ stack / e.best.noise**2, linear.frames.shape[2])
     left = found.unexplained if found.remaining is None else found.remaining
     value, axes = np.linalg.eigh(matrix)
     value = np.maximum(value, 0.0)
-    times = exceeding(fit, linear, value, axes) if left.flagged else np.ones(len(value))
+    times = variance_inflation(fit, linear, value, axes) if left.flagged else np.ones(len(value))
     return Sums((axes * (value / times)) @ axes.T, axes @ ((axes.T @ vector) / times))
 
 
 def _columns(at: Observations, item: Candidate, number: int) -> Array:
     """Columns (N, m, P) of an effect in expected sizes; zeros where the campaign lacks its columns."""
     if not item.parameters[number]:
-        return np.zeros((*moved_by(at, ()).shape[:2], len(item.told)))
+        return np.zeros((*moved_by(at, ()).shape[:2], len(item.compared)))
     return moved_by(at, item.parameters[number]) * item.sizes
 
 
@@ -303,9 +305,9 @@ def _projected(full: Array, flat: int) -> tuple[Array, Array]:
     return (axes[:, seen] * value[seen]) @ axes[:, seen].T, axes[:, seen] @ (axes[:, seen].T @ vector)
 
 
-def told(said: Sequence[Sums]) -> list[int]:
+def identifiable(statistics: Sequence[Sums]) -> list[int]:
     """Return the indices of the parameters that the campaigns together determine, without aliases of earlier ones."""
-    together = np.sum([one.matrix for one in said], axis=0)
+    together = np.sum([one.matrix for one in statistics], axis=0)
     value, axes = np.linalg.eigh(together)
     root = (axes * np.sqrt(np.maximum(value, 0.0))).T
     length = np.sqrt(np.maximum(np.diag(together), 0.0))
@@ -313,7 +315,7 @@ def told(said: Sequence[Sums]) -> list[int]:
     return distinct(root / np.where(seen, length, 1.0), seen, settings.DISTINCT)
 
 
-def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: Sequence[Array]) -> Sums:
+def _of_model(known: ModelAsFit, listed: Sequence[Candidate], number: int, columns: Sequence[Array]) -> Sums:
     """Return the normal equations from a model file's covariance, with the (3N, P) columns of each listed effect."""
     width = sum(own.shape[1] for own in columns)
     prior, start = np.asarray(known.spread.prior), 0
@@ -323,19 +325,19 @@ def _of_model(known: Known, listed: Sequence[Candidate], number: int, columns: S
         which = range(start, start + len(values))
         start += len(values)
         own = equations_of(block(known.corrected, effect).columns) * prior[which]
-        told = _expressed(known, effect, own, listed, columns, number)
-        if told is not None:
+        compared = _expressed(known, effect, own, listed, columns, number)
+        if compared is not None:
             kept += which
-            across.append(told)
+            across.append(compared)
     if not kept:
         return Sums(np.zeros((width, width)), np.zeros(width))
-    information, said = _without_prior(known, np.array(kept), prior)
+    information, statistics = _without_prior(known, np.array(kept), prior)
     back = np.linalg.pinv(np.column_stack(across), rcond=settings.SAME_PLACE)
-    return Sums(back.T @ information @ back, back.T @ said)
+    return Sums(back.T @ information @ back, back.T @ statistics)
 
 
 def _expressed(
-    known: Known, effect: Effect, own: Array, listed: Sequence[Candidate], columns: Sequence[Array], number: int
+    known: ModelAsFit, effect: Effect, own: Array, listed: Sequence[Candidate], columns: Sequence[Array], number: int
 ) -> Array | None:
     """Return listed parameters (P, K) equivalent to one prior deviation of each of an effect's K; ``None`` without any.
 
@@ -355,13 +357,13 @@ def _expressed(
         found[seen] = np.linalg.lstsq(every[:, seen] / length[seen], own, rcond=None)[0] / length[seen, None]
         left = np.linalg.norm(own - every @ found, axis=0)
         if (left <= settings.DISTINCT * np.linalg.norm(own, axis=0)).all():
-            told = np.zeros((len(owner), own.shape[1]))
-            told[used] = found[: used.sum()]
-            return told
+            compared = np.zeros((len(owner), own.shape[1]))
+            compared[used] = found[: used.sum()]
+            return compared
     return None
 
 
-def _without_prior(known: Known, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
+def _without_prior(known: ModelAsFit, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
     """Information G and b of some of the model's parameters, in prior deviations, with the prior removed."""
     covariance = known.spread.covariance if known.spread.wider is None else known.spread.wider
     flat = len(covariance) - len(prior)

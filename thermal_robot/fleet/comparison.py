@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.files import write_text
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.fleet.compare_sums import Known
+    from thermal_robot.fleet.compare_sums import ModelAsFit
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
@@ -199,7 +199,7 @@ class Comparison:
     predicted: tuple[Predicted, ...]
     not_told: tuple[str, ...] = ()
     looked_at: int = 0
-    diagnoses: tuple[Diagnosis | Known, ...] = field(default=(), compare=False)
+    diagnoses: tuple[Diagnosis | ModelAsFit, ...] = field(default=(), compare=False)
 
     @property
     def verdict(self) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ class Comparison:
     @property
     def summary(self) -> str:
         """Result in one plain sentence."""
-        return str(registered().comparison_headline(self._plain()))
+        return str(registered_renderer().comparison_headline(self._plain()))
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -246,7 +246,7 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """JSON object of the format ``thermal-robot/comparison/1``, SI."""
         plain = self._plain()
-        return {**plain, "summary": registered().comparison_headline(plain)}
+        return {**plain, "summary": registered_renderer().comparison_headline(plain)}
 
     def _plain(self) -> dict[str, Any]:
         told = zip(self.campaigns, self.samples, self.diagnoses, strict=True)
@@ -273,7 +273,7 @@ class Comparison:
         return f"Comparison({', '.join(self.campaigns)}: {changed} changed)"
 
     def __str__(self) -> str:
-        return str(registered().comparison_text(self.to_dict()))
+        return str(registered_renderer().comparison_text(self.to_dict()))
 
     def _repr_html_(self) -> str:
-        return str(registered().comparison_fragment(self.to_dict()))
+        return str(registered_renderer().comparison_fragment(self.to_dict()))

@@ -41,7 +41,7 @@ from thermal_robot.fleet import settings
 from thermal_robot.fleet.listed import Listed, campaigns
 from thermal_robot.fleet.rows import CAMPAIGN, Plain, failed, needed, rows_of, write_rows
 from thermal_robot.fleet.summary import Summary, summarise
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,7 +87,7 @@ class Fleet:
         return pd.read_parquet(self.table, columns=None if columns is None else list(columns))
 
     def __str__(self) -> str:
-        return str(registered().fleet_text(self.summary.to_dict()))
+        return str(registered_renderer().fleet_text(self.summary.to_dict()))
 
     def __repr__(self) -> str:
         s = self.summary
@@ -188,9 +188,9 @@ def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple
             warnings.simplefilter("ignore")  # what is worth a word stands in the rows
             return rows_of(diagnose(folder, only=only or None, without=without)), False
     except ThermalRobotError as error:
-        return failed(_without_place(str(error), folder)), False
+        return failed(_without_path(str(error), folder)), False
     except Exception as error:
-        return failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
+        return failed(f"the program failed: {type(error).__name__}: {_without_path(str(error), folder)}"), True
 
 
 def _diagnosed(
@@ -213,7 +213,7 @@ def _diagnosed(
                 key = fingerprint(folder, options)
             except (ThermalRobotError, OSError) as error:
                 key = f"unread {number}"
-                done.put(key, failed(_without_place(str(error), folder)), again=True)
+                done.put(key, failed(_without_path(str(error), folder)), again=True)
             done.name(number, key)
             if key in under_way or key in done:
                 progress("campaigns", next(finished), total)
@@ -265,7 +265,7 @@ def _whole(found: Listed, done: Done) -> Iterator[Plain]:
         yield from ({**named, **row} for row in rows)
 
 
-def _without_place(message: str, folder: str) -> str:
+def _without_path(message: str, folder: str) -> str:
     """Message without the absolute path of its folder."""
     place = folder if not is_file(Path(folder)) else os.path.dirname(folder)
     return " ".join(message.replace(place + os.sep, "").split())

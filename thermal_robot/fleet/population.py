@@ -46,7 +46,7 @@ class Population:
         return float(2.0 * ndtr(-abs(self.means[0]) / self.deviations[0]))
 
     @property
-    def alike(self) -> float:
+    def p_equal_means(self) -> float:
         """P-value of equal group means: F test."""
         groups, robots = len(self.means), int(self.counts.sum())
         weight = self.deviations**-2.0

@@ -340,14 +340,14 @@ def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, .
     return tuple(g for *_, g in kept[: settings.MOST_LISTED])
 
 
-def _told(table: Path, effect: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def _parameter_values(table: Path, effect: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield name and unit of each parameter of one effect, with values and deviations by campaign."""
     pa, compute = needed("pyarrow"), needed("pyarrow.compute")
     of_effect = [("effect", "==", effect)]
     read = needed("pyarrow.parquet").read_table(table, columns=[CAMPAIGN, "free"], filters=of_effect).combine_chunks()
-    told = pa.Table.from_struct_array(compute.list_flatten(read["free"])).to_pandas()
-    told[CAMPAIGN] = read[CAMPAIGN].take(compute.list_parent_indices(read["free"])).to_pandas()
-    for (name, unit), rows in told.groupby(["name", "unit"], sort=False):
+    free = pa.Table.from_struct_array(compute.list_flatten(read["free"])).to_pandas()
+    free[CAMPAIGN] = read[CAMPAIGN].take(compute.list_parent_indices(read["free"])).to_pandas()
+    for (name, unit), rows in free.groupby(["name", "unit"], sort=False):
         yield name, unit, rows
 
 
@@ -367,14 +367,14 @@ def _shared(
     together: list[Shared] = []
     apart: list[Apart] = []
     for k, effect in enumerate(effects, 1):
-        for name, unit, rows in _told(table, effect):
+        for name, unit, rows in _parameter_values(table, effect):
             owners = robot_of[rows[CAMPAIGN]].to_numpy()
             who, values, deviations = combined(rows["value"].to_numpy(), rows["std"].to_numpy(), owners)
             if len(who) >= settings.FEWEST_ROBOTS:
                 found, usual, unlike = _compared((effect, name, unit), values, deviations, who, labels)
                 together.append(found)
-                told = zip(names[who], values, deviations, usual, unlike, strict=True)
-                some = ((robot, *map(float, rest)) for robot, *rest in told if rest[-1] >= settings.NAMED)
+                per_robot = zip(names[who], values, deviations, usual, unlike, strict=True)
+                some = ((robot, *map(float, rest)) for robot, *rest in per_robot if rest[-1] >= settings.NAMED)
                 apart += [Apart(robot, effect, name, unit, *rest) for robot, *rest in some]
         progress("effects compared", k, len(effects))
     tests = len(together) * (1 + len(labels))
@@ -406,11 +406,13 @@ def _compared(
             splits.append((label, population(values[kept], deviations[kept], own), kept, own, names[groups]))
     if not splits:
         return found, usual, unlike
-    label, by, kept, own, names = min(splits, key=lambda split: split[1].alike)
-    told = zip(names, by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
-    groups_told = sorted((Group(*group) for group in told), key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group))
-    found = replace(found, label=label, p_label=by.alike, groups=tuple(groups_told[: settings.MOST_GROUPS]))
-    if by.alike < settings.STRIKING:
+    label, by, kept, own, names = min(splits, key=lambda split: split[1].p_equal_means)
+    per_group = zip(names, by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
+    groups_told = sorted(
+        (Group(*group) for group in per_group), key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group)
+    )
+    found = replace(found, label=label, p_label=by.p_equal_means, groups=tuple(groups_told[: settings.MOST_GROUPS]))
+    if by.p_equal_means < settings.STRIKING:
         found = replace(found, spread=by.spread, spread_std=by.spread_std)
         unlike = np.where(kept, 0.0, unlike)
         usual[kept], unlike[kept] = by.means[own], by.apart

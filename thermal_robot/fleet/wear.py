@@ -17,7 +17,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis import Diagnosis
-from thermal_robot.diagnosis.data_checks import as_counted, usable
+from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
 from thermal_robot.effects import RANDOM, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
@@ -134,7 +134,7 @@ def of_fits(
     series = Series(whole.matrices, whole.vectors, times, np.ones(len(whole.keys), dtype=bool))
     series = replace(series, followed=comparable(whole, series))
     found = explanations(series)
-    worn = told(whole, series, found, moments[0] if moments else None, limits or {}, false_alarm)
+    worn = results(whole, series, found, moments[0] if moments else None, limits or {}, false_alarm)
     dates = [each.isoformat(timespec="minutes").removesuffix("T00:00") for each in moments] or [""] * len(fits)
     visits = tuple(
         Visit(fit.campaign.name, date, float(time), int((~fit.explanation.outliers).sum()))
@@ -188,7 +188,7 @@ def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
         return given.fit
     if given.position is None or not given.samples:
         raise CampaignError(given.name, "nothing was measured", expected="a campaign with measured positions")
-    found = fit(as_counted(usable(given)[0]), choose(chosen, (), ()))
+    found = fit(with_corrected_signs(usable(given)[0]), choose(chosen, (), ()))
     if another_motion(found) is not None:
         expected = "a campaign that `thermal-robot diagnose` can use; it says what is wrong"
         raise CampaignError(given.name, "robot and table do not describe the same motion", expected=expected)
@@ -268,7 +268,7 @@ def comparable(problem: Problem, series: Series) -> NDArray[np.bool_]:
     return np.asarray((problem.has.sum(axis=0) >= 2) & (known * settings.COMPARABLE**2 > 1.0))
 
 
-def told(
+def results(
     problem: Problem,
     series: Series,
     found: Mapping[Moves, float],
@@ -314,9 +314,9 @@ def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> t
     bare, followed, size = problem.parameters[number], bool(series.followed[number]), problem.parameters[number].size
     state, free = State.of(series, moves), State.of(series, moves, free=number)
     path = state.path(number)
-    line, covariance = state.told(np.stack([path[-1], path[-1] - path[0]]))
+    line, covariance = state.combinations(np.stack([path[-1], path[-1] - path[0]]))
     line, covariance = size * line, size**2 * covariance
-    values, spread = free.told(free.path(number))
+    values, spread = free.combinations(free.path(number))
     stds, seen = np.sqrt(np.maximum(np.diag(spread), 0.0)), problem.has[:, number] & followed
     reason = ABSENT if problem.has[:, number].sum() < 2 else HIDDEN
     worn = Worn(

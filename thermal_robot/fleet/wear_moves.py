@@ -294,7 +294,7 @@ class State:
         along[:, len(self.series.followed) :] = np.where(owner == parameter, self.series.shapes[shape].T, 0.0)
         return along
 
-    def told(self, along: Array) -> tuple[Array, Array]:
+    def combinations(self, along: Array) -> tuple[Array, Array]:
         """Values (R,) of linear combinations (R, P + D), and their covariance (R, R)."""
         return along @ self.mean, along @ self.covariance @ along.T
 

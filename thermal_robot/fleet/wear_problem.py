@@ -91,13 +91,16 @@ def problem(fits: Sequence[Fit]) -> Problem:
         If the unknown frames of one cannot be fitted.
     """
     shared = _shared([effect for fit in fits for effect, _ in fit.effects], fits[0].nominal)
-    tellable = [dict(_told([gate.elsewhere(effect, fit.nominal) for effect in shared], fit.nominal)) for fit in fits]
+    reported = [
+        dict(_reported_parameters([gate.elsewhere(effect, fit.nominal) for effect in shared], fit.nominal))
+        for fit in fits
+    ]
     listed: dict[Key, Parameter] = {}
-    for one in tellable:
+    for one in reported:
         listed |= {key: parameter for key, parameter in one.items() if key not in listed}
     keys, bare = tuple(listed), tuple(replace(parameter, responses=()) for parameter in listed.values())
     sizes, values = np.array([parameter.size for parameter in bare]), np.zeros(len(keys))
-    visits = [_Visit.of(fit, keys, one) for fit, one in zip(fits, tellable, strict=True)]
+    visits = [_Visit.of(fit, keys, one) for fit, one in zip(fits, reported, strict=True)]
     for _ in range(settings.LINEARISATIONS):
         parts = [visit.products(sizes, values) for visit in visits]
         matrices, vectors = (np.array(each) for each in zip(*parts, strict=True))
@@ -112,7 +115,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
 
 def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect, ...]:
     """Effects of all campaigns in their most frequent settings, in all places named."""
-    kept = [effect for effect in named if not _begins_anew(effect, observations)]
+    kept = [effect for effect in named if not _independent_per_campaign(effect, observations)]
     found = [e for e in library().values() if e.told_inside and not gate.missing(e, observations)]
     always = {effect.name for effect in found}
     for name in dict.fromkeys(e.name for e in kept if e.name not in always):
@@ -124,7 +127,7 @@ def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect
     return tuple(found)
 
 
-def _begins_anew(effect: Effect, observations: Observations) -> bool:
+def _independent_per_campaign(effect: Effect, observations: Observations) -> bool:
     """Whether an effect is independent in each campaign."""
     if effect.name in FRAMES or effect.name.startswith(PREFIX):
         return True
@@ -137,15 +140,15 @@ def _begins_anew(effect: Effect, observations: Observations) -> bool:
 
 
 @dataclass(frozen=True)
-class _AsTold(Effect):
+class _GivenParameters(Effect):
     """Pseudo-effect of given parameters and responses."""
 
     name: ClassVar[str] = "as told"
-    told: tuple[Parameter, ...] = ()
+    given: tuple[Parameter, ...] = ()
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the given parameters."""
-        return self.told
+        return self.given
 
 
 @dataclass(eq=False)
@@ -165,25 +168,25 @@ class _Visit:
     linear: Linear
 
     @classmethod
-    def of(cls, fit: Fit, keys: Sequence[Key], told: dict[Key, Parameter]) -> _Visit:
+    def of(cls, fit: Fit, keys: Sequence[Key], given: dict[Key, Parameter]) -> _Visit:
         """Responses of the common parameters in a campaign's rows; none for an effect whose columns it lacks."""
-        fresh = [effect for effect, _ in fit.effects if _begins_anew(effect, fit.nominal)]
+        fresh = [effect for effect, _ in fit.effects if _independent_per_campaign(effect, fit.nominal)]
         own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
         white, linear = fit.explanation.whitening, fit.explanation.linear
         white = replace(white, noise=white.noise * fit.explanation.best.noise)
-        common = tuple(told[key] for key in keys if key in told)
-        return cls(fit, np.array([key in told for key in keys]), common, own, white, fit.nominal.frames, linear)
+        common = tuple(given[key] for key in keys if key in given)
+        return cls(fit, np.array([key in given for key in keys]), common, own, white, fit.nominal.frames, linear)
 
     def products(self, sizes: Array, values: Array) -> tuple[Array, Array]:
         """Return the normal equations (P, P) and (P,) about values of the common parameters."""
         here, campaign = self.here, self.fit.campaign
         nominal = observe(campaign, self.frames)
-        change, instrument = displacement(nominal, [(_AsTold(told=self.common), values[here])])
+        change, instrument = displacement(nominal, [(_GivenParameters(given=self.common), values[here])])
         seen = observe(campaign, self.frames, displacement=change, instrument=instrument)
         columns = moved_by(seen, (*self.common, *self.own))
         gap = seen.gap + columns[:, :, : here.sum()] @ values[here]
         scale = np.concatenate([sizes[here], [p.size for p in self.own]])
-        self.linear = Linear(gap, frame_columns(seen)[0], (Block(_AsTold(), (), columns, scale),))
+        self.linear = Linear(gap, frame_columns(seen)[0], (Block(_GivenParameters(), (), columns, scale),))
         stack = whitened(self.linear, self.whitening)
         matrix, vector = np.zeros((len(here), len(here))), np.zeros(len(here))
         flat = self.linear.frames.shape[2]
@@ -198,7 +201,7 @@ class _Visit:
             self.frames = moved(self.frames, step, frame_columns(self.fit.nominal)[1])
 
 
-def _told(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:
+def _reported_parameters(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:
     """Yield the reported parameters that these rows determine, contained effects taken out of larger ones."""
     names = {effect.name for effect in effects if effect.told_inside}
     for effect in effects:

@@ -51,7 +51,7 @@ class Columns:
     positive: Mask
 
     @cached_property
-    def sided(self) -> NDArray[np.int64]:
+    def constrained(self) -> NDArray[np.int64]:
         """Indices of the columns with a non-negativity constraint."""
         return np.flatnonzero(self.positive)
 
@@ -98,16 +98,20 @@ class Posterior:
         else:
             values, covariance, log_det, pull, _ = _solved(columns, scale, variance, free)
             values = np.where(columns.positive, np.maximum(values, 0.0), values)
-        tight = scale[columns.owner] ** -2.0
+        prior_precision = scale[columns.owner] ** -2.0
         kept = np.flatnonzero(free)
         every, spread = len(kept) == size, np.zeros(size)
         spread[kept] = covariance.diagonal()
         effective = _by_block(
-            columns, 1.0 - spread * tight if every else np.where(free, 1.0 - spread * tight, 0.0), count
+            columns,
+            1.0 - spread * prior_precision if every else np.where(free, 1.0 - spread * prior_precision, 0.0),
+            count,
         )
-        first, second, worth = values, values**2 + spread, 0.0
-        if len(columns.sided):
-            first, second, worth = _sides(columns, values, spread, covariance, kept, pull, tight, variance)
+        first, second, log_mass = values, values**2 + spread, 0.0
+        if len(columns.constrained):
+            first, second, log_mass = _truncated(
+                columns, values, spread, covariance, kept, pull, prior_precision, variance
+            )
         whole = covariance
         if not every:
             whole = np.diag(second)
@@ -116,37 +120,37 @@ class Posterior:
             values,
             whole,
             free,
-            worth - 0.5 * log_det,
+            log_mass - 0.5 * log_det,
             effective,
-            _by_block(columns, first**2 * tight, count),
-            _by_block(columns, 1.0 - (second - first**2) * tight, count),
+            _by_block(columns, first**2 * prior_precision, count),
+            _by_block(columns, 1.0 - (second - first**2) * prior_precision, count),
         )
 
-    def bend(self, owner: NDArray[np.int64], scale: Array, tight: Array) -> Array:
+    def hessian(self, owner: NDArray[np.int64], scale: Array, prior_precision: Array) -> Array:
         """Negative Hessian (B, B) of the log integrand in ln λ.
 
-        With m and C mode and covariance of the values, a prior N(0, P⁻¹) of ln λ (P is ``tight``) and s held, it is
-        H_bc = δ_bc 2 (m_bᵀm_b + tr C_bb)/λ_b² + P_bc − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
+        With m and C mode and covariance of the values, a prior N(0, P⁻¹) of ln λ (P is ``prior_precision``) and s held,
+        it is H_bc = δ_bc 2 (m_bᵀm_b + tr C_bb)/λ_b² + P_bc − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
         """
         each = np.zeros((len(scale), len(owner)))
         each[owner, np.arange(len(owner))] = scale[owner] ** -2.0
         moment = np.multiply.outer(2.0 * self.values, self.values)
         moment += self.covariance
         moment *= self.covariance
-        bend = -2.0 * (each @ moment @ each.T)
-        bend += tight
-        bend.ravel()[:: len(scale) + 1] += 2.0 * (each @ (self.values**2 + self.covariance.diagonal()))
-        return np.asarray(bend)
+        hessian = -2.0 * (each @ moment @ each.T)
+        hessian += prior_precision
+        hessian.ravel()[:: len(scale) + 1] += 2.0 * (each @ (self.values**2 + self.covariance.diagonal()))
+        return np.asarray(hessian)
 
-    def step(self, bend: Array, scale: Array, tight: Array) -> tuple[Array, float]:
+    def step(self, hessian: Array, scale: Array, prior_precision: Array) -> tuple[Array, float]:
         """Newton step of ln λ, each component at most one, and the gain that a quadratic model predicts.
 
         Where the problem is not convex, each scale steps separately.
         """
-        slope = self.fitted - self.determined - tight @ np.log(scale)
-        _, step, failed = dposv(bend, slope) if len(scale) else (None, slope, 0)
+        slope = self.fitted - self.determined - prior_precision @ np.log(scale)
+        _, step, failed = dposv(hessian, slope) if len(scale) else (None, slope, 0)
         if failed:
-            step = slope / (self.fitted + self.determined + tight.diagonal())
+            step = slope / (self.fitted + self.determined + prior_precision.diagonal())
         return np.minimum(np.maximum(step, -1.0), 1.0), float(0.5 * slope @ step)
 
 
@@ -163,71 +167,71 @@ def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tupl
     would be positive.
     """
     kept = np.flatnonzero(free)
-    mean, covariance, log_det = _both_sides(columns.some(kept), scale, variance)
+    mean, covariance, log_det = _unconstrained(columns.some(kept), scale, variance)
     values, pull, wrong = np.zeros(len(free)), np.zeros(len(free)), np.zeros(len(free), dtype=bool)
     values[kept] = mean
     if len(kept) < len(free):
         out = np.flatnonzero(~free)
-        beside, vector = columns.matrix[out[:, None], kept], columns.vector[out]
-        pull[out] = (vector - beside @ mean) / variance
-        rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(beside) @ np.abs(mean)) / variance
+        conditional_scales, vector = columns.matrix[out[:, None], kept], columns.vector[out]
+        pull[out] = (vector - conditional_scales @ mean) / variance
+        rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(conditional_scales) @ np.abs(mean)) / variance
         wrong[out] = pull[out] > rounding
-    if len(columns.sided):
-        own = values[columns.sided]
-        wrong[columns.sided] |= own < -settings.SIDE_ROUNDING * np.abs(values).max()
+    if len(columns.constrained):
+        own = values[columns.constrained]
+        wrong[columns.constrained] |= own < -settings.SIDE_ROUNDING * np.abs(values).max()
     return values, covariance, log_det, pull, wrong
 
 
-def _both_sides(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:
+def _unconstrained(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:
     """Unconstrained posterior mean, covariance and log|I + Λ G/s²|."""
     size = len(columns.vector)
     if not size:
         return np.zeros(0), np.zeros((0, 0)), 0.0
-    tight = 1.0 / scale[columns.owner] ** 2
+    prior_precision = 1.0 / scale[columns.owner] ** 2
     precision = columns.matrix / variance
-    precision.ravel()[:: size + 1] += tight
+    precision.ravel()[:: size + 1] += prior_precision
     # what stands below the diagonal of its transpose is above its own: it is symmetric, and nothing is copied
     factor, failed = dpotrf(precision.T, lower=1, clean=1, overwrite_a=1)
     if failed:
         raise EstimationError(UNDETERMINED)
-    log_det = float(2.0 * np.log(factor.diagonal()).sum() - np.log(tight).sum())
+    log_det = float(2.0 * np.log(factor.diagonal()).sum() - np.log(prior_precision).sum())
     lower, _ = dpotri(factor, lower=1, overwrite_c=1)
     covariance = lower + lower.T  # above the diagonal it is zero
     covariance.ravel(order="K")[:: size + 1] *= 0.5
     return covariance @ columns.vector / variance, covariance, log_det
 
 
-def _sides(
+def _truncated(
     columns: Columns,
     values: Array,
     spread: Array,
     covariance: Array,
     kept: NDArray[np.int64],
     pull: Array,
-    tight: Array,
+    prior_precision: Array,
     s2: float,
 ) -> tuple[Array, Array, float]:
     """Mean and second moment of truncated normal columns, and the log probability of their half lines."""
-    mean, own, worth = values.copy(), spread.copy(), 0.0
+    mean, own, log_mass = values.copy(), spread.copy(), 0.0
     if len(kept) < len(values):
         dropped = np.ones(len(values), dtype=bool)
         dropped[kept] = False
         out = np.flatnonzero(dropped)
         along = columns.matrix[out[:, None], kept] / s2
-        bend = columns.matrix[out, out] / s2 + tight[out] - ((along @ covariance) * along).sum(axis=1)
-        bend = np.maximum(bend, tight[out])
-        mean[out], own[out] = pull[out] / bend, 1.0 / bend
-        worth = float((0.5 * np.log(tight[out] / bend) + 0.5 * pull[out] ** 2 / bend).sum())
-    p = columns.sided
-    at, beside = mean[p], own[p]
-    root = np.sqrt(beside)
+        hessian = columns.matrix[out, out] / s2 + prior_precision[out] - ((along @ covariance) * along).sum(axis=1)
+        hessian = np.maximum(hessian, prior_precision[out])
+        mean[out], own[out] = pull[out] / hessian, 1.0 / hessian
+        log_mass = float((0.5 * np.log(prior_precision[out] / hessian) + 0.5 * pull[out] ** 2 / hessian).sum())
+    p = columns.constrained
+    at, conditional_scales = mean[p], own[p]
+    root = np.sqrt(conditional_scales)
     z = at / root
     # of a normal on one side of zero: mean m + σ r, mean square σ² + m (m + σ r), with r = φ(z)/Φ(z)
     ratio = _ROOT_2_OVER_PI / erfcx(-z / _ROOT_2)
     first, second = mean, mean**2 + own
     first[p] = moved = np.maximum(at + root * ratio, 0.0)
-    second[p] = np.maximum(beside + at * moved, moved**2)
-    return first, second, worth + float((log_ndtr(z) + _LOG_2).sum())
+    second[p] = np.maximum(conditional_scales + at * moved, moved**2)
+    return first, second, log_mass + float((log_ndtr(z) + _LOG_2).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,7 +324,7 @@ def evidence(
     most = np.full(len(scale), np.inf) if gram.most is None else gram.most[list(blocks)]
     peak = _most_probable(gram, columns, np.minimum(scale, most), law, most, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
-    log_evidence = known + _log_joint(gram, columns, found, scale, law, variance) + _log_volume(peak.bend, law)
+    log_evidence = known + _log_joint(gram, columns, found, scale, law, variance) + _log_volume(peak.hessian, law)
     log_evidence += peak.promised or 0.0
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
@@ -333,9 +337,9 @@ def evidence(
 
 @dataclass(frozen=True, eq=False)
 class ScalePrior:
-    """Normal prior N(0, C) of B log scales with a common factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
+    """Normal prior N(0, C) of B log scales with a common factor κ: C⁻¹ (``prior_precision``), and R with C = R Rᵀ."""
 
-    tight: Array
+    prior_precision: Array
     root: Array
 
     @classmethod
@@ -345,7 +349,7 @@ class ScalePrior:
         return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
 
 
-def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
+def conditional_scales(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
     """Conditional mean and standard deviations of ln λ of further blocks, given those of B known ones.
 
     ``spread`` and ``log_scale`` (B,) are those of the known blocks, ``own`` (K,) the spreads of the further ones.
@@ -355,11 +359,11 @@ def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Peak:
+class _Mode:
     """Maximum of the density of scales and noise; where the search stopped early, with the gain still expected."""
 
     posterior: Posterior
-    bend: Array
+    hessian: Array
     scale: Array
     variance: float
     promised: float | None = None
@@ -374,14 +378,14 @@ def _most_probable(
     variance: float,
     floor: float,
     settled: float,
-) -> _Peak:
+) -> _Mode:
     """Maximise the density of scales and noise; stop early where the log evidence cannot reach ``floor``."""
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        bend = found.bend(columns.owner, scale, law.tight)
-        step, gain = found.step(bend, scale, law.tight)
+        hessian = found.hessian(columns.owner, scale, law.prior_precision)
+        step, gain = found.step(hessian, scale, law.prior_precision)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, np.minimum(reach * step, np.log(most / scale))
@@ -394,9 +398,9 @@ def _most_probable(
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
             reached = _log_joint(gram, columns, found, scale, law, variance)
             if reached + settings.CLEARLY * gain < floor:
-                return _Peak(found, bend, scale, variance, gain)
+                return _Mode(found, hessian, scale, variance, gain)
         variance, scale = target, scale * np.exp(step)
-    return _Peak(found, bend, scale, variance)
+    return _Mode(found, hessian, scale, variance)
 
 
 def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, law: ScalePrior, variance: float) -> float:
@@ -405,13 +409,13 @@ def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, law
     quadratic = gram.total - columns.vector @ found.values
     fit = -0.5 * ((gram.equations + held) * np.log(variance) + (held + quadratic) / variance)
     log = np.log(scale)
-    return float(fit + found.log_volume - 0.5 * log @ law.tight @ log)
+    return float(fit + found.log_volume - 0.5 * log @ law.prior_precision @ log)
 
 
-def _log_volume(bend: Array, law: ScalePrior) -> float:
+def _log_volume(hessian: Array, law: ScalePrior) -> float:
     """Laplace approximation, −½ log|Rᵀ H R| with C = R Rᵀ: posterior over prior volume of ln λ with prior N(0, C).
 
     H neglects the dependence of s on λ and higher orders: both within about 0.1 for well determined blocks.
     """
-    peak = np.linalg.eigvalsh(law.root.T @ bend @ law.root)
+    peak = np.linalg.eigvalsh(law.root.T @ hessian @ law.root)
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

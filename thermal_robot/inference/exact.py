@@ -20,11 +20,11 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, whitener,
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, explain, log_odds
-from thermal_robot.inference.kernels import forms
+from thermal_robot.inference.kernels import discrepancy_kernels
 from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values, whitened
 from thermal_robot.inference.registration import moved
 from thermal_robot.inference.search import Search
-from thermal_robot.inference.weights import Noise, tail_weight
+from thermal_robot.inference.weights import Noise, huber_weight
 from thermal_robot.observations import Frames, Observations, observe
 
 
@@ -137,26 +137,26 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     1) is halved, until a parabola through them predicts no gain. Outliers are down-weighted instead of left out, as a
     wrong constant makes outliers of the very rows that determine it. Returns the effects with their (P,) values.
     """
-    kept = Products(explanation.linear, heard(explanation))
+    kept = Products(explanation.linear, downweighted(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
-    moved = constants_moved(kept, observations, blocks, factor)
+    moved = refined_blocks(kept, observations, blocks, factor)
     if moved != blocks:
         linear, problem, found = _evaluated(kept, moved)
         values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
     return [(item.effect, mean) for item, mean in zip(moved, values, strict=True)]
 
 
-def constants_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
+def refined_blocks(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
     """One sweep of the coordinate search: the blocks with the constants of each moved in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
-        if _movable(item, factor):
-            moved[place] = _moved(kept, observations, moved, place, factor)
+        if _has_constants(item, factor):
+            moved[place] = _refined_block(kept, observations, moved, place, factor)
     return moved
 
 
-def _movable(item: Block, factor: float) -> bool:
+def _has_constants(item: Block, factor: float) -> bool:
     """Whether the effect of a block has constants to refine."""
     return len(gate.nearby(item.effect, factor)) > 1
 
@@ -167,24 +167,27 @@ def weighed(kept: Products, blocks: Sequence[Block]) -> float:
     return _evaluated(kept, blocks)[2].log_evidence + priors
 
 
-def heard(explanation: Explanation) -> Whitening:
+def downweighted(explanation: Explanation) -> Whitening:
     """Whitening in which outliers are down-weighted instead of left out, unless a smooth discrepancy is in it.
 
     A per-pose discrepancy is left out of it, as it would absorb the residual of a slightly wrong constant.
     """
-    whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
-    if form is not None and form.anew:
+    whitening, aside, kernel = explanation.whitening, explanation.outliers, explanation.discrepancy.kernel
+    if kernel is not None and kernel.grouped:
         whitening = replace(whitening, smooth=None)
     if whitening.smooth is not None or not aside.any():
         return whitening
     noise = whitening.sigma() * explanation.best.noise
     distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
     return replace(
-        whitening, weights=np.where(aside, tail_weight(distance2, whitening.figures(noise.shape[1])), whitening.weights)
+        whitening,
+        weights=np.where(aside, huber_weight(distance2, whitening.figures(noise.shape[1])), whitening.weights),
     )
 
 
-def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:
+def _refined_block(
+    kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float
+) -> Block:
     """Block at one place after hill climbing over the constants of its effect."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
     seen: dict[Effect, float] = {}
@@ -220,7 +223,7 @@ def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, C
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
+class ExactSelection:
     """Explanation linearised at the exact model of its own effects, which have the values (P,).
 
     ``families`` names the effect that each block belongs to.
@@ -232,7 +235,7 @@ class Settled:
     families: tuple[str, ...]
 
 
-def settle(
+def select_exactly(
     start: Observations,
     variants: dict[str, tuple[Effect, ...]],
     progress: Callable[[str], None],
@@ -240,7 +243,7 @@ def settle(
     held: Sequence[tuple[Effect, Array]] = (),
     before: Explanation | None = None,
     starts: Sequence[Sequence[Effect]] = (),
-) -> Settled:
+) -> ExactSelection:
     """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
 
     Starts at ``start``, the exact model of the effects ``held`` with their values, and at the weights of the
@@ -253,7 +256,7 @@ def settle(
     variants = dict(whole)
     for effect, _ in held:
         if effect.name in variants:
-            rivals = _others(effect, start, whole[effect.name])
+            rivals = _alternatives(effect, start, whole[effect.name])
             variants[effect.name] = tuple(dict.fromkeys((*variants[effect.name], effect, *rivals)))
     noise = Noise.of(campaign)
     many = campaign.samples > settings.MANY_ROWS
@@ -261,12 +264,14 @@ def settle(
     for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
         listed = [effect for effect, _ in held if effect.name in variants]
-        blocks = tuple(_listed(variants, observations, (*begun, *listed)))
+        blocks = tuple(_testable_blocks(variants, observations, (*begun, *listed)))
         candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
         chosen = [candidates.index(effect) for effect in listed]
         seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
         linear = at_exact_model(observations, blocks, held)
-        explanation = explain(linear, noise, families=families, starts=seeds, before=before, forms=forms(observations))
+        explanation = explain(
+            linear, noise, families=families, starts=seeds, before=before, kernels=discrepancy_kernels(observations)
+        )
         factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
@@ -281,9 +286,9 @@ def settle(
         for effect, _ in held:
             b = explanation.block_of(effect)
             leading = _leading(effect, blocks[b], explanation.values[b][0])
-            others = _others(effect, start, whole[effect.name])
+            others = _alternatives(effect, start, whole[effect.name])
             variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
-    return Settled(observations, explanation, tuple(held), families)
+    return ExactSelection(observations, explanation, tuple(held), families)
 
 
 def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
@@ -306,7 +311,7 @@ def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
         yield replace(chosen, places=tuple(place for place in every if place in most[:count]))
 
 
-def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
+def _alternatives(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
     """Yield the alternatives of a setting that compete with it while its constants are refined.
 
     These are: one place more, less or exchanged, single places, all places, and other settings of its places. Of a law,
@@ -329,7 +334,7 @@ def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Ef
         yield from (alone for place in chosen.places if (alone := gate.at(setting, place, observations)) is not None)
 
 
-def _listed(
+def _testable_blocks(
     variants: dict[str, tuple[Effect, ...]], observations: Observations, kept: Sequence[Effect]
 ) -> Iterator[Block]:
     """Yield the blocks of all settings but those that the data or the unknown frames leave undetermined.
@@ -350,11 +355,11 @@ def _listed(
     for setting in every:
         if setting in kept or not (hidden & set(setting.places) and constant(setting, observations)):
             item = block(observations, setting)
-            if setting in kept or _sees(item):
+            if setting in kept or _all_places_visible(item):
                 yield item
 
 
-def _sees(item: Block) -> bool:
+def _all_places_visible(item: Block) -> bool:
     """Whether the columns of each place of a multi-place setting differ from zero."""
     places = item.effect.places if len(item.effect.places) > 1 else ()
     if not places:

@@ -20,7 +20,14 @@ from thermal_robot.effects import Effect
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, Gram, evidence
-from thermal_robot.inference.kernels import Form, Grouped, Smooth, Spectrum, Stack, decomposed
+from thermal_robot.inference.kernels import (
+    DesignMatrix,
+    GroupKernel,
+    Kernel,
+    KernelCovariance,
+    SmoothKernel,
+    decomposed,
+)
 from thermal_robot.inference.problem import (
     Linear,
     Whitening,
@@ -32,89 +39,89 @@ from thermal_robot.inference.problem import (
     white_stack,
 )
 from thermal_robot.inference.search import Search
-from thermal_robot.inference.weights import Noise, distance_limit, first_whitening, reweigh
+from thermal_robot.inference.weights import Noise, first_whitening, reweigh
 
-Rung = tuple[int, float]
-"""Number of the form and τ; (−1, 0) where there is no discrepancy."""
-PLAIN: Rung = (-1, 0.0)
+Hyperparameters = tuple[int, float]
+"""Number of the kernel and its amplitude τ; (−1, 0) where there is no discrepancy."""
+PLAIN: Hyperparameters = (-1, 0.0)
 
 
 @dataclass(eq=False)
-class Ladder:
+class ModelSearch:
     """Model search over combinations of blocks and over kernels and amplitudes of a discrepancy.
 
     ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
-    contains the other; ``among`` is the number of kernels that share the prior, of which ``forms`` are left.
+    contains the other; ``among`` is the number of kernels that share the prior, of which ``kernels`` are left.
     """
 
     linear: Linear
     whitening: Whitening
-    forms: list[Form]
+    kernels: list[Kernel]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
     among: int = 0
-    stack: Stack | None = None
-    searches: dict[Rung, Search] = field(default_factory=dict)
+    stack: DesignMatrix | None = None
+    searches: dict[Hyperparameters, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Decompose each kernel once for all amplitudes."""
         w = self.whitening
-        self._stack = white_stack(self.stack or Stack.of(self.linear.columns), w)
+        self._stack = white_stack(self.stack or DesignMatrix.of(self.linear.columns), w)
         self._products, self._equations = self._stack.products(), self._stack.equations
         self._first = np.unique(self._stack.number, return_index=True)[1]
         plain = normal_equations(self.linear, w, self._products, self._equations)
         inside = contained(plain)
         self._pairs = inside | self.exclusive
         self._containers = frozenset(self._containing(plain, inside - self.exclusive))
-        share = settings.SMOOTH_PRIOR if self.forms or self.among else 0.0
+        share = settings.SMOOTH_PRIOR if self.kernels or self.among else 0.0
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
-        self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
-        self._settled: dict[tuple[int, tuple[int, ...]], Combination] = {}
+        self._log_evidences: dict[tuple[Hyperparameters, tuple[int, ...]], float] = {}
+        self._combinations: dict[tuple[int, tuple[int, ...]], Combination] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
-        self._joined = False
+        self._joints_tried = False
         self._out: frozenset[int] = frozenset()
-        self._sizes: dict[int, float] = {}
-        given, self.forms = self.forms, []
-        self._spectra: list[Spectrum | Grouped] = []
-        self._along: list[list[Array] | None] = []
+        self._amplitudes: dict[int, float] = {}
+        given, self.kernels = self.kernels, []
+        self._spectra: list[SmoothKernel | GroupKernel] = []
+        self._projections: list[list[Array] | None] = []
         self._last: tuple[object, list[Array]] = None, []
-        for form in given:
-            self._consider(form, float(np.log(share / max(self.among, len(given)))))
+        for kernel in given:
+            self._add_kernel(kernel, float(np.log(share / max(self.among, len(given)))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
-    def without(self, out: frozenset[int]) -> Ladder:
+    def without(self, out: frozenset[int]) -> ModelSearch:
         """Copy of the search without some blocks; evaluations of the others stay in the memo."""
         found = copy(self)
-        found.forms, found._joined = list(self.forms), any(form.several for form in self.forms)
-        found._spectra, found._along = list(self._spectra), list(self._along)
-        found._priors, found._sizes = dict(self._priors), dict(self._sizes)
-        found._quick = {key: log for key, log in self._quick.items() if not out & set(key[1])}
-        found._settled = {key: own for key, own in self._settled.items() if not out & set(key[1])}
+        found.kernels, found._joints_tried = list(self.kernels), any(kernel.several for kernel in self.kernels)
+        found._spectra, found._projections = list(self._spectra), list(self._projections)
+        found._priors, found._amplitudes = dict(self._priors), dict(self._amplitudes)
+        found._log_evidences = {key: log for key, log in self._log_evidences.items() if not out & set(key[1])}
+        found._combinations = {key: own for key, own in self._combinations.items() if not out & set(key[1])}
         found._out = self._out | out
-        left = {rung: search.without(out) for rung, search in self.searches.items()}
-        found.searches = {rung: search for rung, search in left.items() if search.seen or rung == PLAIN}
+        left = {hyper: search.without(out) for hyper, search in self.searches.items()}
+        found.searches = {hyper: search for hyper, search in left.items() if search.seen or hyper == PLAIN}
         return found
 
-    def bare(self) -> Ladder:
+    def without_columns(self) -> ModelSearch:
         """Copy without the rows' columns, unless a per-pose discrepancy still needs them."""
-        if any(form.anew for form in self.forms):
+        if any(kernel.grouped for kernel in self.kernels):
             return self
         found = copy(self)
         found.stack, found._stack = None, replace(self._stack, different=())
         return found
 
-    def _consider(self, form: Form, log_prior: float) -> int:
+    def _add_kernel(self, kernel: Kernel, log_prior: float) -> int:
         """Add a kernel, whose prior is divided among its amplitudes; return its number.
 
         Products with all columns are cached, but not for per-pose kernels, which have too many.
         """
-        self.forms.append(form)
+        self.kernels.append(kernel)
         w = self.whitening
-        spectrum = decomposed(form.over(w.relative), w.weights, w.noise)
+        spectrum = decomposed(kernel.over(w.relative), w.weights, w.noise)
         self._spectra.append(spectrum)
-        self._along.append(None if form.anew else spectrum.along(self._stack))
-        number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
+        self._projections.append(None if kernel.grouped else spectrum.along(self._stack))
+        number, each = len(self.kernels) - 1, log_prior - float(np.log(len(settings.TAUS)))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
 
@@ -127,79 +134,87 @@ class Ladder:
             if float(np.trace(plain.matrix[own, own])) > settings.CONTAINS:
                 yield large
 
-    def whitened_at(self, rung: Rung) -> Whitening:
+    def whitened_at(self, hyper: Hyperparameters) -> Whitening:
         """Whitening with a discrepancy of the given kernel and amplitude."""
-        form, tau = rung
-        return self.whitening if form < 0 else replace(self.whitening, smooth=Smooth(self._spectra[form], tau))
+        kernel, tau = hyper
+        return (
+            self.whitening
+            if kernel < 0
+            else replace(self.whitening, smooth=KernelCovariance(self._spectra[kernel], tau))
+        )
 
-    def beside(self, rung: Rung) -> Search:
+    def search_at(self, hyper: Hyperparameters) -> Search:
         """Search over blocks with one discrepancy in the covariance, made once."""
-        if rung not in self.searches:
-            white, products = self.whitened_at(rung), self._left(rung, np.arange(len(self._products)))
+        if hyper not in self.searches:
+            white, products = self.whitened_at(hyper), self._whitened_gram(hyper, np.arange(len(self._products)))
             plain = self.searches[PLAIN].gram
-            self.searches[rung] = self._search(
-                rung, normal_equations(self.linear, white, products, self._equations, like=plain)
+            self.searches[hyper] = self._search(
+                hyper, normal_equations(self.linear, white, products, self._equations, like=plain)
             )
-        return self.searches[rung]
+        return self.searches[hyper]
 
-    def _search(self, rung: Rung, problem: Gram) -> Search:
-        offset = problem.offset + self._priors[rung]
+    def _search(self, hyper: Hyperparameters, problem: Gram) -> Search:
+        offset = problem.offset + self._priors[hyper]
         found = Search(replace(problem, offset=offset), self.log_prior, self._pairs, self._containers)
         return found.without(self._out) if self._out else found
 
-    def run(self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True) -> tuple[Rung, Combination]:
+    def run(
+        self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True
+    ) -> tuple[Hyperparameters, Combination]:
         """Hill climbing over combinations and discrepancies from several starts.
 
         With ``detours`` larger moves are tried, too.
         """
-        first = self.beside(PLAIN)
+        first = self.search_at(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
         begin = sorted((first.evaluate(s) for s in allowed), key=lambda c: -c.log_evidence)
-        rung, best = PLAIN, first.climb(begin[0].blocks)
+        hyper, best = PLAIN, first.climb(begin[0].blocks)
         seeds = [c.blocks for c in begin[: settings.STARTS]]
         while True:
             tried = dict.fromkeys([best.blocks, *seeds])
-            found = [(*self._size(k, blocks), blocks) for k in range(len(self.forms)) for blocks in tried]
+            found = [(*self._best_amplitude(k, blocks), blocks) for k in range(len(self.kernels)) for blocks in tried]
             seeds = []
-            other = max(found, key=lambda item: item[1], default=(rung, -np.inf, ()))
-            nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(rung, best)
-            nearby = nearby or (self._further(rung, best) if detours else None)
+            other = max(found, key=lambda item: item[1], default=(hyper, -np.inf, ()))
+            nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(hyper, best)
+            nearby = nearby or (self._larger_moves(hyper, best) if detours else None)
             if nearby is None:
-                return rung, best
-            rung, best = nearby
+                return hyper, best
+            hyper, best = nearby
 
-    def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+    def _several_joints(self, hyper: Hyperparameters, best: Combination) -> tuple[Hyperparameters, Combination] | None:
         """Extend a per-pose discrepancy to several joints, one after another; return an improvement, if any.
 
         Tried with the best combination and with none, since the amplitudes of one need not suit the other.
         """
-        if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
+        if self._joints_tried or hyper[0] < 0 or not self.kernels[hyper[0]].grouped:
             return None
-        self._joined = True
-        single = [k for k, f in enumerate(self.forms) if f.anew and f.joints]
+        self._joints_tried = True
+        single = [k for k, f in enumerate(self.kernels) if f.grouped and f.joints]
         if not single:
             return None
-        tried = [(*self._joined_beside(blocks, single), blocks) for blocks in {best.blocks, ()}]
+        tried = [(*self._best_joints(blocks, single), blocks) for blocks in {best.blocks, ()}]
         return self._climbed(max(tried, key=lambda item: item[1]), best)
 
     def _climbed(
-        self, found: tuple[Rung, float, tuple[int, ...]], best: Combination
-    ) -> tuple[Rung, Combination] | None:
+        self, found: tuple[Hyperparameters, float, tuple[int, ...]], best: Combination
+    ) -> tuple[Hyperparameters, Combination] | None:
         """Climb where an amplitude promises more evidence than the best; return an improvement, if any."""
-        rung, promised, blocks = found
-        return self._better(rung, blocks, best) if promised > best.log_evidence + settings.BETTER else None
+        hyper, promised, blocks = found
+        return self._better(hyper, blocks, best) if promised > best.log_evidence + settings.BETTER else None
 
-    def _better(self, rung: Rung, blocks: tuple[int, ...], best: Combination) -> tuple[Rung, Combination] | None:
-        nearby = self.beside(rung).climb(blocks)
-        return (rung, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
+    def _better(
+        self, hyper: Hyperparameters, blocks: tuple[int, ...], best: Combination
+    ) -> tuple[Hyperparameters, Combination] | None:
+        nearby = self.search_at(hyper).climb(blocks)
+        return (hyper, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
 
-    def _further(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+    def _larger_moves(self, hyper: Hyperparameters, best: Combination) -> tuple[Hyperparameters, Combination] | None:
         """Search beyond single steps with the present discrepancy; return an improvement, if any."""
-        found = self.beside(rung).run(best.blocks)
-        return (rung, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
+        found = self.search_at(hyper).run(best.blocks)
+        return (hyper, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
-    def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
-        found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
+    def _best_joints(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Hyperparameters, float]:
+        found = max((self._best_amplitude(k, blocks) for k in single), key=lambda item: item[1])
         for _ in range(settings.SCATTERING - 1):
             further = self._one_more_joint(found[0], blocks, single)
             if further is None or further[1] <= found[1]:
@@ -207,126 +222,132 @@ class Ladder:
             found = further
         return found
 
-    def _one_more_joint(self, rung: Rung, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float] | None:
-        form = self.forms[rung[0]]
-        others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
-        others = [f for f in others if f.place[1] not in form.joints]
+    def _one_more_joint(
+        self, hyper: Hyperparameters, blocks: tuple[int, ...], single: Sequence[int]
+    ) -> tuple[Hyperparameters, float] | None:
+        kernel = self.kernels[hyper[0]]
+        others = [self.kernels[k] for k in single if self.kernels[k].functions is kernel.functions]
+        others = [f for f in others if f.place[1] not in kernel.joints]
         if not others:
             return None
-        prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
+        prior = float(self._priors[hyper] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
         tried = []
         for other in others:
             for part in settings.PARTS:
-                further = form.beside(other, part)
+                further = kernel.with_joint(other, part)
                 # the joints so far stay as they are
-                tau = min(settings.TAUS, key=lambda t: abs(t - rung[1] * float(np.hypot(1.0, part))))
-                tried.append((self._beside((self._consider(further, prior), tau), blocks), tau, further))
-                self._forget()
+                tau = min(settings.TAUS, key=lambda t: abs(t - hyper[1] * float(np.hypot(1.0, part))))
+                tried.append((self._log_evidence((self._add_kernel(further, prior), tau), blocks), tau, further))
+                self._remove_kernel()
         _, tau, best = max(tried, key=lambda item: item[0])
-        return self._size(self._consider(best, prior), blocks, tau)
+        return self._best_amplitude(self._add_kernel(best, prior), blocks, tau)
 
-    def _forget(self) -> None:
+    def _remove_kernel(self) -> None:
         """Remove the last kernel."""
-        number = len(self.forms) - 1
-        del self.forms[number], self._spectra[number], self._along[number]
-        self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
-        self._settled = {key: found for key, found in self._settled.items() if key[0] != number}
+        number = len(self.kernels) - 1
+        del self.kernels[number], self._spectra[number], self._projections[number]
+        self._log_evidences = {key: log for key, log in self._log_evidences.items() if key[0][0] != number}
+        self._combinations = {key: found for key, found in self._combinations.items() if key[0] != number}
 
-    def _size(self, form: int, blocks: tuple[int, ...], start: float = 1.0) -> tuple[Rung, float]:
+    def _best_amplitude(
+        self, kernel: int, blocks: tuple[int, ...], start: float = 1.0
+    ) -> tuple[Hyperparameters, float]:
         """Most probable amplitude of a kernel with one combination, and its log evidence; it is unimodal."""
-        k = settings.TAUS.index(self._sizes.get(form, start))
-        best = self._beside((form, settings.TAUS[k]), blocks)
+        k = settings.TAUS.index(self._amplitudes.get(kernel, start))
+        best = self._log_evidence((kernel, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:
             for sign in (step, -step):
                 while 0 <= k + sign < len(settings.TAUS):
-                    other = self._beside((form, settings.TAUS[k + sign]), blocks)
+                    other = self._log_evidence((kernel, settings.TAUS[k + sign]), blocks)
                     if other <= best:
                         break
                     k, best = k + sign, other
-        self._sizes[form] = settings.TAUS[k]
-        return (form, settings.TAUS[k]), best
+        self._amplitudes[kernel] = settings.TAUS[k]
+        return (kernel, settings.TAUS[k]), best
 
-    def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
+    def _log_evidence(self, hyper: Hyperparameters, blocks: tuple[int, ...]) -> float:
         """Log evidence of one combination with one discrepancy, from the columns of its blocks alone."""
-        key = rung, tuple(sorted(blocks))
-        if key not in self._quick:
-            flat, white = self.linear.frames.shape[2], self.whitened_at(rung)
+        key = hyper, tuple(sorted(blocks))
+        if key not in self._log_evidences:
+            flat, white = self.linear.frames.shape[2], self.whitened_at(hyper)
             picked = np.concatenate([np.arange(flat), *(self._spans[b] for b in key[1]), [len(self._products) - 1]])
             problem = normal_equations(
                 Linear(self.linear.gap, self.linear.frames, tuple(self.linear.blocks[b] for b in key[1])),
                 white,
-                self._left(rung, picked.astype(int)),
+                self._whitened_gram(hyper, picked.astype(int)),
                 self._equations,
                 like=self.searches[PLAIN].gram.some(key[1]),
             )
-            prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
+            prior = self._priors[hyper] + sum(self.log_prior[b] for b in key[1])
             try:
-                found = evidence(problem, tuple(range(len(blocks))), prior, self._like(rung[0], key[1]))
-                self._settled[rung[0], key[1]], self._quick[key] = found, found.log_evidence
+                found = evidence(problem, tuple(range(len(blocks))), prior, self._warm_start(hyper[0], key[1]))
+                self._combinations[hyper[0], key[1]], self._log_evidences[key] = found, found.log_evidence
             except EstimationError:  # what so large a discrepancy leaves is rounding
-                self._quick[key] = -np.inf
-        return self._quick[key]
+                self._log_evidences[key] = -np.inf
+        return self._log_evidences[key]
 
-    def _like(self, form: int, blocks: tuple[int, ...]) -> Combination | None:
+    def _warm_start(self, kernel: int, blocks: tuple[int, ...]) -> Combination | None:
         """Warm start: the same combination with the last amplitude, or without a discrepancy."""
-        if (form, blocks) in self._settled:
-            return self._settled[form, blocks]
+        if (kernel, blocks) in self._combinations:
+            return self._combinations[kernel, blocks]
         known = self.searches[PLAIN].seen.get(blocks)
         return known and replace(known, scales={k: known.scales.get(b, 1.0) for k, b in enumerate(blocks)})
 
-    def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
+    def _whitened_gram(self, hyper: Hyperparameters, picked: NDArray[np.int64]) -> Array:
         """Gram matrix of some columns, whitened with a discrepancy."""
         kept, number = np.unique(self._stack.number[picked], return_inverse=True)
         plain = self._products[np.ix_(self._first[kept], self._first[kept])]
-        found = self._spectra[rung[0]].products(rung[1], self._along_form(rung[0], kept), plain)
+        found = self._spectra[hyper[0]].products(hyper[1], self._projected(hyper[0], kept), plain)
         return np.asarray(found[np.ix_(number, number)])
 
-    def _along_form(self, form: int, kept: NDArray[np.int64]) -> list[Array]:
+    def _projected(self, kernel: int, kept: NDArray[np.int64]) -> list[Array]:
         """Products of a kernel's factor with some of the distinct columns."""
-        known = self._along[form]
+        known = self._projections[kernel]
         if known is not None:
             return [own[:, kept] for own in known]
-        key = self._spectra[form], kept.tobytes()
+        key = self._spectra[kernel], kept.tobytes()
         if self._last[0] != key:  # one after another its sizes are tried
-            self._last = key, self._spectra[form].along(self._stack.differing(kept))
+            self._last = key, self._spectra[kernel].along(self._stack.some_columns(kept))
         return self._last[1]
 
-    def in_question(self, best: Combination) -> tuple[Form, ...]:
+    def plausible_kernels(self, best: Combination) -> tuple[Kernel, ...]:
         """Kernels with substantial posterior probability beside the best combination.
 
         A kernel whose most probable amplitude is the smallest is noise; one that is far less probable is left out.
         """
         peaks: dict[int, tuple[float, float]] = {}
-        for ((form, tau), blocks), log in self._quick.items():
-            if blocks == best.blocks and form >= 0:
-                peaks[form] = max(peaks.get(form, (-np.inf, 0.0)), (log, tau))
-        least = best.log_evidence - settings.FORM_REACH
-        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
-        single = [form for form in self.forms if not form.several]
-        several = any(self.forms[k].several for k in near)
-        return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
+        for ((kernel, tau), blocks), log in self._log_evidences.items():
+            if blocks == best.blocks and kernel >= 0:
+                peaks[kernel] = max(peaks.get(kernel, (-np.inf, 0.0)), (log, tau))
+        least = best.log_evidence - settings.KERNEL_REACH
+        near = {kernel for kernel, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
+        single = [kernel for kernel in self.kernels if not kernel.several]
+        several = any(self.kernels[k].several for k in near)
+        return tuple(f for k, f in enumerate(single) if k in near or (several and f.grouped))
 
-    def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
+    def _beside_others(self, best: Combination) -> tuple[Hyperparameters, Combination] | None:
         """Evaluate the neighbours with all plausible discrepancies; return an improvement, if any."""
-        near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
+        near = [
+            r for (r, blocks), log in self._log_evidences.items() if blocks == best.blocks and self._is_near(log, best)
+        ]
         for other in dict.fromkeys((PLAIN, *near)):
-            if self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best):
-                nearby = self.beside(other).weigh(best.blocks)
+            if self._is_near(self.search_at(other).evaluate(best.blocks).log_evidence, best):
+                nearby = self.search_at(other).evaluate_neighbours(best.blocks)
                 if nearby.log_evidence > best.log_evidence + settings.BETTER:
                     return self._better(other, nearby.blocks, best)
         return None
 
     @staticmethod
-    def _counts(log_evidence: float, best: Combination) -> bool:
-        return log_evidence > best.log_evidence - settings.RUNG_REACH
+    def _is_near(log_evidence: float, best: Combination) -> bool:
+        return log_evidence > best.log_evidence - settings.AMPLITUDE_REACH
 
-    def weigh_pairs(self, rung: Rung, best: Combination) -> None:
+    def evaluate_pairs(self, hyper: Hyperparameters, best: Combination) -> None:
         """Evaluate pairs of changes of the best combination of which each alone is uncertain.
 
         Two uncertain effects that are independent may both be at work; without such pairs each would lower the
         probability of the other.
         """
-        search = self.beside(rung)
+        search = self.search_at(hyper)
         own = set(best.blocks)
         near = []
         for c in search.seen.values():
@@ -344,7 +365,7 @@ class Ladder:
             if search.allowed(blocks):
                 search.evaluate(blocks, best)
 
-    def consensus(self, families: Sequence[str]) -> tuple[Rung, Combination]:
+    def consensus(self, families: Sequence[str]) -> tuple[Hyperparameters, Combination]:
         """Best combination of the most probable set of effects, summed over settings and discrepancies."""
         compared, probabilities = self.probabilities()
         mass: dict[frozenset[str], float] = {}
@@ -353,50 +374,50 @@ class Ladder:
             mass[names] = mass.get(names, 0.0) + float(p)
         chosen = max(mass, key=lambda names: mass[names])
         held = [
-            (rung, c)
-            for rung, search in self.searches.items()
+            (hyper, c)
+            for hyper, search in self.searches.items()
             for c in search.seen.values()
             if frozenset(families[b] for b in c.blocks) == chosen
         ]
-        rung, best = max(held, key=lambda item: item[1].log_evidence)
-        return rung, self.beside(rung).evaluate(best.blocks)
+        hyper, best = max(held, key=lambda item: item[1].log_evidence)
+        return hyper, self.search_at(hyper).evaluate(best.blocks)
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Posterior probabilities of all combinations, summed over discrepancies, most probable first."""
-        masses = [(mass, c) for own in self._masses().values() for mass, c in own]
+        masses = [(mass, c) for own in self._log_masses().values() for mass, c in own]
         masses.sort(key=lambda item: -item[0])
         weight = np.exp(np.array([mass for mass, _ in masses]) - masses[0][0])
         return [c for _, c in masses], weight / weight.sum()
 
-    def forms_in_question(self) -> dict[str, float]:
+    def kernel_probabilities(self) -> dict[str, float]:
         """Posterior probability of each kernel by its name, and by an empty name that of none."""
-        held = {rung: np.array([mass for mass, _ in own]) for rung, own in self._masses().items()}
+        held = {hyper: np.array([mass for mass, _ in own]) for hyper, own in self._log_masses().items()}
         top = max(own.max() for own in held.values())
         mass: dict[str, float] = {}
-        for rung, own in held.items():
-            name = self.forms[rung[0]].name if rung[0] >= 0 else ""
+        for hyper, own in held.items():
+            name = self.kernels[hyper[0]].name if hyper[0] >= 0 else ""
             mass[name] = mass.get(name, 0.0) + float(np.exp(own - top).sum())
         return {name: m / sum(mass.values()) for name, m in mass.items()}
 
-    def _masses(self) -> dict[Rung, list[tuple[float, Combination]]]:
+    def _log_masses(self) -> dict[Hyperparameters, list[tuple[float, Combination]]]:
         """Log evidence of all combinations for each discrepancy, weighted by the amplitudes that it represents.
 
         Sum over all amplitudes by those computed: each represents the amplitudes nearest to it.
         """
-        seen = {rung: list(search.seen.values()) for rung, search in self.searches.items()}
+        seen = {hyper: list(search.seen.values()) for hyper, search in self.searches.items()}
         best = max((c for own in seen.values() for c in own), key=lambda c: c.log_evidence)
         computed: dict[int, list[int]] = {}
-        for (form, tau), blocks in self._quick:
-            if blocks == best.blocks and form >= 0:
-                computed.setdefault(form, []).append(settings.TAUS.index(tau))
+        for (kernel, tau), blocks in self._log_evidences:
+            if blocks == best.blocks and kernel >= 0:
+                computed.setdefault(kernel, []).append(settings.TAUS.index(tau))
         stands = {PLAIN: 0.0}
-        for form, sizes in computed.items():
+        for kernel, sizes in computed.items():
             sizes.sort()
             between = [0.5 * (a + b) for a, b in pairwise(sizes)]
             ends = [sizes[0] - 0.5, *between, sizes[-1] + 0.5]
             for k, (a, b) in zip(sizes, pairwise(ends), strict=True):
-                stands[form, settings.TAUS[k]] = float(np.log(b - a))
-        return {rung: [(c.log_evidence + stands.get(rung, 0.0), c) for c in own] for rung, own in seen.items()}
+                stands[kernel, settings.TAUS[k]] = float(np.log(b - a))
+        return {hyper: [(c.log_evidence + stands.get(hyper, 0.0), c) for c in own] for hyper, own in seen.items()}
 
 
 NOTHING = np.zeros(0)
@@ -406,14 +427,14 @@ NOTHING = np.zeros(0)
 class Discrepancy:
     """Posterior of a correlated discrepancy: the probability of any, and of each kernel by its name.
 
-    Beside the best combination: ``form`` and ``tau``, its rms over the noise (``None`` and 0 where there is none), and
-    ``noise`` in units of the whitening noise.
+    Beside the best combination: ``kernel`` and ``tau``, its rms over the noise (``None`` and 0 where there is none),
+    and ``noise`` in units of the whitening noise.
     """
 
-    form: Form | None
+    kernel: Kernel | None
     tau: float
     probability: float
-    forms: Mapping[str, float]
+    kernels: Mapping[str, float]
     noise: float = 1.0
 
 
@@ -438,14 +459,14 @@ class Explanation:
     smooth: Array
     outliers: NDArray[np.bool_]
     discrepancy: Discrepancy
-    forms: Sequence[Form]
-    searched: _Round | None = None
+    kernels: Sequence[Kernel]
+    searched: _Iteration | None = None
 
     def without(self, out: Sequence[int]) -> Explanation:
         """Best explanation without some blocks, at the same weights, from the memo."""
         if self.searched is None:
             raise ValueError("what was weighed for this explanation is no longer known")
-        return self.searched.without(frozenset(out)).told(self.outliers)
+        return self.searched.without(frozenset(out)).explanation(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
         """Block of the best combination that belongs to this effect, in whatever setting."""
@@ -455,12 +476,6 @@ class Explanation:
         """Prior standard deviations (P,) of a block's parameters, SI; next to 0 for those held at zero."""
         item = self.linear.blocks[block]
         return item.sizes * self.best.scales[block] * item.kept(self.values[block][0])
-
-    def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Outliers (N,) among the given rows."""
-        beyond = self.whitening.sigma() * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
-        distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
-        return np.asarray(rows & (distance2 > distance_limit(self.whitening.figures(self.linear.measures), len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
         """Posterior probability that any of the blocks is in the model."""
@@ -472,145 +487,150 @@ def explain(
     linear: Linear,
     noise: Noise,
     *,
-    rows: NDArray[np.bool_] | None = None,
     families: Sequence[str] = (),
     starts: Sequence[Sequence[int]] = (),
-    outliers: NDArray[np.bool_] | None = None,
     before: Explanation | None = None,
-    forms: Sequence[Form] = (),
+    kernels: Sequence[Kernel] = (),
     log_prior: Sequence[float] | None = None,
 ) -> Explanation:
     """Bayesian model selection of blocks together with outliers, noise and a correlated discrepancy.
 
-    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
-    (N,) are ignored. Blocks of one family are settings that exclude each other and share its prior probability.
-    ``starts`` and ``outliers`` are where the search starts. With an explanation of a similar problem ``before``, its
-    weights, noise and plausible kernels are reused; if the first of the starts is found again with the same kernel, the
-    iteration ends. ``log_prior`` is by default that of the blocks' effects.
+    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Blocks of one
+    family are settings that exclude each other and share its prior probability. The search starts from ``starts``. With
+    an explanation of a similar problem ``before``, its weights, noise and plausible kernels are reused; if the first of
+    the starts is found again with the same kernel, the iteration ends. ``log_prior`` is by default that of
+    the blocks' effects.
     """
-    samples = len(linear.gap)
-    use = np.ones(samples, dtype=bool) if rows is None else rows
-    outliers = before.outliers if before and outliers is None else outliers
-    aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
+    aside = np.zeros(len(linear.gap), dtype=bool) if before is None else before.outliers
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
-    asked = _Asked(linear, families, log_prior, settings_of_one(families), len(forms), Stack.of(linear.columns))
+    inputs = _Inputs(
+        linear, families, log_prior, exclusive_settings(families), len(kernels), DesignMatrix.of(linear.columns)
+    )
     seeds = [tuple(sorted(start)) for start in starts]
     first, history = before is None, list[tuple[object, ...]]()
-    beside: Sequence[Form] = ()
+    beside: Sequence[Kernel] = ()
     if before is None:
         # effects that are far off, and gross errors, are settled first, beside a noise that is free
-        whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
+        whitening = first_whitening(linear, noise)
     else:
-        whitening, alive = replace(before.whitening, smooth=None), {form.name for form in before.forms}
-        beside, form = [form for form in forms if form.name in alive], before.discrepancy.form
-        history += [_state(seed, form, whitening) for seed in seeds[:1]]
+        whitening, alive = replace(before.whitening, smooth=None), {kernel.name for kernel in before.kernels}
+        beside, kernel = [kernel for kernel in kernels if kernel.name in alive], before.discrepancy.kernel
+        history += [_state(seed, kernel, whitening) for seed in seeds[:1]]
 
-    def settled(found: _Round) -> bool:
+    def settled(found: _Iteration) -> bool:
         return bool(history) and (found.state in history or len(history) >= settings.FIRST_ROUNDS)
 
     while True:
-        found = _Round.of(asked, whitening, beside, seeds)
+        found = _Iteration.of(inputs, whitening, beside, seeds)
         if settled(found):
             found = found.without(frozenset())  # weights stay: only now is it worth to look for what steps miss
             if settled(found):
-                return found.told(aside)
+                return found.explanation(aside)
         history.append(found.state)
-        whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
+        whitening, aside = reweigh(found.rough_residual, noise, found.leverage, linear.measures)
         seeds = [found.best.blocks]
-        beside = forms if first else found.ladder.in_question(found.best)
+        beside = kernels if first else found.models.plausible_kernels(found.best)
         first = False
         del found  # before the next one takes as much memory
 
 
-def _state(blocks: tuple[int, ...], form: Form | None, whitening: Whitening) -> tuple[object, ...]:
+def _state(blocks: tuple[int, ...], kernel: Kernel | None, whitening: Whitening) -> tuple[object, ...]:
     """Key of an iteration, to detect convergence: blocks, kernel of the discrepancy, and rows in use."""
-    return blocks, form and form.words, np.packbits(whitening.weights > 0).tobytes()
+    return blocks, kernel and kernel.words, np.packbits(whitening.weights > 0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _Inputs:
     """Inputs that stay the same in all iterations."""
 
     linear: Linear
     families: Sequence[str]
     log_prior: Sequence[float]
     rivals: frozenset[frozenset[int]]
-    forms: int
-    stack: Stack | None
+    kernels: int
+    stack: DesignMatrix | None
 
 
 @dataclass(frozen=True, eq=False)
-class _Round:
+class _Iteration:
     """One search at fixed weights: best combination, its discrepancy, and both residuals."""
 
-    asked: _Asked
-    ladder: Ladder
-    rung: Rung
+    inputs: _Inputs
+    models: ModelSearch
+    hyper: Hyperparameters
     best: Combination
     remainder: Array
     smooth: Array
 
     @classmethod
     def of(
-        cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
-    ) -> _Round:
-        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms, asked.stack)
-        return cls._on(asked, ladder, seeds, detours=False)
+        cls, inputs: _Inputs, whitening: Whitening, beside: Sequence[Kernel], seeds: Sequence[tuple[int, ...]]
+    ) -> _Iteration:
+        models = ModelSearch(
+            inputs.linear, whitening, list(beside), inputs.log_prior, inputs.rivals, inputs.kernels, inputs.stack
+        )
+        return cls._searched(inputs, models, seeds, detours=False)
 
-    def without(self, out: frozenset[int]) -> _Round:
+    def without(self, out: frozenset[int]) -> _Iteration:
         """Return the round without some blocks, started from the best combination without them."""
-        return self._on(self.asked, self.ladder.without(out), [tuple(b for b in self.best.blocks if b not in out)])
+        return self._searched(
+            self.inputs, self.models.without(out), [tuple(b for b in self.best.blocks if b not in out)]
+        )
 
     @classmethod
-    def _on(cls, asked: _Asked, ladder: Ladder, seeds: Sequence[tuple[int, ...]], *, detours: bool = True) -> _Round:
-        ladder.run(seeds, detours=detours)
-        rung, best = ladder.consensus(asked.families)
-        white = ladder.whitened_at(rung)
-        remainder = left_of(asked.linear, white, parameter_values(asked.linear, ladder.beside(rung).gram, best))
-        return cls(asked, ladder, rung, best, remainder, discrepancy_mean(white, remainder))
+    def _searched(
+        cls, inputs: _Inputs, models: ModelSearch, seeds: Sequence[tuple[int, ...]], *, detours: bool = True
+    ) -> _Iteration:
+        models.run(seeds, detours=detours)
+        hyper, best = models.consensus(inputs.families)
+        white = models.whitened_at(hyper)
+        remainder = residual_of(
+            inputs.linear, white, parameter_values(inputs.linear, models.search_at(hyper).gram, best)
+        )
+        return cls(inputs, models, hyper, best, remainder, discrepancy_mean(white, remainder))
 
     @property
-    def form(self) -> Form | None:
-        return self.ladder.forms[self.rung[0]] if self.rung[0] >= 0 else None
+    def kernel(self) -> Kernel | None:
+        return self.models.kernels[self.hyper[0]] if self.hyper[0] >= 0 else None
 
     @property
     def state(self) -> tuple[object, ...]:
-        return _state(self.best.blocks, self.form, self.ladder.whitening)
+        return _state(self.best.blocks, self.kernel, self.models.whitening)
 
     @property
-    def rough(self) -> Array:
+    def rough_residual(self) -> Array:
         """Residual (N, m) less a smooth discrepancy; a per-pose discrepancy is not subtracted."""
-        return self.remainder if self.form is None or self.form.anew else self.remainder - self.smooth
+        return self.remainder if self.kernel is None or self.kernel.grouped else self.remainder - self.smooth
 
     @property
     def leverage(self) -> float:
         """Share of the equations fitted by effects, frames and a smooth discrepancy."""
-        flat, smooth = self.asked.linear.frames.shape[2], self.ladder.whitened_at(self.rung).smooth
+        flat, smooth = self.inputs.linear.frames.shape[2], self.models.whitened_at(self.hyper).smooth
         followed = self.best.effective + flat
-        if smooth is not None and self.form is not None and not self.form.anew:
+        if smooth is not None and self.kernel is not None and not self.kernel.grouped:
             followed += smooth.degrees
-        equations = self.ladder.beside(self.rung).gram.equations + flat
+        equations = self.models.search_at(self.hyper).gram.equations + flat
         return float(min(followed / max(equations, 1), settings.MOST_LEVERAGE))
 
-    def told(self, aside: NDArray[np.bool_]) -> Explanation:
+    def explanation(self, aside: NDArray[np.bool_]) -> Explanation:
         """Explanation of this round.
 
         Settings and values are those of the best correction: with a smooth discrepancy, which no correction contains,
         the effects are refitted without it, at a noise that includes it.
         """
-        linear, ladder = self.asked.linear, self.ladder
-        rung = self.rung if self.form is None or self.form.anew else PLAIN
-        search, white = ladder.beside(rung), ladder.whitened_at(rung)
+        linear, models = self.inputs.linear, self.models
+        hyper = self.hyper if self.kernel is None or self.kernel.grouped else PLAIN
+        search, white = models.search_at(hyper), models.whitened_at(hyper)
         best = (
             search.evaluate(self.best.blocks)
-            if rung == self.rung
-            else search.set_best(self.best.blocks, self.asked.families)
+            if hyper == self.hyper
+            else search.set_best(self.best.blocks, self.inputs.families)
         )
         values = parameter_values(linear, search.gram, best)
-        ladder.weigh_pairs(self.rung, self.best)
-        compared, probabilities = ladder.probabilities()
-        odds = ladder.forms_in_question()
+        models.evaluate_pairs(self.hyper, self.best)
+        compared, probabilities = models.probabilities()
+        odds = models.kernel_probabilities()
         return Explanation(
             linear,
             white,
@@ -619,12 +639,12 @@ class _Round:
             [replace(c, values=NOTHING, covariance=NOTHING) for c in compared],
             probabilities,
             values,
-            left_of(linear, white, values),
+            residual_of(linear, white, values),
             self.smooth,
             aside,
-            Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
-            ladder.in_question(self.best),
-            replace(self, asked=replace(self.asked, stack=None), ladder=ladder.bare()),
+            Discrepancy(self.kernel, self.hyper[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
+            models.plausible_kernels(self.best),
+            replace(self, inputs=replace(self.inputs, stack=None), models=models.without_columns()),
         )
 
 
@@ -633,7 +653,7 @@ def log_odds() -> float:
     return float(np.log(settings.PRIOR_PROBABILITY / (1.0 - settings.PRIOR_PROBABILITY)))
 
 
-def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
+def exclusive_settings(families: Sequence[str]) -> frozenset[frozenset[int]]:
     """Pairs of blocks that are settings of one effect, and exclude each other."""
     pairs = combinations(range(len(families)), 2)
     return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
@@ -668,7 +688,7 @@ def share_of_places(count: int, among: int) -> float:
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
 
 
-def left_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
+def residual_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
     """Residual (N, m): gap less effects and frames."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
     left = linear.gap - sum(moved, np.zeros_like(linear.gap))

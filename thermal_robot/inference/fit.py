@@ -20,8 +20,15 @@ from thermal_robot.errors import EffectError, EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns, unknown_frames
 from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.exact import Settled, at_exact_model, constants_moved, gauss_newton, settle, weighed
-from thermal_robot.inference.explain import Discrepancy, Explanation, left_of
+from thermal_robot.inference.exact import (
+    ExactSelection,
+    at_exact_model,
+    gauss_newton,
+    refined_blocks,
+    select_exactly,
+    weighed,
+)
+from thermal_robot.inference.explain import Discrepancy, Explanation, residual_of
 from thermal_robot.inference.grouping import near_repeats
 from thermal_robot.inference.problem import Linear, Products, frame_step, gram, parameter_values
 from thermal_robot.inference.registration import found_frames, frames_known, moved, refined_frames, register
@@ -84,8 +91,8 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
     variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
-    settled = settle(nominal, variants, progress)
-    return _fitted(campaign, settled, needs, variants)
+    selection = select_exactly(nominal, variants, progress)
+    return _fitted(campaign, selection, needs, variants)
 
 
 def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
@@ -122,21 +129,21 @@ def refit(
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
     # rows that were set aside are judged anew beside what joins: they may be what it explains
     before = None if starts and known.explanation.outliers.any() else known.explanation
-    settled = settle(known.corrected, whole, progress, held=known.effects, before=before, starts=starts)
-    return _fitted(known.campaign, settled, known.needs, whole)
+    selection = select_exactly(known.corrected, whole, progress, held=known.effects, before=before, starts=starts)
+    return _fitted(known.campaign, selection, known.needs, whole)
 
 
 def _fitted(
     campaign: Campaign,
-    settled: Settled,
+    selection: ExactSelection,
     needs: dict[str, tuple[str, ...]],
     variants: dict[str, tuple[Effect, ...]],
 ) -> Fit:
-    explanation = settled.explanation
+    explanation = selection.explanation
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
-    corrected = settled.observations if settled.held else nominal
-    return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, variants)
+    corrected = selection.observations if selection.held else nominal
+    return Fit(campaign, nominal, before, corrected, explanation, selection.held, selection.families, needs, variants)
 
 
 def require_enough(campaign: Campaign) -> None:
@@ -234,20 +241,21 @@ def _explained(
 
     Starts at the weights and scales of a nearby explanation ``before``, if any.
     """
-    noise, use = Noise.of(observations.campaign), np.ones(observations.campaign.samples, dtype=bool)
+    noise = Noise.of(observations.campaign)
     linear = at_exact_model(observations, [block(observations, effect).held for effect in effects], held)
     # effects that are far off, and gross errors, are settled first, beside a noise that is free
-    whitening = before.whitening if before else replace(first_whitening(linear, noise, use), held=0.0)
-    aside, rounds, known = before.outliers if before else ~use, 0, before is not None
+    whitening = before.whitening if before else first_whitening(linear, noise)
+    aside = before.outliers if before else np.zeros(len(linear.gap), dtype=bool)
+    rounds, known = 0, before is not None
     best, flat = before.best if before else None, linear.frames.shape[2]
     while True:
         problem, rounds = gram(linear, whitening), rounds + 1
         best = Search(problem, [0.0] * len(effects)).evaluate(range(len(effects)), best)
         values = parameter_values(linear, problem, best)
-        left = left_of(linear, whitening, values)
+        left = residual_of(linear, whitening, values)
         # the share of the equations that effects and frames take up
         leverage = float(min((best.effective + flat) / max(problem.equations + flat, 1), settings.MOST_LEVERAGE))
-        then, later = reweigh(left, noise, use, leverage, linear.measures)
+        then, later = reweigh(left, noise, leverage, linear.measures)
         if (known and (later == aside).all()) or rounds > settings.FIRST_ROUNDS:
             none = Discrepancy(None, 0.0, 0.0, {}, best.noise)
             sure = (best,), np.ones(1)
@@ -269,4 +277,4 @@ def _best_settings(
         rivals = [block(observations, setting).held for setting in own]
         scores = [weighed(kept, [*chosen[:k], rival, *chosen[k + 1 :]]) for rival in rivals]
         chosen[k] = rivals[int(np.argmax(scores))]
-    return [item.effect for item in constants_moved(kept, observations, chosen, settings.REFINEMENT)]
+    return [item.effect for item in refined_blocks(kept, observations, chosen, settings.REFINEMENT)]

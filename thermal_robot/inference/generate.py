@@ -30,12 +30,12 @@ from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import blocks, each, in_order, neighbourhoods
 from thermal_robot.inference.screening import (
+    RowSample,
+    ScanCache,
     Scanned,
-    Seats,
     Target,
-    Thin,
+    bic_gain,
     explained_by,
-    gained,
     independent,
     orders,
     peak,
@@ -56,7 +56,7 @@ class _Sums:
     """Cumulative sums, in the order of measurement, of products of a place's d displacement columns.
 
     They are those with each other, with the r columns of the design, and with the residual, of which ``squares`` (N,)
-    are the squared lengths; ``total`` and ``freedom`` as of a :class:`~thermal_robot.inference.screening.Seat`.
+    are the squared lengths; ``total`` and ``freedom`` as of ``PlaceStatistics``.
     """
 
     products: Array
@@ -69,12 +69,12 @@ class _Sums:
     @classmethod
     def of(cls, target: Target, moves: Array, order: NDArray[np.int64]) -> _Sums:
         """Cumulative sums of the columns (N, m, d) of a place over a residual."""
-        (rows, m, d), seat = moves.shape, target.seat(moves)
-        parts = (seat.weight, seat.design.transpose(2, 0, 1), seat.remainder)
+        (rows, m, d), statistics = moves.shape, target.statistics(moves)
+        parts = (statistics.weight, statistics.design.transpose(2, 0, 1), statistics.remainder)
         products = np.concatenate([part.reshape(rows, -1) for part in parts], axis=1)[order]
         summed = np.concatenate([np.zeros((1, products.shape[1])), np.cumsum(products, axis=0)])
         squares = (target.white.reshape(rows, m) ** 2).sum(axis=1)[order]
-        return cls(products, summed, squares, (m, d, len(seat.design)), seat.total, seat.freedom)
+        return cls(products, summed, squares, (m, d, len(statistics.design)), statistics.total, statistics.freedom)
 
     @property
     def fewest(self) -> int:
@@ -83,12 +83,12 @@ class _Sums:
         return settings.FEWEST_ASIDE + -(-2 * d // m)
 
     def gains(self, sums: Array, total: float, freedom: int) -> Array:
-        """Log evidence (C,) of a displacement of some rows (:attr:`Worth.gain`), from sums (C, ·) over these rows."""
+        """Log evidence (C,) of a displacement of some rows (:attr:`Score.gain`), from sums (C, ·) over these rows."""
         (_, d, r), runs = self.size, len(sums)
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
         explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
-        return gained(total, explained, rank, freedom)
+        return bic_gain(total, explained, rank, freedom)
 
     def best(self, runs: Runs) -> Runs:
         """Run (2,) of rows with the largest gain; the empty one where there is none."""
@@ -151,9 +151,9 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
             for gain, law in _at_place(observations, place, _Sums.of(target, own, order), order):
                 # the choice among all places and runs, and the law itself, are paid for
                 law = replace(law, tried=law.tried * len(places))
-                worth, key = gain + log_odds() - float(np.log(law.tried)), (law.kind, law.place)
-                if worth > 0.0 and worth - instead > found.get(key, (0.0, law))[0]:
-                    found[key] = (worth - instead, law)
+                net, key = gain + log_odds() - float(np.log(law.tried)), (law.kind, law.place)
+                if net > 0.0 and net - instead > found.get(key, (0.0, law))[0]:
+                    found[key] = (net - instead, law)
     return tuple(law for _, law in sorted(found.values(), key=lambda item: -item[0]))
 
 
@@ -164,7 +164,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
     event: the event must gain more than the effect.
     """
     e = fit.explanation
-    single = e.outliers & ~gathered(fit, e.outliers)
+    single = e.outliers & ~clustered_outliers(fit, e.outliers)
     blocks = e.best.blocks
 
     def target(some: Iterable[int], trusted: Rows) -> Target:
@@ -175,10 +175,10 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
     yield target(blocks, e.outliers & ~single), 0.0
     for out in blocks if len(blocks) <= settings.LEFT_OUT else ():
         rest = target([b for b in blocks if b != out], ~single)
-        yield rest, rest.worth(e.linear.blocks[out].columns).gain
+        yield rest, rest.score(e.linear.blocks[out].columns).gain
 
 
-def gathered(fit: Fit, aside: Rows) -> Rows:
+def clustered_outliers(fit: Fit, aside: Rows) -> Rows:
     """Outliers (N,) that cluster in the order of measurement more than chance allows."""
     order = in_order(fit.campaign)
     near = np.convolve(aside[order], np.ones(2 * settings.NEAR_IN_ORDER + 1), "same")
@@ -264,13 +264,13 @@ def waves(fit: Fit) -> JointRipple:
     equations and in one equation a row, along the joint, since the components of a pose are rarely independent. The
     held-out residual must not grow by time, and hardly by region.
     """
-    thin = Thin.of(fit)
-    others = [b for b in fit.explanation.best.blocks if not isinstance(thin.linear.blocks[b].effect, JointRipple)]
+    sample = RowSample.of(fit)
+    others = [b for b in fit.explanation.best.blocks if not isinstance(sample.linear.blocks[b].effect, JointRipple)]
     # it goes on from the waves that the fit holds
     held = ripple_of(fit)
     share = held.tried ** (1.0 / max(len(held.orders), 1))
     known = [_Wave(joint, order, share) for joint, order in zip(held.joints, held.orders, strict=True)]
-    return _Pursuit.of(thin, others, fit).run(known)
+    return _Pursuit.of(sample, others, fit).run(known)
 
 
 def ripple_of(fit: Fit) -> JointRipple:
@@ -314,8 +314,8 @@ class _Pursuit:
     changed: Rows
 
     @classmethod
-    def of(cls, thin: Thin, others: Sequence[int], fit: Fit) -> _Pursuit:
-        linear, best, campaign = thin.linear, fit.explanation.best, thin.observations.campaign
+    def of(cls, sample: RowSample, others: Sequence[int], fit: Fit) -> _Pursuit:
+        linear, best, campaign = sample.linear, fit.explanation.best, sample.observations.campaign
         columns = [linear.blocks[b].columns for b in others]
         sizes = [linear.blocks[b].sizes * best.scales[b] for b in others]
         robot = campaign.robot
@@ -324,23 +324,23 @@ class _Pursuit:
             for j, joint in enumerate(robot.joint_names)
         }
         return cls(
-            thin.observations,
+            sample.observations,
             linear.gap,
             np.concatenate([linear.frames, *columns], axis=2),
             linear.frames.shape[2],
             np.concatenate([np.zeros(0), *sizes]) ** -2.0,
             {joint: grid for joint, grid in grids.items() if len(grid)},
             (each(blocks(campaign)), each(neighbourhoods(campaign, settings.FOLDS))),
-            thin.changed,
+            sample.changed,
         )
 
     @property
-    def allowed(self) -> Array:
+    def allowed_ratio(self) -> Array:
         """Largest ratio (S,) of held-out residuals after and before, by scheme: 1 by time, slightly more by region."""
         return np.array([1.0, settings.WORSE_ELSEWHERE**2])
 
     @property
-    def price(self) -> float:
+    def independent_waves(self) -> float:
         """Number of independent waves among which the best is picked."""
         return max(sum(independent(grid) for grid in self.grids.values()), 1.0)
 
@@ -348,14 +348,14 @@ class _Pursuit:
         """Add waves to those that were found before, then eliminate those that became needless."""
         astray, target = np.ones(len(self.folds)), self._target(found)
         while len(found) < settings.MOST_WAVES:
-            wider = self._wider(found, astray, target)
+            wider = self._with_best_wave(found, astray, target)
             if wider is None:
                 break
             found, astray = wider
             target = self._target(found, target)
         return _ripple(self._pruned(found, target))
 
-    def _wider(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
+    def _with_best_wave(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
         """Add the wave of the largest gain that does not harm held-out rows; ``None`` where none qualifies.
 
         ``astray`` (S,) is the held-out residual of each scheme over the smallest so far.
@@ -367,17 +367,17 @@ class _Pursuit:
         before = np.array([one.left(self.flat, prior) for one in held])
         seen = list(found)
         for _ in range(settings.WAVES_REFUSED):
-            worth = [
+            net_gains = [
                 (self._gain(target, along[wave.joint], wave) - np.log(wave.tried), wave)
                 for wave in self._peaks(target, found, seen)
             ]
-            offered = [wave for gain, wave in sorted(worth, key=lambda item: -item[0]) if gain > 0.0]
+            offered = [wave for gain, wave in sorted(net_gains, key=lambda item: -item[0]) if gain > 0.0]
             if not offered:
                 break
             for wave in offered:
                 further, more = self._wave(wave) * root, np.concatenate([prior, self._priors([wave])])
                 left = astray * np.array([one.left(self.flat, more, further) for one in held]) / before
-                if (left <= self.allowed).all():
+                if (left <= self.allowed_ratio).all():
                     return [*found, wave], np.maximum(left, 1.0)
                 seen.append(wave)
         return None
@@ -388,16 +388,16 @@ class _Pursuit:
         while kept:
             whole = self._columns(kept) * target.root[:, :, None]
             values, last = self.gap * target.root, whole.shape[2] - 2 * np.arange(len(kept), 0, -1)
-            worth = _dropped(equations_of(whole), values.ravel(), last)
+            net_gains = _dropped(equations_of(whole), values.ravel(), last)
             for joint in {wave.joint for wave in kept}:
-                way = _way(target, self._moves(joint)[1][:, :, 0])[0]
+                way = _unit_vectors(target, self._moves(joint)[1][:, :, 0])[0]
                 own = [k for k, wave in enumerate(kept) if wave.joint == joint]
                 alone = _dropped(np.einsum("nm,nmk->nk", way, whole), (way * values).sum(axis=1), last[own])
-                worth[own] = np.minimum(worth[own], alone)
-            worth -= np.log([wave.tried for wave in kept])
-            if worth.min() > 0.0:
+                net_gains[own] = np.minimum(net_gains[own], alone)
+            net_gains -= np.log([wave.tried for wave in kept])
+            if net_gains.min() > 0.0:
                 break
-            kept.pop(int(np.argmin(worth)))
+            kept.pop(int(np.argmin(net_gains)))
         return kept
 
     def _peaks(self, target: Target, found: Sequence[_Wave], seen: Sequence[_Wave]) -> Iterator[_Wave]:
@@ -413,12 +413,12 @@ class _Pursuit:
                 free &= (wave.joint != joint) | (np.abs(grid - wave.order) > width)
             for wave in found:
                 echo |= (wave.joint != joint) & (np.abs(grid - wave.order) <= width)
-            seat = target.seat(moves)
-            gains = np.where(free, periodogram(seat, q, grid), -np.inf)
-            for among, tried in ((free, self.price), (free & echo, float(len(found) * len(self.grids)))):
+            statistics = target.statistics(moves)
+            gains = np.where(free, periodogram(statistics, q, grid), -np.inf)
+            for among, tried in ((free, self.independent_waves), (free & echo, float(len(found) * len(self.grids)))):
                 if among.any():
                     best = int(np.argmax(np.where(among, gains, -np.inf)))
-                    order = peak(seat, q, grid[best : best + 1]) if np.isfinite(gains[best]) else 0.0
+                    order = peak(statistics, q, grid[best : best + 1]) if np.isfinite(gains[best]) else 0.0
                     if grid[0] <= order <= grid[-1]:  # what peaks beyond is no ripple
                         yield _Wave(joint, order, tried)
 
@@ -451,7 +451,7 @@ class _Pursuit:
 
     def _gain(self, target: Target, along: Target, wave: _Wave) -> float:
         """Log evidence of a wave: the lesser of that in all equations and in one equation a row."""
-        return min(target.worth(self._wave(wave)).gain, along.worth(self._functions(wave)).gain)
+        return min(target.score(self._wave(wave)).gain, along.score(self._functions(wave)).gain)
 
 
 def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
@@ -465,7 +465,7 @@ def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
     own = np.column_stack([pairs, pairs + 1])
     inner = root[own] @ root[own].transpose(0, 2, 1)
     more = np.einsum("wi,wi->w", fitted[own], np.linalg.solve(inner, fitted[own][:, :, None])[:, :, 0])
-    return np.array([gained(rest + each, each, 2, len(values) - root.shape[1] + 2) for each in more])
+    return np.array([bic_gain(rest + each, each, 2, len(values) - root.shape[1] + 2) for each in more])
 
 
 def _ripple(waves: Sequence[_Wave]) -> JointRipple:
@@ -482,7 +482,7 @@ def _orders(q: Array, slides: bool) -> Array:
     return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
 
 
-def _way(target: Target, moves: Array) -> tuple[Array, Array]:
+def _unit_vectors(target: Target, moves: Array) -> tuple[Array, Array]:
     """Return the unit vectors (N, m) along a joint's displacement (N, m), weighted, and its lengths (N,)."""
     own = moves * target.root
     length = np.linalg.norm(own, axis=1)
@@ -491,7 +491,7 @@ def _way(target: Target, moves: Array) -> tuple[Array, Array]:
 
 def _along(target: Target, moves: Array) -> Target:
     """Target of one equation a row: the component along the displacement (N, m) of one joint."""
-    way, length = _way(target, moves)
+    way, length = _unit_vectors(target, moves)
     basis = orthonormal(np.einsum("nm,nmr->nr", way, target.basis.reshape(*way.shape, -1)))
     white = np.einsum("nm,nm->n", way, target.white.reshape(way.shape))
     return Target(without(white, basis), length[:, None], basis)
@@ -513,27 +513,27 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
     Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
     have absorbed an unlisted cause. A law is called ``discovered.<number>``.
     """
-    thin = Thin.of(fit)
+    sample = RowSample.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
-    targets = [thin.target(blocks) for blocks in remainders]
+    targets = [sample.target(blocks) for blocks in remainders]
     if fit.explanation.outliers.any():
-        targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
-    found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
-    offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
+        targets += [sample.target(blocks, sound=True) for blocks in remainders[:2]]
+    found, _ = scan(sample.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
+    offered = [_best_laws(sample, target, own) for target, own in zip(targets, found, strict=True)]
     chosen = list(happened[: settings.LIKELY_EVENTS])
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
     named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
-    return tuple(islice((law for law in named if not listed(thin, law)), settings.COMPARED_LAWS))
+    return tuple(islice((law for law in named if not listed(sample, law)), settings.COMPARED_LAWS))
 
 
-def listed(thin: Thin, law: Discovered) -> bool:
+def listed(sample: RowSample, law: Discovered) -> bool:
     """Whether a known effect, with a zero that is off, is identical to a law in its joint."""
     if law.kind != "joint":
         return False
-    own = [item for item in thin.linear.blocks if item.effect.places == (law.place,)]
-    free = [item.columns for item in own if constant(item.effect, thin.observations)] + [thin.linear.frames]
-    columns = equations_of(block(thin.observations, law).columns)
+    own = [item for item in sample.linear.blocks if item.effect.places == (law.place,)]
+    free = [item.columns for item in own if constant(item.effect, sample.observations)] + [sample.linear.frames]
+    columns = equations_of(block(sample.observations, law).columns)
     length = np.linalg.norm(columns, axis=0).max()
     for item in own:
         basis = orthonormal(equations_of(np.concatenate([item.columns, *free], axis=2)))
@@ -554,21 +554,25 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
         yield from (tuple(b for b in best if b != out) for out in effects)
 
 
-def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
+def _best_laws(sample: RowSample, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
     """Best laws of a residual, with the number of those tried; for a segment also the law of the joint behind it."""
-    first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
-    joints = thin.observations.robot.joint_names
+    first = [(item, shaped(sample.observations, target, item.law)) for item in _with_joints(own)]
+    joints = sample.observations.robot.joint_names
     at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
     if at_links:
         simpler = [replace(s.law, kind="joint") for _, s in at_links]
-        gains = Seats(thin.observations, [target]).gains(simpler)[0]
+        gains = ScanCache(sample.observations, [target]).gains(simpler)[0]
         first += [
             (item, replace(s, law=law, gain=float(gain)))
             for (item, s), law, gain in zip(at_links, simpler, gains, strict=True)
         ]
-    worth = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
-    worth.sort(key=lambda entry: -entry[0])
-    return [replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.RUNG_REACH]
+    net_gains = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
+    net_gains.sort(key=lambda entry: -entry[0])
+    return [
+        replace(s.law, tried=float(item.tried * s.tried))
+        for gain, item, s in net_gains
+        if gain > -settings.AMPLITUDE_REACH
+    ]
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:

@@ -48,7 +48,7 @@ def in_order(campaign: Campaign) -> Labels:
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 
-def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def consecutive_outliers(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Outliers (N,) in runs of three or more consecutive rows: a change, not gross errors."""
     order = in_order(campaign)
     own = aside[order]
@@ -76,10 +76,10 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     return labels
 
 
-def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
-    """Label (N,), 0..B−1, of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
+def blocks(campaign: Campaign) -> Labels:
+    """Label (N,), 0..B−1, of one of few blocks of consecutive measurements: folds, and groups of the jackknife.
 
-    Blocks are the folds of cross-validation, and the groups of the jackknife.
+    Near-repeats stay together.
     """
     cluster = near_repeats(campaign)
     rank = np.empty(campaign.samples)
@@ -90,7 +90,7 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
     order = np.argsort(middle, kind="stable")
     ahead = np.empty(len(order))
     ahead[order] = np.cumsum(sizes[order]) - sizes[order]
-    count = min(count, len(order))
+    count = min(settings.BLOCKS, len(order))
     block = np.minimum(ahead * count // campaign.samples, count - 1).astype(np.int64)[cluster]
     return np.unique(block, return_inverse=True)[1].astype(np.int64)
 
@@ -98,7 +98,7 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
 STAND = "stand"  # Label of what stays in one place while the robot is brought to it
 
 
-def held_together(campaign: Campaign) -> tuple[Labels, str]:
+def held_out_groups(campaign: Campaign) -> tuple[Labels, str]:
     """(N,) label of the rows that are held out at a time, and what they are: stands, or blocks where these are few."""
     stands = campaign.labels.get(STAND)
     if stands is not None and campaign.position is None:

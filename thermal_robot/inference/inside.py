@@ -56,7 +56,7 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
     kept = distinct(across, within)
     free, sizes = np.array([of[k] != name for k in kept]), np.array([wanted[k].size for k in kept])
     covariance = seen.T @ (e.values[b][1] / np.outer(item.sizes, item.sizes)) @ seen
-    told, covariance, prior = _freed(
+    told, covariance, prior = _without_prior_of(
         seen.T @ (values / item.sizes), covariance, e.best.scales[b], across[:, kept], free
     )
     figures = sizes * np.stack([told, np.sqrt(np.maximum(np.diag(covariance), 0.0)), prior])
@@ -70,7 +70,7 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
     return tuple(found)
 
 
-def _freed(
+def _without_prior_of(
     values: Array, covariance: Array, scale: float, across: Array, free: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array]:
     """Values (k,), covariance (k, k) and prior deviations (k,) in other coordinates, some without their prior.

@@ -1,6 +1,6 @@
 """Smooth model discrepancy as a Gaussian process in the rows' covariance (Kennedy and O'Hagan 2001).
 
-The whitened gap is y = F f + X θ + δ + e with e ~ N(0, s²) and δ ~ N(0, s² τ² K). K has one of several forms, each of
+The whitened gap is y = F f + X θ + δ + e with e ~ N(0, s²) and δ ~ N(0, s² τ² K). K is one of several kernels, each of
 mean one on its diagonal, so that τ is the discrepancy's rms over the noise:
 
 * ``tool``: the target moves by a smooth function of all joint positions and conditions together;
@@ -37,7 +37,7 @@ Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class DesignMatrix:
     """Design matrix of K columns over E = n·m equations; columns shared by several settings are stored once.
 
     ``different`` are U arrays (N, m) of all rows, ``number`` (K,) which of them each column is, ``used`` (n,) the rows
@@ -50,7 +50,7 @@ class Stack:
     root: Array
 
     @classmethod
-    def of(cls, columns: Iterable[Array]) -> Stack:
+    def of(cls, columns: Iterable[Array]) -> DesignMatrix:
         """Stack of columns (N, m, ·) over all rows, unweighted."""
         different: list[Array] = []
         number: list[int] = []
@@ -66,13 +66,13 @@ class Stack:
         return cls(tuple(different), np.array(number), np.arange(len(different[0])), np.ones(different[0].shape))
 
     @classmethod
-    def around(cls, array: Array, measures: int) -> Stack:
+    def from_array(cls, array: Array, measures: int) -> DesignMatrix:
         """Stack of the columns (E, K) of an array."""
         different = tuple(column.reshape(-1, measures) for column in array.T)
         rows = len(array) // measures
         return cls(different, np.arange(len(different)), np.arange(rows), np.ones((rows, measures)))
 
-    def weighed(self, used: Numbers, root: Array) -> Stack:
+    def weighted(self, used: Numbers, root: Array) -> DesignMatrix:
         """Columns over the rows in use, (n,), times ``root`` (n, m), computed on demand."""
         return replace(self, used=used, root=root)
 
@@ -81,7 +81,7 @@ class Stack:
         """Number of equations E."""
         return self.root.size
 
-    def differing(self, kept: Numbers) -> Stack:
+    def some_columns(self, kept: Numbers) -> DesignMatrix:
         """Stack of some of the distinct columns."""
         return replace(self, different=tuple(self.different[k] for k in kept), number=np.arange(len(kept)))
 
@@ -114,7 +114,7 @@ def chunks(rows: int) -> Iterator[slice]:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class KernelFactor:
     """Factor of a kernel: B = functions (N, k) × displacements (N, m, c), times ``root`` (n,) of the rows' weights.
 
     Moves are in units of the noise; (m, c) where all rows have the same.
@@ -174,7 +174,7 @@ Labels = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Grouped:
+class GroupKernel:
     """Covariance 1 + τ²BBᵀ of a block-diagonal factor B: c columns for each of G groups of rows.
 
     With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ²
@@ -191,7 +191,7 @@ class Grouped:
     vector: Array = field(repr=False)
 
     @classmethod
-    def of(cls, moves: Array, groups: NDArray[np.int64], weights: Array, noise: Array) -> Grouped:
+    def of(cls, moves: Array, groups: NDArray[np.int64], weights: Array, noise: Array) -> GroupKernel:
         """Scale displacements (N, m, c) to unit mean square, in units of the noise, and decompose each group."""
         everywhere = moves / noise[:, None]
         everywhere = everywhere / np.sqrt(max(float((everywhere**2).sum(axis=2).mean()), settings.TINY))
@@ -202,9 +202,9 @@ class Grouped:
         value, vector = np.linalg.eigh(inside)
         return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
 
-    def along(self, stack: Array | Stack) -> list[Array]:
+    def along(self, stack: Array | DesignMatrix) -> list[Array]:
         """Product BᵀS (G c, U) in the eigenvectors of every group, S the distinct columns."""
-        stack = stack if isinstance(stack, Stack) else Stack.around(stack, self.moves.shape[1])
+        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, self.moves.shape[1])
         found = np.zeros((*self.value.shape, len(stack.different)))
         for groups, rows, starts in _in_chunks(self.group):
             each = self.moves[rows].transpose(0, 2, 1) @ stack.rows(rows)
@@ -242,11 +242,11 @@ class Grouped:
         rows = len(self.groups), self.everywhere.shape[1]
         return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
 
-    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken <.discrepancy.Smooth.taken>`."""
-        heard = tau**2 * self.value > floor
-        unit = self.vector * np.where(heard, 1.0 / np.sqrt(np.where(heard, self.value, 1.0)), 0.0)[:, None, :]
-        tight = 1.0 / np.where(heard, tau**2 * self.value, 1.0)
+    def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
+        above = tau**2 * self.value > floor
+        unit = self.vector * np.where(above, 1.0 / np.sqrt(np.where(above, self.value, 1.0)), 0.0)[:, None, :]
+        tight = 1.0 / np.where(above, tau**2 * self.value, 1.0)
         numbers, found = np.flatnonzero(rows), np.zeros((1, 1))
         for groups, which, starts in _in_chunks(self.group[numbers]):
             own = self.moves[numbers[which]] @ unit[self.group[numbers[which]]]
@@ -284,10 +284,10 @@ def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class Kernel:
     """Kernel of the discrepancy: K = B Bᵀ over all rows, B the products of functions and displacements.
 
-    ``functions`` (N, k) are smooth in what is commanded and recorded; of a form that is ``anew`` (N,) the number of
+    ``functions`` (N, k) are smooth in what is commanded and recorded; of one that is ``grouped`` (N,) the number of
     each pose or visit. ``moves`` (N, m, c) or, the same for all rows, (m, c): displacement of the target by each
     component, root frame axes, m and rad. ``place`` is where it enters, the first of several joints (``further``);
     empty where it may be anywhere.
@@ -296,7 +296,7 @@ class Form:
     name: str
     functions: Array
     moves: Array
-    anew: bool = False
+    grouped: bool = False
     place: tuple[str, str] = ("", "")
     further: tuple[str, ...] = ()
 
@@ -316,28 +316,28 @@ class Form:
         kind, name = self.place
         return (name, *self.further) if kind == "joint" else ()
 
-    def over(self, relative: Array | None) -> Form:
+    def over(self, relative: Array | None) -> Kernel:
         """Kernel with each row divided by its relative noise (N, m); ``None`` if all are one."""
         if relative is None:
             return self
-        if not self.anew and bool((relative == relative[:, :1]).all()):
+        if not self.grouped and bool((relative == relative[:, :1]).all()):
             return replace(self, functions=self.functions / relative[:, :1])
         alike = bool((relative == relative[:1]).all())  # the same for all rows, if not for all figures
         return replace(self, moves=self.moves / (relative[0, :, None] if alike else relative[:, :, None]))
 
-    def beside(self, other: Form, part: float) -> Form:
+    def with_joint(self, other: Kernel, part: float) -> Kernel:
         """Kernel with one more joint, whose rms is a part of that of all joints so far."""
-        length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
+        length = [np.sqrt((kernel.moves**2).sum(axis=2).mean()) for kernel in (self, other)]
         moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
         joint = other.place[1]
         return replace(self, name=f"{self.name}, {joint}", moves=moves, further=(*self.further, joint))
 
 
 @dataclass(frozen=True, eq=False)
-class Smooth:
+class KernelCovariance:
     """Covariance 1 + τ²BBᵀ of the rows in use, in units of the noise."""
 
-    spectrum: Spectrum | Grouped
+    spectrum: SmoothKernel | GroupKernel
     tau: float
 
     def products(self, stack: Array) -> Array:
@@ -348,12 +348,12 @@ class Smooth:
         """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K); slower than :meth:`products`."""
         return self.spectrum.whitened(self.tau, stack)
 
-    def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+    def reduction(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
         """Reduction SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
 
         ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
         """
-        return self.spectrum.taken(self.tau, rows, white, floor)
+        return self.spectrum.reduction(self.tau, rows, white, floor)
 
     @property
     def log_det(self) -> float:
@@ -371,7 +371,7 @@ class Smooth:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class SmoothKernel:
     """Decomposed kernel on the rows in use for every amplitude τ: one Cholesky factor each, no (E, M) array.
 
     With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity, Sᵀ(1 + τ²BBᵀ)⁻¹S =
@@ -381,18 +381,18 @@ class Spectrum:
     """
 
     axes: Array
-    parts: tuple[Part, ...]
-    everywhere: tuple[Part, ...]
+    parts: tuple[KernelFactor, ...]
+    everywhere: tuple[KernelFactor, ...]
     own: tuple[Array, ...]
     factors: dict[tuple[float, int], Array] = field(default_factory=dict)
     vectors: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, form: Form, weights: Array, noise: Array) -> Spectrum:
+    def of(cls, kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel:
         """Scale a kernel to unit mean diagonal, in units of the noise."""
         used = np.flatnonzero(weights > 0)
-        moves = form.moves / noise[:, None]
-        weight = (form.functions**2).sum(axis=1) if moves.ndim == 3 else (form.functions**2).sum(axis=1).mean()
+        moves = kernel.moves / noise[:, None]
+        weight = (kernel.functions**2).sum(axis=1) if moves.ndim == 3 else (kernel.functions**2).sum(axis=1).mean()
         square = (moves**2).sum(axis=-1)
         mean = (square * weight[:, None]).mean() if moves.ndim == 3 else square.mean() * weight
         moves = moves / np.sqrt(max(float(mean), settings.TINY))
@@ -401,14 +401,14 @@ class Spectrum:
         else:
             value, axes = np.linalg.eigh(moves @ moves.T)
             each = list(np.sqrt(np.maximum(value, 0.0))[:, None, None])
-        parts = tuple(Part(form.functions, own, used, np.sqrt(weights[used])) for own in each)
+        parts = tuple(KernelFactor(kernel.functions, own, used, np.sqrt(weights[used])) for own in each)
         every = np.arange(len(weights))
-        everywhere = tuple(Part(form.functions, own, every, np.ones(len(every))) for own in each)
+        everywhere = tuple(KernelFactor(kernel.functions, own, every, np.ones(len(every))) for own in each)
         return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
 
-    def along(self, stack: Array | Stack) -> list[Array]:
+    def along(self, stack: Array | DesignMatrix) -> list[Array]:
         """Product BᵀS of each part, or, where B is wide, the part's rows of S; S the distinct columns."""
-        stack = stack if isinstance(stack, Stack) else Stack.around(stack, len(self.axes))
+        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, len(self.axes))
         found = [np.zeros((len(own), len(stack.different))) for own in self.own]
         for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
@@ -431,7 +431,7 @@ class Spectrum:
             return rows[0]
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
 
-    def back(self, parts: Sequence[Part], inner: Sequence[Array]) -> Array:
+    def back(self, parts: Sequence[KernelFactor], inner: Sequence[Array]) -> Array:
         """Product (n, m, K) of B with (c k, K) of each part."""
         found = np.empty((len(parts[0].used), len(self.axes), inner[0].shape[1]))
         for chunk in chunks(len(found)):
@@ -496,20 +496,20 @@ class Spectrum:
         m = len(self.axes)
         for k, part in enumerate(self.parts):
             value, vector = self.decomposed(k)
-            heard = tau**2 * value > floor
-            own = vector[:, heard]
+            above = tau**2 * value > floor
+            own = vector[:, above]
             if not part.wide:
-                inner = own / np.sqrt(value[heard])
+                inner = own / np.sqrt(value[above])
                 rows = [part.times(inner, chunk) for chunk in chunks(len(part.used))]
                 own = np.concatenate(rows).reshape(len(part.used) * rows[0].shape[1], inner.shape[1])
             if len(self.parts) > 1:
                 own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
             found.append(own)
-            variance.append(tau**2 * value[heard])
+            variance.append(tau**2 * value[above])
         return np.concatenate(found, axis=1), np.concatenate(variance)
 
-    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken`."""
+    def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
         basis, variance = self.eigen(tau, floor)
         columns = white(np.flatnonzero(rows))
         own = basis[np.repeat(rows, len(self.axes))]
@@ -532,41 +532,43 @@ class Spectrum:
         return self.back(self.everywhere, found)[:, :, 0]
 
 
-def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
+def decomposed(kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel | GroupKernel:
     """Decompose a kernel for every amplitude: unit mean diagonal, in units of the noise."""
-    if not form.anew:
-        return Spectrum.of(form, weights, noise)
-    moves = np.broadcast_to(form.moves, (len(form.functions), *form.moves.shape[-2:]))
-    return Grouped.of(moves, form.functions.astype(np.int64), weights, noise)
+    if not kernel.grouped:
+        return SmoothKernel.of(kernel, weights, noise)
+    moves = np.broadcast_to(kernel.moves, (len(kernel.functions), *kernel.moves.shape[-2:]))
+    return GroupKernel.of(moves, kernel.functions.astype(np.int64), weights, noise)
 
 
-def forms(observations: Observations) -> tuple[Form, ...]:
-    """Return the forms of the discrepancy that a campaign allows."""
+def discrepancy_kernels(observations: Observations) -> tuple[Kernel, ...]:
+    """Kernels of the discrepancy that a campaign allows."""
     measures = components(observations.campaign)
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
-    found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
+    found = [Kernel(f"tool, {length:g}", functions, units) for length, functions in lengths]
     smooth = [v for name, v in quantities(observations).items() if not name.startswith(settings.NO_BACKGROUND)]
     functions = np.concatenate([_spectral(values) for values in smooth], axis=1)
-    found.append(Form("places", functions, _moves(observations, measures)))
-    found += _at_one_place(observations, "places", functions, measures, anew=False)
+    found.append(Kernel("places", functions, _moves(observations, measures)))
+    found += _at_one_place(observations, "places", functions, measures, grouped=False)
     pose = repeated_poses(observations.campaign)
     each, repeated = pose.astype(float), int(pose.max()) + 1 < len(pose)
     if observations.campaign.noise_position is not None or repeated:
-        found.append(Form("poses", each, units, anew=True))
-        found += _at_one_place(observations, "poses", each, measures, anew=True)
+        found.append(Kernel("poses", each, units, grouped=True))
+        found += _at_one_place(observations, "poses", each, measures, grouped=True)
     if repeated:
-        found += _at_one_place(observations, "visits", np.arange(len(pose), dtype=float), measures, anew=True)
+        found += _at_one_place(observations, "visits", np.arange(len(pose), dtype=float), measures, grouped=True)
     return tuple(found)
 
 
-def _at_one_place(observations: Observations, what: str, functions: Array, measures: int, *, anew: bool) -> list[Form]:
+def _at_one_place(
+    observations: Observations, what: str, functions: Array, measures: int, *, grouped: bool
+) -> list[Kernel]:
     """Kernels with the same functions (N, k): one for each joint that moves, and one for the base."""
     moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
     seen = np.flatnonzero(moving(observations.q))
-    found = [Form(f"{what}, {names[j]}", functions, moves[:, :, [j]], anew, ("joint", names[j])) for j in seen]
+    found = [Kernel(f"{what}, {names[j]}", functions, moves[:, :, [j]], grouped, ("joint", names[j])) for j in seen]
     base = observations.base_sensitivity[:, :measures]
-    return [*found, Form(f"{what}, base", functions, base, anew, ("base", "base"))]
+    return [*found, Kernel(f"{what}, base", functions, base, grouped, ("base", "base"))]
 
 
 def _together(observations: Observations) -> list[Array]:

@@ -17,7 +17,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.evidence import Combination, Gram
-from thermal_robot.inference.kernels import Smooth, Stack
+from thermal_robot.inference.kernels import DesignMatrix, KernelCovariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Whitening:
     weights: Array
     noise: Array
     held: float
-    smooth: Smooth | None = None
+    smooth: KernelCovariance | None = None
     relative: Array | None = None
     seen: NDArray[np.int64] | None = None
 
@@ -95,16 +95,16 @@ class Whitening:
 def gram(linear: Linear, whitening: Whitening) -> Gram:
     """Return normal equations: frames projected out, each block reduced to the directions that the data determine."""
     if whitening.smooth is None:  # rows are then apart, and never all held at once
-        stack = white_stack(Stack.of(linear.columns), whitening)
+        stack = white_stack(DesignMatrix.of(linear.columns), whitening)
         return normal_equations(linear, whitening, stack.products(), stack.equations)
     white = whitened(linear, whitening)
     return normal_equations(linear, whitening, white.T @ white, len(white))
 
 
-def white_stack(stack: Stack, whitening: Whitening) -> Stack:
+def white_stack(stack: DesignMatrix, whitening: Whitening) -> DesignMatrix:
     """Columns over the rows with weight, in units of the noise, without the discrepancy."""
     used = np.flatnonzero(whitening.weights > 0)
-    return stack.weighed(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
+    return stack.weighted(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
 
 
 def normal_equations(

@@ -34,14 +34,14 @@ CUBE = [
 """The 24 turns of a cube: no turn is farther than 63° from the next of them."""
 
 
-class Placed(NamedTuple):
+class BaseAndTarget(NamedTuple):
     """Poses of base and target, (..., 4, 4) each, for data sets side by side."""
 
     base: Array
     tool: Array
 
 
-class Paired(Protocol):
+class PoseProtocol(Protocol):
     """Protocol of commands paired with measurements; see :class:`~thermal_robot.campaign.Campaign`."""
 
     @property
@@ -60,13 +60,13 @@ class Paired(Protocol):
     def tool_known(self) -> bool: ...  # noqa: D102
 
 
-def starts(campaign: Paired) -> Array:
+def starts(campaign: PoseProtocol) -> Array:
     """Return the initial shifts (S, 3) of the target, m, for :func:`alternate`; the first is zero."""
     fixed = campaign.tool_known or campaign.simulated_position is not None
     return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
 
 
-def soft(distance: Array) -> Array:
+def cauchy_weights(distance: Array) -> Array:
     """Cauchy weights of distances (..., N) at the scale of their median, robust to a third of gross errors."""
     scale = settings.CAUCHY_SCALE * middle(distance)[..., None] + settings.UNSEEN
     return np.asarray(1.0 / (1.0 + (distance / scale) ** 2))
@@ -80,13 +80,13 @@ def middle(values: Array) -> Array:
 
 
 def alternate(
-    campaign: Paired,
+    campaign: PoseProtocol,
     declared: Frames,
     targets: Array,
     rounds: int = settings.START_ROUNDS,
     some: NDArray[np.int64] | slice = slice(None),
     poses: Array | None = None,
-) -> tuple[Array, Placed]:
+) -> tuple[Array, BaseAndTarget]:
     """Robust registration by alternation: rigid alignment of the base, then linear fit of the target's place.
 
     Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front
@@ -118,7 +118,7 @@ def alternate(
     tool[..., :3, 3] = place
     if campaign.orientation is not None and turns is not None and not campaign.tool_known:
         tool[..., :3, :3] = _turn(turns, base, quaternion_to_rotation(campaign.orientation[..., some, :]), weights)
-    return cost[()], Placed(base, tool)
+    return cost[()], BaseAndTarget(base, tool)
 
 
 def _turn(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
@@ -160,7 +160,7 @@ def _alternated(
         away = seen - _predicted(start, turn, place) @ rotation.transpose(0, 2, 1) - shift
         distance = np.sqrt((away * away).sum(axis=2))
         before, cost = costs[moving], middle(distance)
-        bases[moving], places[moving], costs[moving], weights[moving] = base, place, cost, soft(distance)
+        bases[moving], places[moving], costs[moving], weights[moving] = base, place, cost, cauchy_weights(distance)
         moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
         if not len(moving):
             break
@@ -226,14 +226,14 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
         tool[:3, :3] = turn
         begun = replace(frames, tool=tool)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found.append((_away(some, begun), begun))
+            found.append((_median_distance(some, begun), begun))
     nearest = sorted(found, key=lambda one: one[0])[: settings.TURNS_TRIED]
     tried = [refined_frames(some, begun, robust=True) for _, begun in nearest]
-    best = min(tried, key=lambda one: _away(some, one))
+    best = min(tried, key=lambda one: _median_distance(some, one))
     return replace(best, artefacts={})
 
 
-def _away(campaign: Campaign, frames: Frames) -> float:
+def _median_distance(campaign: Campaign, frames: Frames) -> float:
     """Return the median distance that frames leave, m; infinite where it is no number."""
     distance = float(np.median(np.linalg.norm(observe(campaign, frames).gap, axis=1)))
     return distance if np.isfinite(distance) else np.inf
@@ -259,7 +259,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         root_weight = np.zeros_like(gap)
         for part in (slice(0, 3), slice(3, 6))[: gap.shape[1] // 3]:
             distance = np.linalg.norm(gap[:, part], axis=1)
-            weight = np.sqrt(soft(distance)) if robust else np.ones(len(distance))
+            weight = np.sqrt(cauchy_weights(distance)) if robust else np.ones(len(distance))
             root_weight[:, part] = weight[:, None] / (middle(distance) + settings.UNSEEN)
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])

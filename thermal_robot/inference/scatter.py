@@ -559,8 +559,8 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
     means = means / np.linalg.norm(means, axis=0)
     target = Target(without(errors * root, means), root[:, None], means)
     vary = {name: values for name, values in recorded.items() if np.ptp(values) > settings.ROUNDING}
-    worth = {name: target.worth(smooth_columns(values)[:, None, :]) for name, values in vary.items()}
-    p_values = {name: w.p_value for name, w in worth.items() if w.share > settings.SCATTER_LAW_SHARE}
+    scores = {name: target.score(smooth_columns(values)[:, None, :]) for name, values in vary.items()}
+    p_values = {name: w.p_value for name, w in scores.items() if w.share > settings.SCATTER_LAW_SHARE}
     best = min(p_values, key=p_values.__getitem__, default="")
     return best if best and p_values[best] * len(recorded) < settings.LEVEL else ""
 
@@ -731,7 +731,7 @@ def random_gap(fit: Fit) -> RandomGap:
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
-    scatter, used, carried = _stands(partial(estimate, gap), scatter, gap, sensitivity, used)
+    scatter, used, carried = _without_influential_rows(partial(estimate, gap), scatter, gap, sensitivity, used)
     gap, sensitivity = gap[used], sensitivity[used]
     laws, steps, kept = _judge(fit, scatter, gap, sensitivity, pose, used, freedom)
     likely = stepped(steps.values()) >= settings.SCATTER_SURE
@@ -743,7 +743,7 @@ def random_gap(fit: Fit) -> RandomGap:
     return RandomGap(tuple(kept), bool(real) and explains, p_value, scatter, steps, laws, note)
 
 
-def _stands(
+def _without_influential_rows(
     estimate: Callable[..., Scatter], scatter: Scatter, gap: Array, sensitivity: Array, used: Rows
 ) -> tuple[Scatter, Rows, list[int]]:
     """Sensitivity of the scatter to its few most influential rows: real scatter is in all rows.
@@ -767,11 +767,11 @@ def _stands(
 
 def _in_joints(fit: Fit) -> list[Component]:
     """Kind and joints of a per-pose or per-visit discrepancy."""
-    form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
-    if form is None or not form.anew:
+    kernel, names = fit.explanation.discrepancy.kernel, fit.campaign.robot.joint_names
+    if kernel is None or not kernel.grouped:
         return []
-    kind = "visit" if form.name.startswith("visits") else "pose"
-    return [(kind, names.index(joint)) for joint in form.joints]
+    kind = "visit" if kernel.name.startswith("visits") else "pose"
+    return [(kind, names.index(joint)) for joint in kernel.joints]
 
 
 def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None) -> Array:

@@ -1,7 +1,7 @@
 """Screening of further columns against a residual: which law, entering where, explains it best.
 
-The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`gained`). Screened are
-laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
+The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`bic_gain`).
+Screened are laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, whitener,
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.exact import corrected_observations
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import in_a_row
+from thermal_robot.inference.grouping import consecutive_outliers
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.weights import robust_noise
 from thermal_robot.observables import components, seen_components
@@ -35,7 +35,7 @@ from thermal_robot.observations import Observations
 
 
 @dataclass(frozen=True)
-class Worth:
+class Score:
     """Score of further columns: p-value of their F test, share of the residual explained, and gain of log evidence.
 
     ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayes information
@@ -48,10 +48,10 @@ class Worth:
     gain: float
 
 
-NOTHING = Worth(1.0, 0.0, -np.inf)
+NOTHING = Score(1.0, 0.0, -np.inf)
 
 
-def gained(total: Array | float, explained: Array | float, rank: Array | float, freedom: float) -> Array:
+def bic_gain(total: Array | float, explained: Array | float, rank: Array | float, freedom: float) -> Array:
     """Gain of log evidence by the Bayes information criterion (Schwarz 1978), ½ ν ln(S₀/S₁) − ½ k ln ν.
 
     ``total`` S₀ and S₀ − S₁ ``explained`` are sums of squares, ``rank`` k the number of columns, ``freedom`` ν the
@@ -95,9 +95,9 @@ class Target:
             like = None if like is None else replace(like, root=like.root * relative)
             even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like, seen=seen)
             return replace(even, root=even.root / relative)
-        found = _weighed(gap, design, gap if like is None else like.left, seen, first=like is None)
+        found = _reweighted(gap, design, gap if like is None else like.left, seen, first=like is None)
         for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
-            found = _weighed(gap, design, found.left, seen)
+            found = _reweighted(gap, design, found.left, seen)
         if trusted is not None and trusted.any():
             noise = np.repeat(robust_noise(found.left, seen=seen), 3)
             found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
@@ -113,7 +113,7 @@ class Target:
         """Residual degrees of freedom: equations less the rank of the design."""
         return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
-    def worth(self, columns: Array) -> Worth:
+    def score(self, columns: Array) -> Score:
         """Score of further columns (N, m, K); zero where they leave too few degrees of freedom."""
         whole = equations_of(columns * self.root[:, :, None])
         flat = without(whole, self.basis)
@@ -126,17 +126,17 @@ class Target:
         projected = own.T @ (flat.T @ self.white)
         total, taken = max(float(self.white @ self.white), settings.TINY), float(projected @ projected)
         rest = max(total - taken, settings.TINY)
-        return Worth(
+        return Score(
             float(fdtrc(k, freedom - k, (taken / k) / (rest / (freedom - k)))),
             1.0 - (rest / (freedom - k)) / (total / freedom),
-            float(gained(total, taken, k, freedom)),
+            float(bic_gain(total, taken, k, freedom)),
         )
 
-    def seat(self, moves: Array) -> Seat:
+    def statistics(self, moves: Array) -> PlaceStatistics:
         """Precomputed sums for laws at a place whose d components displace the target by (N, m, d) a unit."""
         own = moves * self.root[:, :, None]
         basis = self.basis.reshape(*self.root.shape, -1)
-        return Seat(
+        return PlaceStatistics(
             np.einsum("nmd,nme->nde", own, own),
             np.einsum("nmr,nmd->rdn", basis, own),
             np.einsum("nm,nmd->nd", self.white.reshape(self.root.shape), own),
@@ -145,7 +145,7 @@ class Target:
         )
 
 
-def _weighed(
+def _reweighted(
     gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
 ) -> Target:
     """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
@@ -179,7 +179,7 @@ class LawStack:
 
 
 @dataclass(frozen=True, eq=False)
-class Seat:
+class PlaceStatistics:
     """Sufficient statistics of a residual for all laws at one place, summed over the components of each row.
 
     A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
@@ -195,7 +195,7 @@ class Seat:
     freedom: int
 
     def gains(self, laws: Sequence[Array] | LawStack) -> Array:
-        """Gain of log evidence of each law (:attr:`Worth.gain`), from its (N, K) functions."""
+        """Gain of log evidence of each law (:attr:`Score.gain`), from its (N, K) functions."""
         alike = laws if isinstance(laws, LawStack) else LawStack.of(laws)
         found = np.full(alike.laws, -np.inf)
         for which, functions, products in alike.stacks:
@@ -213,7 +213,7 @@ class Seat:
         gram = whole - inside.transpose(0, 2, 1) @ inside
         vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
         explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole))
-        return gained(self.total, explained, rank, self.freedom)
+        return bic_gain(self.total, explained, rank, self.freedom)
 
 
 def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
@@ -292,16 +292,16 @@ def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
 
 
-def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
+def of_quantity(law: Discovered, values: Array) -> Discovered:
     """Law with knots at the quantity's quantiles, or with its levels where it has few values."""
     levels = np.unique(values)
     low, high = float(values.min()), float(values.max())
     if len(levels) <= settings.FEW_LEVELS:
         return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
-    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, knots))
-    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / knots:
+    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, settings.KNOTS))
+    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / settings.KNOTS:
         # most values lie in one spot: a spline between knots there would be free to do anything
-        marks = np.linspace(low, high, knots)
+        marks = np.linspace(low, high, settings.KNOTS)
     return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
 
 
@@ -412,30 +412,30 @@ def independent(grid: Array) -> float:
     return max(len(grid) * settings.ORDER_STEP, 1.0) if len(grid) else 0.0
 
 
-def periodogram(seat: Seat, q: Array, at: Array) -> Array:
+def periodogram(statistics: PlaceStatistics, q: Array, at: Array) -> Array:
     """Least-squares periodogram (K,): log evidence of 1, sin kq and cos kq at each order k.
 
     The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
     periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
-    steps (K,). Gains are those of :meth:`Seat.gains`; orders that the design can do, or
+    steps (K,). Gains are those of :meth:`PlaceStatistics.gains`; orders that the design can do, or
     whose sine and cosine the positions cannot tell apart, gain −∞.
     """
-    found = [_chunk(seat, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]
+    found = [_chunk(statistics, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]
     return np.concatenate([*found, np.zeros(0)])
 
 
-def peak(seat: Seat, q: Array, grid: Array) -> float:
+def peak(statistics: PlaceStatistics, q: Array, grid: Array) -> float:
     """Order of the largest gain, refined between grid points (K,)."""
-    best = float(grid[np.argmax(periodogram(seat, q, grid))])
+    best = float(grid[np.argmax(periodogram(statistics, q, grid))])
     step = settings.ORDER_STEP * 2.0 * np.pi / float(np.ptp(q))
     for _ in range(settings.ORDER_ZOOMS):
         near = best + step * np.linspace(-1.0, 1.0, 17)
-        best, step = float(near[np.argmax(periodogram(seat, q, near))]), step / 8
+        best, step = float(near[np.argmax(periodogram(statistics, q, near))]), step / 8
     return best
 
 
-def _chunk(seat: Seat, q: Array, at: Array) -> Array:
-    weight, design, remainder = seat.weight[:, 0, 0], seat.design[:, 0], seat.remainder[:, 0]
+def _chunk(statistics: PlaceStatistics, q: Array, at: Array) -> Array:
+    weight, design, remainder = statistics.weight[:, 0, 0], statistics.design[:, 0], statistics.remainder[:, 0]
     # equal steps: e^(i k q) of the first, times powers of one step
     wave = _waves(q, at)
     both = np.concatenate([wave.real, wave.imag], axis=1)
@@ -461,7 +461,7 @@ def _chunk(seat: Seat, q: Array, at: Array) -> Array:
     seen = (np.minimum(first, second) > settings.ALIAS * whole) & (apart > settings.LAW_FLOOR * first * second)
     a, b = np.split(values, 2)
     part = (second * a**2 - 2.0 * cross * a * b + first * b**2) / np.where(seen, apart, 1.0)
-    return np.where(seen, gained(seat.total, explained + part, rank, seat.freedom), -np.inf)
+    return np.where(seen, bic_gain(statistics.total, explained + part, rank, statistics.freedom), -np.inf)
 
 
 def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
@@ -486,7 +486,7 @@ def _nyquist(q: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Thin:
+class RowSample:
     """Rows of a fit for a scan: all of them, or a random sample where there are very many.
 
     ``changed`` (M,): rows that were set aside and follow each other in time.
@@ -497,11 +497,11 @@ class Thin:
     changed: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, fit: Fit) -> Thin:
+    def of(cls, fit: Fit) -> RowSample:
         """Sample the rows of a fit."""
         e = fit.explanation
         if fit.campaign.samples <= settings.ENOUGH_ROWS:
-            return cls(fit.corrected, e.linear, in_a_row(fit.campaign, e.outliers))
+            return cls(fit.corrected, e.linear, consecutive_outliers(fit.campaign, e.outliers))
         drawn = np.random.default_rng(settings.DRAW_SEED).choice(
             fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
         )
@@ -513,7 +513,7 @@ class Thin:
                 e.linear.frames[rows],
                 tuple(replace(b, source=b.columns[rows]) for b in e.linear.blocks),
             ),
-            in_a_row(fit.campaign, e.outliers)[rows],
+            consecutive_outliers(fit.campaign, e.outliers)[rows],
         )
 
     def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
@@ -560,7 +560,7 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
             continue
         setting = gate.variants(effect, observations)[0] if effects is None else effect
         arguments = {k: v for k, v in gate.arguments(setting).items() if k not in ("places", "excluded")}
-        for joint in _changing(setting, observations):
+        for joint in _varying_joints(setting, observations):
             driver = _driver(setting, observations, joint)
             followed = (*conditions(observations, joint), joint)
             names = [name for name in followed if driver not in (name, f"position of {name}")]
@@ -570,10 +570,10 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
     return found
 
 
-def _changing(effect: Effect, observations: Observations) -> tuple[str, ...]:
+def _varying_joints(effect: Effect, observations: Observations) -> tuple[str, ...]:
     """Joints in which an effect's response differs between rows."""
     own = [p for p in gate.checked(effect, observations) if p.kind == "joint"]
-    return gate.places_of([p for p in own if any(np.ptp(r.values, axis=0).any() for r in _rows(p))])
+    return gate.places_of([p for p in own if any(np.ptp(r.values, axis=0).any() for r in _varying_responses(p))])
 
 
 def _driver(effect: Effect, observations: Observations, joint: str) -> str:
@@ -583,7 +583,7 @@ def _driver(effect: Effect, observations: Observations, joint: str) -> str:
     return driver[0] if driver else ""
 
 
-def _rows(parameter: Parameter) -> Iterator[Response]:
+def _varying_responses(parameter: Parameter) -> Iterator[Response]:
     """Yield the responses of a parameter that vary by row."""
     yield from (r for r in parameter.responses if r.values.ndim == (1 if r.channel == "joint" else 2))
 
@@ -645,26 +645,26 @@ class Scanned:
     tried: float = 1.0
 
     @property
-    def worth(self) -> float:
+    def net_gain(self) -> float:
         """Gain of log evidence less the logarithm of the number tried."""
         return self.gain - float(np.log(self.tried))
 
 
-class Seats:
+class ScanCache:
     """Cache of the columns of each place and the functions of each quantity, for scans of some targets."""
 
     def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
         self.observations, self.targets = observations, targets
-        self._seats: dict[tuple[object, ...], tuple[Seat, ...]] = {}
+        self._statistics: dict[tuple[object, ...], tuple[PlaceStatistics, ...]] = {}
         self._functions: dict[tuple[object, ...], Array] = {}
 
-    def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
+    def statistics(self, law: Discovered) -> tuple[PlaceStatistics, ...]:
         """Sufficient statistics of each target at a law's place, or for the known effect that it modulates."""
         place = (law.kind, law.place, law.turns, law.of, law.of_arguments)
-        if place not in self._seats:
-            moves = block(self.observations, _steady(law)).columns
-            self._seats[place] = tuple(target.seat(moves) for target in self.targets)
-        return self._seats[place]
+        if place not in self._statistics:
+            moves = block(self.observations, _constant_law(law)).columns
+            self._statistics[place] = tuple(target.statistics(moves) for target in self.targets)
+        return self._statistics[place]
 
     def functions(self, law: Discovered) -> Array:
         """Functions (N, K) of a law of what it follows, wherever it enters."""
@@ -681,54 +681,54 @@ class Seats:
     def gains(self, candidates: Sequence[Discovered]) -> Array:
         """Gain (targets, C) of log evidence of each law."""
         found = np.zeros((len(self.targets), len(candidates)))
-        together: dict[tuple[Seat, ...], list[int]] = {}
+        together: dict[tuple[PlaceStatistics, ...], list[int]] = {}
         for i, law in enumerate(candidates):
-            together.setdefault(self.seen_from(law), []).append(i)
-        for seats, which in together.items():
+            together.setdefault(self.statistics(law), []).append(i)
+        for at_place, which in together.items():
             functions = LawStack.of([self.functions(candidates[i]) for i in which])
-            for t, seat in enumerate(seats):
-                found[t, which] = seat.gains(functions)
+            for t, statistics in enumerate(at_place):
+                found[t, which] = statistics.gains(functions)
         return found
 
 
 def scan(
     observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
 ) -> tuple[list[list[Scanned]], int]:
-    """Scan of all candidate laws: for every target sorted by :attr:`Scanned.worth`, and the number tried.
+    """Scan of all candidate laws: for every target sorted by :attr:`Scanned.net_gain`, and the number tried.
 
     Candidates are a smooth and a straight law of each quantity at each place; waves of any order and memory of each
     joint; known effects modulated in one joint; products of two quantities. At segments, whose laws have six
     components, only the best quantities are tried. Dropped are laws no better than what they contain: a modulated
     effect than the effect itself, a product than one of its quantities.
     """
-    seats = Seats(observations, targets)
-    kinds = _candidates(seats, effects)
+    cache = ScanCache(observations, targets)
+    kinds = _candidates(cache, effects)
     grids = _grids(observations)
     waves = round(sum(independent(grid) for grid in grids.values()))
     filled = sum(map(bool, (*kinds.values(), grids)))
-    gains = {kind: seats.gains(own) for kind, own in kinds.items()}
-    steady = list(dict.fromkeys(map(_steady, kinds["modulated"])))
-    itself = dict(zip(steady, seats.gains(steady).T, strict=True))
+    gains = {kind: cache.gains(own) for kind, own in kinds.items()}
+    steady = list(dict.fromkeys(map(_constant_law, kinds["modulated"])))
+    itself = dict(zip(steady, cache.gains(steady).T, strict=True))
     found = []
     for t in range(len(targets)):
         own = {
             kind: [Scanned(law, float(g), filled * len(made)) for law, g in zip(made, gains[kind][t], strict=True)]
             for kind, made in kinds.items()
         }
-        own["free wave"] = _free_waves(seats, t, grids, filled * waves)
-        own["modulated"] = [item for item in own["modulated"] if item.worth > itself[_steady(item.law)][t]]
-        found.append(_best(own, seats, t))
+        own["free wave"] = _free_waves(cache, t, grids, filled * waves)
+        own["modulated"] = [item for item in own["modulated"] if item.net_gain > itself[_constant_law(item.law)][t]]
+        found.append(_best(own, cache, t))
     return found, sum(map(len, kinds.values())) + waves
 
 
-def _candidates(seats: Seats, effects: Iterable[Effect] | None) -> dict[str, list[Discovered]]:
+def _candidates(cache: ScanCache, effects: Iterable[Effect] | None) -> dict[str, list[Discovered]]:
     """Candidate laws by kind, without waves of arbitrary order."""
-    observations = seats.observations
+    observations = cache.observations
     first = laws(observations, ("joint", "base", "tool"))
     plain = [law for law in first if law.shape != "harmonic"]
     plain += [straight(law) for law in plain if law.shape == "smooth"]
-    telling = _telling(plain, seats.gains(plain))
-    leading = sorted(telling, key=lambda name: -telling[name])[: settings.LINK_QUANTITIES]
+    by_quantity = _gain_by_quantity(plain, cache.gains(plain))
+    leading = sorted(by_quantity, key=lambda name: -by_quantity[name])[: settings.LINK_QUANTITIES]
     return {
         "plain": plain + laws(observations, ("link",), leading),
         "wave": [law for law in first if law.shape == "harmonic"],
@@ -743,20 +743,20 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
 
     Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
     """
-    seats = Seats(observations, [target])
-    measured = _measured(seats, 0, law)
+    cache = ScanCache(observations, [target])
+    measured = _gains_by_shape(cache, 0, law)
     first: dict[str, Scanned] = {}
     for item in sorted(measured, key=lambda item: -item.gain):
         first.setdefault(item.law.shape, item)
     # between the marks that were tried one may lie that makes another shape the best
-    moved = {"sudden": _timed, "gradual": _refined}
+    moved = {"sudden": _refined_step, "gradual": _refined_marks}
     moves = [(moved.get(SHAPES[shape].mark), item) for shape, item in first.items()]
-    return max((move(item, seats) if move else item for move, item in moves), key=lambda item: item.worth)
+    return max((move(item, cache) if move else item for move, item in moves), key=lambda item: item.net_gain)
 
 
-def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
+def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
     """Gains of a law in every shape that it may have."""
-    observations = seats.observations
+    observations = cache.observations
     whole = replace(law, shape="product") if law.by else law
     values = None if law.quantity == "none" else whole.values(observations)
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names) and not law.of
@@ -765,14 +765,14 @@ def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
     if law.quantity in CLOCK and law.quantity in observations.covariates and not law.of and not law.by:
         candidates += relaxing(observations, law)
     names = [candidate.shape for candidate in candidates]
-    gains = seats.seen_from(law)[t].gains([seats.functions(candidate) for candidate in candidates])
+    gains = cache.statistics(law)[t].gains([cache.functions(candidate) for candidate in candidates])
     return [
         Scanned(candidate, float(gain), len(set(names)) * names.count(candidate.shape))
         for candidate, gain in zip(candidates, gains, strict=True)
     ]
 
 
-def _refined(best: Scanned, seats: Seats) -> Scanned:
+def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
     """Pattern search over marks and widths."""
     step = settings.MARK_STEP
     for _ in range(settings.MARK_ROUNDS):
@@ -783,7 +783,7 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
                 replace(law, marks=(mark, width[0] * f))
                 for f in (1.0 + settings.WIDTH_STEP * step, 1.0 / (1.0 + settings.WIDTH_STEP * step))
             ]
-        gains = seats.gains(near)[0]
+        gains = cache.gains(near)[0]
         if gains.max() > best.gain:
             best = replace(best, law=near[int(gains.argmax())], gain=float(gains.max()))
         else:
@@ -791,23 +791,23 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
     return best
 
 
-def _timed(best: Scanned, seats: Seats) -> Scanned:
+def _refined_step(best: Scanned, cache: ScanCache) -> Scanned:
     """Move a step to the best of the gaps between neighbouring values.
 
     The prior of the mark is uniform over the range, so that a long break between sessions has a larger share than a gap
     between two rows.
     """
-    law, followed = best.law, best.law.values(seats.observations)
+    law, followed = best.law, best.law.values(cache.observations)
     values = np.unique(followed if followed is not None else np.zeros(1))
     gaps, widths = 0.5 * (values[1:] + values[:-1]), np.diff(values)
     beside = -(-len(gaps) // settings.MARKS)
     middle = int(np.searchsorted(gaps, law.marks[0]))
     near = range(max(middle - beside, 0), min(middle + beside + 1, len(gaps)))
-    moved = [_between_runs(replace(law, marks=(float(gaps[k]),)), seats.observations) for k in near]
+    moved = [_between_runs(replace(law, marks=(float(gaps[k]),)), cache.observations) for k in near]
     shapes_tried = best.tried / settings.MARKS
     tried = [shapes_tried * float(np.ptp(values) / widths[k]) for k in near]
-    found = [Scanned(*item) for item in zip(moved, map(float, seats.gains(moved)[0]), tried, strict=True)]
-    return max(found, key=lambda item: item.worth)
+    found = [Scanned(*item) for item in zip(moved, map(float, cache.gains(moved)[0]), tried, strict=True)]
+    return max(found, key=lambda item: item.net_gain)
 
 
 def _between_runs(law: Discovered, observations: Observations) -> Discovered:
@@ -822,7 +822,7 @@ def _between_runs(law: Discovered, observations: Observations) -> Discovered:
     return replace(law, runs=(str(runs[last]), str(runs[first])))
 
 
-def _steady(law: Discovered) -> Discovered:
+def _constant_law(law: Discovered) -> Discovered:
     """Constant law at the place, or of the known effect, of a law."""
     return Discovered(
         kind=law.kind,
@@ -835,7 +835,7 @@ def _steady(law: Discovered) -> Discovered:
     )
 
 
-def _telling(candidates: Sequence[Discovered], gains: Array) -> dict[str, float]:
+def _gain_by_quantity(candidates: Sequence[Discovered], gains: Array) -> dict[str, float]:
     """Largest gain of each quantity over all targets and places."""
     found: dict[str, float] = {}
     for law, own in zip(candidates, gains.T, strict=True):
@@ -853,22 +853,22 @@ def _grids(observations: Observations) -> dict[str, Array]:
     return {joint: grid for joint, grid in every.items() if len(grid)}
 
 
-def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
+def _free_waves(cache: ScanCache, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
     """Best wave of each joint."""
-    observations, found = seats.observations, []
+    observations, found = cache.observations, []
     for joint, grid in grids.items():
         q = observations.q[:, observations.robot.joint_names.index(joint)]
         plain = Discovered(place=joint, quantity=joint, shape="harmonic", unit=unit(observations.robot, joint))
         plain = replace(plain, origin=float(q.min()), span=float(np.ptp(q)))
-        seat = seats.seen_from(plain)[t]
-        law = replace(plain, marks=(peak(seat, q, grid),))
-        found.append(Scanned(law, float(seat.gains([seats.functions(law)])[0]), tried))
+        statistics = cache.statistics(plain)[t]
+        law = replace(plain, marks=(peak(statistics, q, grid),))
+        found.append(Scanned(law, float(statistics.gains([cache.functions(law)])[0]), tried))
     return found
 
 
-def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
+def _session_step(cache: ScanCache, t: int, levels: Scanned) -> Scanned | None:
     """Best step between consecutive sessions at the place of a law of sessions."""
-    observations = seats.observations
+    observations = cache.observations
     known = quantities(observations)
     clock = next((name for name in CLOCK if name in known), None)
     if clock is None:
@@ -879,47 +879,47 @@ def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
     steps = [step for step in steps if step.runs]
     if not steps:
         return None
-    gains = seats.seen_from(law)[t].gains([seats.functions(step) for step in steps])
+    gains = cache.statistics(law)[t].gains([cache.functions(step) for step in steps])
     return Scanned(steps[int(gains.argmax())], float(gains.max()))
 
 
-def _clock_gives_way(single: dict[Site, Scanned], session: Site, seats: Seats, t: int) -> None:
+def _prefer_sessions(single: dict[Site, Scanned], session: Site, cache: ScanCache, t: int) -> None:
     """Drop a law of time where one of sessions at its place explains nearly as much with less resolution."""
-    own = _best_shape(seats, t, single[session].law)
+    own = _best_shape(cache, t, single[session].law)
     for clock in [(*session[:2], name) for name in CLOCK]:
-        if clock in single and _best_shape(seats, t, single[clock].law) < own + settings.COARSER:
+        if clock in single and _best_shape(cache, t, single[clock].law) < own + settings.COARSER:
             del single[clock]
 
 
-def _best_shape(seats: Seats, t: int, law: Discovered) -> float:
+def _best_shape(cache: ScanCache, t: int, law: Discovered) -> float:
     """Gain of a law in its best shape, less the cost of choosing it."""
-    return max(item.worth for item in _measured(seats, t, law))
+    return max(item.net_gain for item in _gains_by_shape(cache, t, law))
 
 
-def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
+def _best(own: Mapping[str, list[Scanned]], cache: ScanCache, t: int) -> list[Scanned]:
     """Candidates that beat what they contain, sorted; of a smooth and a straight law the better one."""
     single: dict[Site, Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)
-        if key not in single or item.worth > single[key].worth:
+        if key not in single or item.net_gain > single[key].net_gain:
             single[key] = item
     for key in [key for key in single if key[2] == "session"]:
-        step = _break(seats, t, single[key])
+        step = _session_step(cache, t, single[key])
         if step is not None and step.gain > single[key].gain - settings.REFINED_GAIN:
             # one step in time explains as much: nothing is known of the session beside when it was
             del single[key]
         elif step is not None:
-            _clock_gives_way(single, key, seats, t)
-    alone = {key: item.worth for key, item in single.items()}
+            _prefer_sessions(single, key, cache, t)
+    alone = {key: item.net_gain for key, item in single.items()}
     for key in sorted(alone, key=lambda key: -alone[key])[: settings.SHAPED]:
         # a step is no smooth law; a product of the clock with anything would stand in for it
-        best = _best_shape(seats, t, single[key].law)
+        best = _best_shape(cache, t, single[key].law)
         alone[key] = max(alone[key], best - float(np.log(single[key].tried)))
     inside = [
         max(alone.get((i.law.kind, i.law.place, name), -np.inf) for name in (i.law.quantity, i.law.by))
         for i in own["product"]
     ]
-    products = [item for item, least in zip(own["product"], inside, strict=True) if item.worth > least]
+    products = [item for item, least in zip(own["product"], inside, strict=True) if item.net_gain > least]
     others = [*own["wave"], *own["free wave"], *own["modulated"], *products]
-    ranked = [*((item, alone[key]) for key, item in single.items()), *((item, item.worth) for item in others)]
+    ranked = [*((item, alone[key]) for key, item in single.items()), *((item, item.net_gain) for item in others)]
     return [item for item, _ in sorted(ranked, key=lambda pair: -pair[1])]

@@ -30,7 +30,7 @@ from scipy.special import erfcx, log_ndtr
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, beside, evidence
+from thermal_robot.inference.evidence import Combination, Gram, conditional_scales, evidence
 
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
@@ -38,7 +38,7 @@ _LOG_2, _ROOT_2 = np.log(2.0), np.sqrt(2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class _Alike:
+class _EqualWidth:
     """Blocks of equal width: their numbers, w and c² (K, D) of the columns not held at zero, and the constrained ones.
 
     ``sides`` (J,): place in ``blocks``, w and c of each column that cannot be negative.
@@ -74,13 +74,13 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
             np.add(left_over[:, :, None], seen, out=part)
             taken = np.divide(told, part, out=part).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        about, spread = beside(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
+        about, spread = conditional_scales(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
         log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
         log -= 0.5 * ((log_scale - about) / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
         if gram.most is not None:
             log[log_scale > np.log(gram.most[alike.blocks])[:, None]] = -np.inf
-        log += _on_their_sides(alike, square, left_over)
+        log += _log_half_lines(alike, square, left_over)
         top = log.max(axis=1)
         gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1))
         result += list(zip(alike.blocks, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
@@ -89,27 +89,29 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
 
 def _beside(
     gram: Gram, base: Combination, blocks: list[int], used: NDArray[np.int64], left: Array, covariance: Array
-) -> _Alike:
+) -> _EqualWidth:
     """Projected statistics of blocks of equal width, given the columns in use and their covariance."""
     own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks])
     cross = gram.matrix[own[:, :, None], used]
     inside = gram.matrix[own[:, :, None], own[:, None, :]] - cross @ covariance @ cross.transpose(0, 2, 1)
     pull, free, sides = left[own], np.ones(own.shape, dtype=bool), _NO_SIDES
     if gram.positive[own].any():
-        free, sides = _sided(inside, pull, gram.positive[own], base.noise**2)
+        free, sides = _constrained(inside, pull, gram.positive[own], base.noise**2)
         inside, pull = inside * (free[:, :, None] & free[:, None, :]), pull * free
     value, vector = np.linalg.eigh(inside)
     along = (vector.transpose(0, 2, 1) @ pull[:, :, None])[:, :, 0] ** 2
-    return _Alike(blocks, np.maximum(value, 0.0), along, sides)
+    return _EqualWidth(blocks, np.maximum(value, 0.0), along, sides)
 
 
-def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) -> tuple[NDArray[np.bool_], _Sides]:
+def _constrained(
+    inside: Array, pull: Array, constrained: NDArray[np.bool_], noise2: float
+) -> tuple[NDArray[np.bool_], _Sides]:
     """Mask of the columns not held at zero at their expected sizes, and single-column statistics of constrained ones.
 
     Of a free column its mean and variance given the other free ones; of one held at zero its gradient and information
     given these.
     """
-    free = ~sided | (pull > 0.0)
+    free = ~constrained | (pull > 0.0)
     for last in [*(False,) * settings.NOISE_ROUNDS, True]:
         both = free[:, :, None] & free[:, None, :]
         value, vector = np.linalg.eigh(np.where(both, inside, 0.0))
@@ -117,18 +119,18 @@ def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) 
         inverse = np.where(both, inverse, 0.0)
         mean = (inverse @ pull[:, :, None])[:, :, 0]
         rest = pull - (inside @ mean[:, :, None])[:, :, 0]
-        wrong = sided & np.where(free, mean < 0.0, rest > 0.0)
+        wrong = constrained & np.where(free, mean < 0.0, rest > 0.0)
         if last or not wrong.any():
             break
         free = free ^ wrong
     taken = (inside @ inverse * inside).sum(axis=2)
     tight = 1.0 / np.where(free, inverse.diagonal(axis1=1, axis2=2), 1.0)
     own = np.where(free, tight - noise2, inside.diagonal(axis1=1, axis2=2) - taken)
-    where = np.nonzero(sided)
+    where = np.nonzero(constrained)
     return free, (where[0], np.maximum(own, 0.0)[where], np.where(free, mean * tight, rest)[where])
 
 
-def _on_their_sides(alike: _Alike, square: Array, noise: Array) -> Array:
+def _log_half_lines(alike: _EqualWidth, square: Array, noise: Array) -> Array:
     """Log integrals (K, S) over the half lines of non-negative columns alone, at each scale."""
     found = np.zeros_like(noise)
     block, value, pull = alike.sides
@@ -143,7 +145,7 @@ def _on_their_sides(alike: _Alike, square: Array, noise: Array) -> Array:
     return found
 
 
-def _padded(parts: Sequence[_Alike]) -> Iterator[_Alike]:
+def _padded(parts: Sequence[_EqualWidth]) -> Iterator[_EqualWidth]:
     """Yield narrow blocks together, padded with zeros, and wide ones as they are."""
     narrow = [part for part in parts if part.value.shape[1] <= settings.NARROW]
     yield from (part for part in parts if part.value.shape[1] > settings.NARROW)
@@ -156,7 +158,9 @@ def _padded(parts: Sequence[_Alike]) -> Iterator[_Alike]:
             value[rows, columns], along[rows, columns] = part.value, part.along
         places = [part.sides[0] + start for start, part in zip(first, narrow, strict=False)]
         seen, pull = (np.concatenate([part.sides[k] for part in narrow]) for k in (1, 2))
-        yield _Alike([b for part in narrow for b in part.blocks], value, along, (np.concatenate(places), seen, pull))
+        yield _EqualWidth(
+            [b for part in narrow for b in part.blocks], value, along, (np.concatenate(places), seen, pull)
+        )
 
 
 def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
@@ -236,7 +240,7 @@ class Search:
         All neighbours of the best combination are evaluated, so that its probability is relative to all of them.
         """
         best = self.climb(start)
-        detours = (self._simpler, self._smaller, self._two_at_once, self._missed)
+        detours = (self._simpler, self._smaller, self._two_at_once, self._rescued)
         while (better := next((found for detour in detours if (found := detour(best))), None)) is not None:
             best = self.climb(better.blocks)
         return best
@@ -244,7 +248,7 @@ class Search:
     def climb(self, start: Sequence[int] = ()) -> Combination:
         """Hill climbing by adding, dropping and exchanging blocks, neighbours of near ties included."""
         best = self._climb(start, frozenset())
-        while (better := self._missed(best) or self._beside_a_tie(best)) is not None:
+        while (better := self._rescued(best) or self._near_ties(best)) is not None:
             best = self._climb(better.blocks, frozenset())
         return best
 
@@ -273,7 +277,7 @@ class Search:
                         return found
         return None
 
-    def _beside_a_tie(self, best: Combination) -> Combination | None:
+    def _near_ties(self, best: Combination) -> Combination | None:
         """Evaluate the neighbours of near ties; return an improvement, if any.
 
         This finds two effects that replace two others: with only one exchanged the evidence is nearly the same.
@@ -282,7 +286,7 @@ class Search:
             if tie.blocks in self._expanded:
                 continue
             self._expanded.add(tie.blocks)
-            found = self.weigh(tie.blocks)
+            found = self.evaluate_neighbours(tie.blocks)
             if found.log_evidence > best.log_evidence + settings.BETTER:
                 return found
         return None
@@ -293,7 +297,7 @@ class Search:
         near = [c for c in near if len(c.blocks) == len(best.blocks)]
         return [best, *sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]]
 
-    def weigh(self, blocks: Sequence[int]) -> Combination:
+    def evaluate_neighbours(self, blocks: Sequence[int]) -> Combination:
         """Evaluate all neighbours of a combination; return the best of them and it."""
         own = self.evaluate(blocks)
         near = [self._at_least(c.blocks, own) for c in self._promising(own)]
@@ -328,7 +332,7 @@ class Search:
                 return found
             found = best
 
-    def _missed(self, best: Combination) -> Combination | None:
+    def _rescued(self, best: Combination) -> Combination | None:
         """Evaluate exactly what was screened and comes near the best; return an improvement, if any."""
         near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
         found = max((self._at_least(blocks, best) for blocks in near), key=lambda c: c.log_evidence, default=best)

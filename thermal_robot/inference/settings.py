@@ -46,15 +46,15 @@ ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
 LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
 STARTS = 3
-"""Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+"""Combinations, the best of those that a search starts from, beside which each kernel of a discrepancy is tried."""
 SCATTERING = 3
 """Joints at most that err anew in every pose or visit beside each other."""
 PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
 """Rms of a further joint over that of those before it, in halves of an octave."""
-FORM_REACH = 20.0
-"""Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
-RUNG_REACH = 5.4
-"""The same at which a size of one still counts: 1 in 200, four sizes an octave."""
+KERNEL_REACH = 20.0
+"""Log evidence below the best at which a kernel of the discrepancy is given up while a fit iterates."""
+AMPLITUDE_REACH = 5.4
+"""The same at which an amplitude of one still counts: 1 in 200, four amplitudes an octave."""
 
 # --- rounding ---
 
@@ -376,5 +376,5 @@ CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
 """rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
-UNHEARD = 1e-2
+KERNEL_FLOOR = 1e-2
 """Of the noise's variance: what rows have in common below it is left out where rows are held out."""

@@ -77,58 +77,54 @@ def robust_noise(
     return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
 
 
-def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
+def noise_estimate(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
     """Noise of each component, stated or else estimated from the residual, and the degrees of freedom of its prior."""
     stated = noise.parts(measures)
     sigma = np.array([m if g is None else g for g, m in zip(stated, measured, strict=True)])
     return np.repeat(sigma, 3), 0.0 if None in stated else settings.GIVEN_NOISE_DOF
 
 
-def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
-    """Equal weights of all rows in use, and the noise from the median of the gap."""
-    own = None if noise.relative is None else noise.relative[use]
-    seen = None if noise.seen is None else noise.seen[use]
-    sigma, held = settled_noise(robust_noise(linear.gap[use], relative=own, seen=seen), noise, linear.measures)
-    return Whitening(use.astype(float), sigma, held, relative=noise.relative, seen=noise.seen)
+def first_whitening(linear: Linear, noise: Noise) -> Whitening:
+    """Equal weights of all rows, and the noise from the median of the gap, free of what is stated."""
+    measured = robust_noise(linear.gap, relative=noise.relative, seen=noise.seen)
+    sigma, _ = noise_estimate(measured, noise, linear.measures)
+    return Whitening(np.ones(len(linear.gap)), sigma, 0.0, relative=noise.relative, seen=noise.seen)
 
 
-def reweigh(
-    remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
-) -> tuple[Whitening, NDArray[np.bool_]]:
+def reweigh(remainder: Array, noise: Noise, leverage: float, measures: int) -> tuple[Whitening, NDArray[np.bool_]]:
     """Huber weights at the residual's noise, and outliers (N,), at most a quarter of the rows.
 
     ``leverage`` is the share of the equations that was fitted.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
-    seen, figures = None if noise.seen is None else noise.seen[use], noise.figures(measures)
-    measured = robust_noise(remainder[use], leverage, seen=seen)
+    rows, figures = len(remainder), noise.figures(measures)
+    measured = robust_noise(remainder, leverage, seen=noise.seen)
     sigma, held, distance2 = judged(remainder, measured, noise, leverage, measures)
-    aside = use & (distance2 > distance_limit(figures, int(use.sum())))
-    worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
-    aside &= np.isin(np.arange(len(use)), worst)
-    weights = np.where(use & ~aside, tail_weight(distance2, figures), 0.0)
+    aside = distance2 > distance_limit(figures, rows)
+    aside &= np.isin(np.arange(rows), np.argsort(-distance2)[: int(settings.MOST_OUTLIERS * rows)])
+    weights = np.where(aside, 0.0, huber_weight(distance2, figures))
     return Whitening(weights, sigma, held, relative=noise.relative, seen=noise.seen), aside
 
 
 def judged(
     remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
 ) -> tuple[Array, float, Array]:
-    """Noise and degrees of freedom as :func:`settled_noise`, and squared distances (N,) of rows in its units.
+    """Noise and degrees of freedom as :func:`noise_estimate`, and squared distances (N,) of rows in its units.
 
     ``remainder`` (N, m) is scaled to equal noise; ``measured`` is its robust noise, one sigma for positions and one for
     orientations.
     """
-    sigma, held = settled_noise(measured, noise, measures)
-    distance2 = ((remainder / far_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
+    sigma, held = noise_estimate(measured, noise, measures)
+    distance2 = ((remainder / outlier_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
     return sigma, held, distance2
 
 
-def far_scale(measured: Array, sigma: Array) -> Array:
+def outlier_scale(measured: Array, sigma: Array) -> Array:
     """Scale (m,) of outlier distances: the noise, or the residual's median where that is larger."""
     return np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
 
 
-def tail_weight(distance2: Array, measures: Figures) -> Array:
+def huber_weight(distance2: Array, measures: Figures) -> Array:
     """Huber's weight (1964) of rows at a squared distance in units of the noise: less in the tail."""
     bend = chdtri(measures, settings.BEND_LEVEL)
     return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))

@@ -205,9 +205,6 @@ class _Figures(NamedTuple):
     most: float = _LARGEST
 
 
-_INERTIA = {
-    name: _Figures(f"inertia {name}", "a number of kg·m²") for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-}
 _LIMIT = {name: _Figures(f"limit {name}", "a number", most=_NO_LIMIT) for name in ("lower", "upper")}
 _ATTRIBUTES: dict[str, dict[str, _Figures | None]] = {
     "origin": {"xyz": _Figures("origin", "three numbers, m", 3), "rpy": _Figures("origin", "three numbers, rad", 3)},
@@ -252,11 +249,11 @@ def require_numbers(urdf: str, source: str) -> None:
         raise RobotError(f"{source} has {freedoms} joints that move, expected at most {MOST_MOVING}: cut it to the arm")
 
 
-def _walk(element: Element, place: str) -> Iterator[tuple[str, Element]]:
+def _descendants(element: Element, place: str) -> Iterator[tuple[str, Element]]:
     """Yield an element and its descendants with their paths below the robot."""
     yield place, element
     for child in element.iterchildren("*"):
-        yield from _walk(child, f"{place}/{element.tag}".lstrip("/"))
+        yield from _descendants(child, f"{place}/{element.tag}".lstrip("/"))
 
 
 def _problems(owner: Element) -> Iterator[str]:
@@ -264,7 +261,7 @@ def _problems(owner: Element) -> Iterator[str]:
     seen, name = set(), owner.get("name", "")
     if owner.tag == "joint" and (not name or name != name.strip()):
         yield ": expected a name without blanks around it"  # a table's column has none
-    for place, element in _walk(owner, ""):
+    for place, element in _descendants(owner, ""):
         path = f"{place}/{element.tag}".lstrip("/")
         if path in _ONCE and path in seen:
             yield f": there are two <{element.tag}>, expected one"

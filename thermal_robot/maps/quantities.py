@@ -237,7 +237,7 @@ def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
         here, q = all_postures(task, spec.over.place(rows))
         places = rows[here]
         branch = np.arange(len(here)) - np.searchsorted(here, here)
-    told = _told(spec, q) if len(q) else dict.fromkeys(list(UNITS)[2:-1], np.zeros(0))
+    told = _assembly_columns(spec, q) if len(q) else dict.fromkeys(list(UNITS)[2:-1], np.zeros(0))
     joints = {name: q[:, k] for k, name in enumerate(robot.joint_names)}
     inside = np.minimum(q - robot.lower, robot.upper - q)
     with np.errstate(invalid="ignore"):
@@ -246,7 +246,7 @@ def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
     return {"place": places, "branch": branch, **joints, **told}
 
 
-def _told(spec: Spec, q: Array) -> Columns:
+def _assembly_columns(spec: Spec, q: Array) -> Columns:
     from thermal_robot.assembly.probability import capability, failing_probability, planes
 
     robot, asked = spec.robot, spec.question

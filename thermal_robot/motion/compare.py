@@ -16,7 +16,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.files import write_text
 from thermal_robot.motion import settings
 from thermal_robot.motion.result import MotionDiagnosis
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +94,7 @@ class MotionComparison:
     @property
     def summary(self) -> str:
         """What changed in one plain sentence."""
-        return str(registered().motion_comparison_headline(self))
+        return str(registered_renderer().motion_comparison_headline(self))
 
     @property
     def table(self) -> pd.DataFrame:
@@ -121,7 +121,7 @@ class MotionComparison:
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __str__(self) -> str:
-        return str(registered().motion_comparison_text(self))
+        return str(registered_renderer().motion_comparison_text(self))
 
     def __repr__(self) -> str:
         changed = ", ".join(dict.fromkeys(one.effect for one in self.changes)) or "nothing"
@@ -170,8 +170,8 @@ def _compared(
     effect, name, unit, joint = key
     values = pair[0].value if pair[0] else None, pair[1].value if pair[1] else None
     stds = pair[0].std if pair[0] else None, pair[1].std if pair[1] else None
-    teller = both[0] if pair[0] else both[1]
-    known = Compared(effect, teller.title(effect, joint), joint, name, unit, values, stds)
+    known_by = both[0] if pair[0] else both[1]
+    known = Compared(effect, known_by.title(effect, joint), joint, name, unit, values, stds)
     if values[0] is None or values[1] is None or stds[0] is None or stds[1] is None:
         return known
     difference, std = values[1] - values[0], float(np.hypot(stds[0], stds[1]))

@@ -395,7 +395,9 @@ def _in_order(
     kept = np.ones(len(time), dtype=bool)
     kept[rows[1:][same & (step == 0.0)]] = False
     repeated = int((~kept).sum())
-    return kept, (f"{table.file}: {table.told(~kept)} left out: the stamp of the row before",) if repeated else ()
+    return kept, (
+        f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before",
+    ) if repeated else ()
 
 
 def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion: NDArray[np.int64]) -> dict[str, str]:

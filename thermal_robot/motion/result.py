@@ -18,16 +18,16 @@ from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.physical import physical
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def told(diagnosis: MotionDiagnosis) -> MotionDiagnosis:
+def with_summary(diagnosis: MotionDiagnosis) -> MotionDiagnosis:
     """Return the diagnosis with its summary and advice."""
-    teller = registered()
-    return replace(diagnosis, summary=teller.motion_headline(diagnosis), advice=teller.motion_advice(diagnosis))
+    renderer = registered_renderer()
+    return replace(diagnosis, summary=renderer.motion_headline(diagnosis), advice=renderer.motion_advice(diagnosis))
 
 
 @dataclass(frozen=True)
@@ -272,10 +272,10 @@ class MotionDiagnosis:
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __str__(self) -> str:
-        return str(registered().motion_text(self))
+        return str(registered_renderer().motion_text(self))
 
     def _repr_html_(self) -> str:
-        return str(registered().motion_fragment(self))
+        return str(registered_renderer().motion_fragment(self))
 
     def __repr__(self) -> str:
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"

@@ -67,8 +67,6 @@ FASTEST = 5.0
 """rad/s: of a joint of which the URDF states no velocity."""
 STEP = 4e-3
 """s: longest time step, a tenth of the shortest lag that is found."""
-COMMON_RATE = 50.0
-"""Hz: of a log without a rate of its own."""
 DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
 CLUSTERS, BLOCKS = 8, 20

@@ -23,8 +23,6 @@ from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
 
-_OWN = ("offset", "coulomb", "stribeck", "viscous", "armature", "load_friction", "torque_constant")
-
 
 class TorqueModel(JointModel):
     """Residual and derivative of a log's joint torques by the parameters of the torque channel."""

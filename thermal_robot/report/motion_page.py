@@ -9,7 +9,7 @@ from thermal_robot.report import motion_plots as plots
 from thermal_robot.report import motion_words as words
 from thermal_robot.report import units
 from thermal_robot.report.page import render
-from thermal_robot.report.words import STATUS, needs, one_sigma, told_as
+from thermal_robot.report.words import STATUS, displayed_status, needs, one_sigma
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
@@ -76,7 +76,7 @@ def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
     for status, heading in STATUS.items():
         for one in d.effects:
             told = status in ("found", "confounded")
-            if told_as(one) != status or (told and one.name not in shown):
+            if displayed_status(one) != status or (told and one.name not in shown):
                 continue
             yield {
                 "finding": one,

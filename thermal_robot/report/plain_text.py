@@ -94,7 +94,7 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max([len(f.name) for f in diagnosis.effects], default=0)
     yield f"    {'':{wide}}{'probability':>13}   share of the gap, on rows held out (95 %)"
     for status, heading in words.STATUS.items():
-        group = [f for f in diagnosis.effects if words.told_as(f) == status]
+        group = [f for f in diagnosis.effects if words.displayed_status(f) == status]
         if group:
             yield f"  {heading}"
         elif status == "found":

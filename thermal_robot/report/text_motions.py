@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from thermal_robot.report import motion_words as words
 from thermal_robot.report import units
 from thermal_robot.report.plain_text import bar, wrap
-from thermal_robot.report.words import STATUS, listed, one_sigma, told_as
+from thermal_robot.report.words import STATUS, displayed_status, listed, one_sigma
 from thermal_robot.report.words import needs as needed
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _which(d: MotionDiagnosis) -> Iterator[str]:
     yield f"    {'':{wide}}{'probability':>13}    share   of the gap, in motions held out"
     shown = {one.name for one in d.shown}
     for status, heading in STATUS.items():
-        group = [one for one in d.effects if told_as(one) == status]
+        group = [one for one in d.effects if displayed_status(one) == status]
         if status in ("found", "confounded"):
             group = [one for one in group if one.name in shown]
         if group:

@@ -278,7 +278,7 @@ NO_BREAK = "\u00a0"
 _TOGETHER = re.compile(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)")
 
 
-def told_as(finding: Finding) -> str:
+def displayed_status(finding: Finding) -> str:
     """Return the displayed status of a finding: not found, yet more probable than not, is in question."""
     doubtful = finding.status == "not_found" and (finding.probability or 0.0) >= _MORE_LIKELY
     return "in_question" if doubtful else finding.status
@@ -286,7 +286,7 @@ def told_as(finding: Finding) -> str:
 
 def by_status(diagnosis: Diagnosis) -> list[Finding]:
     """Return the findings in the order of display: found first, untestable last."""
-    return [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
+    return [f for status in STATUS for f in diagnosis.effects if displayed_status(f) == status]
 
 
 Lines = list[tuple[str, int]]

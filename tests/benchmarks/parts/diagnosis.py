@@ -14,7 +14,7 @@ from simulate import simulate
 from thermal_robot import diagnose, load_robot
 from thermal_robot.diagnosis.cross_validation import held_out, worst_folds
 from thermal_robot.diagnosis.next_measurement import next_samples
-from thermal_robot.diagnosis.prune import earned
+from thermal_robot.diagnosis.prune import held_out_tests
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.generate import candidates, events
@@ -80,7 +80,7 @@ def _shares(effort):
         "whole": lambda: diagnose(campaign, only=only or None),
         "choice and fit": lambda: fit(campaign, choose(only)),
         "scan for laws": lambda: candidates(found, 1, events(found)),
-        "effects on rows held out": lambda: earned(found),
+        "effects on rows held out": lambda: held_out_tests(found),
         "held-out figures": lambda: held_out(found),
         "worst ways of holding out": lambda: worst_folds(found),
         "next samples": lambda: next_samples(found),

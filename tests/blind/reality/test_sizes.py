@@ -12,11 +12,11 @@ from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import (
     GROWS_ONLY,
+    FaultParameter,
     Gauge,
-    Spot,
     Unseen,
     deviation,
-    draw_spot,
+    draw_fault_parameter,
     near,
     place,
     shares,
@@ -168,39 +168,45 @@ def test_the_deviation_is_how_far_fits_to_noise_scatter(setting, gauge):
     # the first and the last zero are the frames': the shortest solution leaves the others as they are
     fitted = np.linalg.lstsq(design, NOISE * chance, rcond=1e-8)[0]
     number = gauge.frames.shape[1] + 3
-    std, _ = deviation(gauge, Spot(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)
+    std, _ = deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)
     assert np.std(fitted[number]) == pytest.approx(std, rel=0.05)
 
 
 def test_what_else_is_at_work_makes_a_number_harder_to_tell_and_what_is_not_does_not(setting, gauge):
     gains = zeros(setting, GAIN)
-    alone, _ = deviation(gauge, Spot(OFFSET, 3), zeros(setting, OFFSET), [], NOISE)
-    assert deviation(gauge, Spot(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[0] == pytest.approx(alone)
+    alone, _ = deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [], NOISE)
+    assert deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[
+        0
+    ] == pytest.approx(alone)
     gains[3] = 1e-3
-    assert deviation(gauge, Spot(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[0] > 1.001 * alone
-    assert deviation(gauge, Spot(OFFSET, 3), zeros(setting, OFFSET), [], 2 * NOISE)[0] == pytest.approx(2 * alone)
+    assert (
+        deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[0] > 1.001 * alone
+    )
+    assert deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [], 2 * NOISE)[0] == pytest.approx(
+        2 * alone
+    )
 
 
 def test_what_frames_take_up_is_not_asked_for(setting, gauge):
     with pytest.raises(Unseen, match="joint_offset"):
-        deviation(gauge, Spot(OFFSET, 0), zeros(setting, OFFSET), [], NOISE)
-    drawn = {draw_spot(OFFSET, zeros(setting, OFFSET), np.random.default_rng(k)).number for k in range(60)}
+        deviation(gauge, FaultParameter(OFFSET, 0), zeros(setting, OFFSET), [], NOISE)
+    drawn = {draw_fault_parameter(OFFSET, zeros(setting, OFFSET), np.random.default_rng(k)).number for k in range(60)}
     assert drawn == set(range(1, setting.world.n - 1))
 
 
 def test_a_place_is_one_where_the_fault_is_at_work(setting):
     values = zeros(setting, PLAY)
     values[[0, 4], 0] = 2e-4
-    drawn = {draw_spot(PLAY, values, np.random.default_rng(k)).number for k in range(40)}
+    drawn = {draw_fault_parameter(PLAY, values, np.random.default_rng(k)).number for k in range(40)}
     assert drawn == {0, 4}
 
 
 @pytest.mark.parametrize("name", ["joint_offset", "joint_gain", "backlash", "joint_compliance"])
 def test_a_change_has_the_name_and_the_size_of_what_formats_md_says(name, setting, gauge):
     fault = FAULTS[name]
-    values, spot = fault.draw(setting, np.random.default_rng(1)), Spot(fault, 2)
+    values, spot = fault.draw(setting, np.random.default_rng(1)), FaultParameter(fault, 2)
     by = 1e-4 * (1.0 if name in GROWS_ONLY else -1.0)
-    parameter, amount = spot.told(setting, values, by)
+    parameter, amount = spot.reported(setting, values, by)
     joint = setting.world.names[2]
     assert parameter.endswith(f", {joint}")
     assert spot.named(setting)["place"] == {"kind": "joint", "name": joint}

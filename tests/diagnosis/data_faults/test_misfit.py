@@ -14,7 +14,7 @@ from spoilt_tables import SPOILT, measured_at
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.data_faults.faults import Readings
-from thermal_robot.diagnosis.data_faults.misfit import another_robot, arm_length, fitting, unfit
+from thermal_robot.diagnosis.data_faults.misfit import another_robot, arm_length, fitting, mismatch
 from thermal_robot.effects import RANDOM
 from thermal_robot.report import schema
 from thermal_robot.robot import load_robot
@@ -56,22 +56,22 @@ def test_the_urdf_of_another_model_is_refused_and_nothing_is_claimed(rv_m2):
 
 def test_the_urdfs_unit_comes_before_faults_of_the_table(rv_m2):
     scaled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), 1000.0))
-    found = unfit(read_with(measured(rv_m2, 1), scaled))
+    found = mismatch(read_with(measured(rv_m2, 1), scaled))
     assert found.fault is None
     assert found.model.factor == 1e-3
 
 
 def test_a_fault_that_mends_the_table_comes_before_another_robot(sound):
-    fault = unfit(SPOILT["reversed joint"](sound)).fault
+    fault = mismatch(SPOILT["reversed joint"](sound)).fault
     # turned half round about its column this arm is its own image, so that the joints in turn do the same
     assert fault.kinds == ("reversed joint", "reversed joints")
     assert fault.what.startswith("joint_3 is reversed")
-    assert unfit(sound) is None
+    assert mismatch(sound) is None
 
 
 def test_another_robot_that_leaves_less_comes_before_a_unit_that_is_nearly_the_ratio_of_the_arms():
     large, small = (load_robot(f"example-robot-data:{name}", "tool0") for name in ("ur10", "ur3"))
-    found = unfit(read_with(measured(large, 1, measures="pose"), small))
+    found = mismatch(read_with(measured(large, 1, measures="pose"), small))
     assert found.fault is None
     assert found.model.fits == "example-robot-data:ur10"
 

@@ -16,9 +16,9 @@ from thermal_robot.diagnosis.sequential import (
     Point,
     Sequential,
     WeightedRows,
+    converged_fit,
     linearised,
     products,
-    settled,
 )
 from thermal_robot.diagnosis.updated import fixed_point
 from thermal_robot.inference.columns import unknown_frames
@@ -62,9 +62,9 @@ def test_it_is_a_fresh_fit_of_the_same_choice(fresh, once):
 
 
 def test_old_rows_are_looked_at_only_where_it_says_so(found, whole, few, monkeypatch):
-    seen, plain = [], sequential.settled
+    seen, plain = [], sequential.converged_fit
     monkeypatch.setattr(
-        sequential, "settled", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
+        sequential, "converged_fit", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
     )
     start, looked = fixed_point(found.fit), []
     for k in range(10):
@@ -112,7 +112,7 @@ def test_it_ends_at_the_same_place_wherever_it_begins(whole, grown):
     known = grown.fitted
     begin = replace(known, best=None, leverage=0.0, rows=in_full(whole))
     astray = replace(begin, point=Point(begin.point.frames, 1.3 * known.point.values))
-    one, other = (settled(grown.choice, grown.sums, b) for b in (begin, astray))
+    one, other = (converged_fit(grown.choice, grown.sums, b) for b in (begin, astray))
     assert one.steady
     assert other.steady
     assert far(one, other) < 1e-7
@@ -170,14 +170,16 @@ def test_no_step_within_reach_carries_a_safe_row_into_the_tail_and_hardly_one_ac
         step = np.linalg.cholesky(np.linalg.inv(guard.metric)) @ rng.normal(size=5)
         step *= guard.reach / np.sqrt(step @ guard.metric @ step)
         after = np.linalg.norm(safe[:, :, -1] - safe[:, :, :-1] @ step, axis=1)
-        assert (after < guard.bend - guard.share * guard.reach).all()
+        assert (after < guard.huber_threshold - guard.share * guard.reach).all()
         crossed.append((after < guard.medians) != below)
     assert np.mean(crossed) < 0.01
 
-    def holds(share, median=0.0, bend=0.0, rms=1.0, guard=guard):
-        return guard.holds(share * step, guard.sigma, guard.medians + median, guard.bend + bend, np.full(1, rms))
+    def holds(share, median=0.0, huber_threshold=0.0, rms=1.0, guard=guard):
+        return guard.holds(
+            share * step, guard.sigma, guard.medians + median, guard.huber_threshold + huber_threshold, np.full(1, rms)
+        )
 
-    told = [holds(0.99), holds(1.01), holds(0.5, bend=-0.1), holds(0.5, median=0.5)]
+    told = [holds(0.99), holds(1.01), holds(0.5, huber_threshold=-0.1), holds(0.5, median=0.5)]
     assert told == [True, False, False, False]
     # where the median bears on nothing it may move, and the mean square may not
     quiet = replace(guard, quiet=True)

@@ -54,7 +54,7 @@ class Answer:
     failure: str = ""
 
     @property
-    def told(self) -> tuple[tuple[str, ...], ...]:
+    def reported(self) -> tuple[tuple[str, ...], ...]:
         """The verdict beyond what every servo has, each effect with its group."""
         usual = frozenset() if self.case.stated else ALWAYS
         pairs = zip(self.verdict, self.groups, strict=True)
@@ -64,17 +64,17 @@ class Answer:
     def named(self) -> bool:
         """Whether the right name is told, or stands in the group of one that is; of nothing, that nothing is told."""
         right = FAULTS.get(self.case.fault, ())
-        return any(set(right) & set(names) for names in self.told) if right else not self.told
+        return any(set(right) & set(names) for names in self.reported) if right else not self.reported
 
     @property
     def first(self) -> bool:
         """Whether it is the first by share."""
-        return bool(self.told) and bool(set(FAULTS.get(self.case.fault, ())) & set(self.told[0]))
+        return bool(self.reported) and bool(set(FAULTS.get(self.case.fault, ())) & set(self.reported[0]))
 
     @property
     def alone(self) -> bool:
         """Whether nothing else is told."""
-        return self.named and len(self.told) <= 1
+        return self.named and len(self.reported) <= 1
 
     @property
     def placed(self) -> bool:
@@ -144,13 +144,13 @@ def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
 
 def blamed(answers: Sequence[Answer]) -> float:
     """Share of unlisted faults for which an effect that is listed is told."""
-    own = [bool(one.told) for one in answers if one.case.fault in UNLISTED and not one.failure]
+    own = [bool(one.reported) for one in answers if one.case.fault in UNLISTED and not one.failure]
     return float(np.mean(own)) if own else 0.0
 
 
 def silent(answers: Sequence[Answer]) -> float:
     """Share of sound arms of which nothing is told."""
-    own = [not one.told for one in answers if one.case.fault == NOTHING and not one.failure]
+    own = [not one.reported for one in answers if one.case.fault == NOTHING and not one.failure]
     return float(np.mean(own)) if own else 0.0
 
 

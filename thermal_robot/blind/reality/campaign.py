@@ -22,11 +22,11 @@ from thermal_robot.blind.reality.setting import Setting, draw_setting, humidity
 from thermal_robot.blind.reality.sizes import (
     GROWS_ONLY,
     SIZE,
+    FaultParameter,
     Gauge,
-    Spot,
     Unseen,
     deviation,
-    draw_spot,
+    draw_fault_parameter,
     sized,
     truth,
 )
@@ -231,7 +231,7 @@ def draw_fleet(
     # halls of equal size, but for one
     halls = [_HALLS[k % 2] for k in rng.permutation(count)]
     at_work: list[AtWork] = [[] for _ in days]
-    taken: list[Spot] = []
+    taken: list[FaultParameter] = []
     shared, own = [], []
     if several.moves:
         group = str(rng.choice(_HALLS)) if several.how == "hall" else None
@@ -250,12 +250,14 @@ def draw_fleet(
     return {"robot": robots, "hall": halls}, at_work, told
 
 
-def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Generator) -> tuple[Spot, Array]:
+def _drawn(
+    case: Case, day: Day, name: str, taken: list[FaultParameter], rng: np.random.Generator
+) -> tuple[FaultParameter, Array]:
     """Draw a fault at one place that has none of its kind, scaled to the size that the case asks for."""
     fault, gauge = FAULTS[name], day.gauge
     for _ in range(_DRAWS):
         values = fault.draw(gauge.setting, rng)
-        spot = draw_spot(fault, np.zeros_like(values), rng)
+        spot = draw_fault_parameter(fault, np.zeros_like(values), rng)
         if all((spot.fault.name, spot.number) != (other.fault.name, other.number) for other in taken):
             break
     else:
@@ -267,8 +269,8 @@ def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Ge
     return spot, sized(gauge, fault, spot.moved(values, size), wanted)
 
 
-def _named(spot: Spot, day: Day, values: Array) -> dict[str, Any]:
-    name, _ = spot.told(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
+def _named(spot: FaultParameter, day: Day, values: Array) -> dict[str, Any]:
+    name, _ = spot.parameter_change(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
     return {**spot.named(day.setting), "parameter": name}
 
 
@@ -326,19 +328,19 @@ def _moving(
     own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
     fault, values = done[own]
     others = [item for k, item in enumerate(done) if k != own]
-    spot, setting = draw_spot(fault, values, rng), days[0].setting
+    spot, setting = draw_fault_parameter(fault, values, rng), days[0].setting
     after = None if several.how == "grows" else int(rng.integers(len(days) - 1))
     shape = time if after is None else (np.arange(len(days)) > after).astype(float)
     times = float(np.exp(rng.uniform(*np.log(several.change))))
     by = times * _tells(several, days, spot, values, others)
     by *= 1.0 if fault.name in GROWS_ONLY else float(rng.choice([-1.0, 1.0]))
     at_work = [[*done[:own], (fault, spot.moved(values, by * share)), *done[own + 1 :]] for share in shape.tolist()]
-    name, amount = spot.told(setting, values, by)
+    name, amount = spot.parameter_change(setting, values, by)
     how = {"parameter": name, "how": several.how, "after": after, "amount": amount, "deviations": times}
     return at_work, {**spot.named(setting), **how}
 
 
-def _tells(several: Several, days: Sequence[Day], spot: Spot, values: Array, others: AtWork) -> float:
+def _tells(several: Several, days: Sequence[Day], spot: FaultParameter, values: Array, others: AtWork) -> float:
     """Return the standard deviation of a change, of a difference or of the first campaign."""
     noise = days[0].instrument.noise
     told = days[:2] if several.how == "changes" else days[:1]

@@ -272,7 +272,7 @@ _SEEN = 1e-6  # of a column: what less is left of is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Spot:
+class FaultParameter:
     """One number of a fault, by its place, with its name and value in the words and units of formats.md."""
 
     fault: Fault
@@ -289,14 +289,14 @@ class Spot:
         [place] = _named([self.fault.places(setting)[self.number]])
         return {"effect": self.fault.name, "place": place}
 
-    def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
+    def parameter_change(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
         """Name of the corresponding parameter, and its change."""
         before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
         [name] = [key for key in after if after[key] != before[key]]
         return name, after[name] - before[name]
 
 
-def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
+def draw_fault_parameter(fault: Fault, values: Array, rng: np.random.Generator) -> FaultParameter:
     """Draw a place at which a fault is at work; of joint zeros and idle faults any but the first and the last.
 
     Frames take up what the first and the last joint's zero do.
@@ -304,11 +304,11 @@ def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
     size = values[:, SIZE]
     inner = np.arange(1, len(size) - 1)
     places = inner if fault.name == _ZEROS or not size.any() else np.flatnonzero(size)
-    return Spot(fault, int(rng.choice(places)))
+    return FaultParameter(fault, int(rng.choice(places)))
 
 
 def deviation(
-    gauge: Gauge, spot: Spot, values: Array, others: Sequence[tuple[Fault, Array]], noise: float
+    gauge: Gauge, spot: FaultParameter, values: Array, others: Sequence[tuple[Fault, Array]], noise: float
 ) -> tuple[float, float]:
     """Return the standard deviation σ / |x − P x| of one number of a fault, whose unit moves the target by x, (3M,).
 

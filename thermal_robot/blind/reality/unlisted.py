@@ -294,7 +294,7 @@ INTERPLAY = (
 """Effects that change with a condition, and products of two quantities."""
 
 
-def _winding(setting: Setting, values: Array) -> Array:
+def _jenkin_elements(setting: Setting, values: Array) -> Array:
     """Parallel Jenkin elements (friction in series with springs): each follows the joint until it slips.
 
     What they hold depends on where the joint turned round, and not only on its last direction.
@@ -350,7 +350,7 @@ ELUSIVE = (
     in_joints(
         "winding",
         one(milli, *[part(*_SLIPS)] * ELEMENTS, *[part(0.3, 1.0)] * ELEMENTS),
-        _winding,
+        _jenkin_elements,
         quantities=lambda s, places: [q for _, joint in places for q in (f"since_turn.{joint}", joint)],
         fixed=tuple((column, (1.0,)) for column in range(1, 1 + 2 * ELEMENTS)),
     ),

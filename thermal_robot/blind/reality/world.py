@@ -317,7 +317,7 @@ class World:
                 self._place(model, each[i])
             free[address] = self.coupling @ (q[i] + body.joints[i]) + self.rest
             free[nodes] = (body.bow[i, : len(nodes)] * pieces[:, None])[:, :, None]
-            torque[i] = _settle(model, data, free, compliance)[address] @ self.coupling
+            torque[i] = _static_torques(model, data, free, compliance)[address] @ self.coupling
             poses[i] = _pose(data, tool)
         return poses, torque
 
@@ -436,7 +436,7 @@ def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     return held
 
 
-def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
+def _static_torques(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
     """Solve the static equilibrium of joint springs against gravity; return the joint torques, N·m."""
     yields = bool(compliance.any())
     data.qpos[:] = free

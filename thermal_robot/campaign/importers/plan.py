@@ -375,7 +375,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     if not measured.all() and (set(names.POSITION) <= set(columns) or any(map(names.target_of, places))):
         if not measured.any():
             raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
-        notes.append(f"{table.told(~measured)} left out, without a measured position")
+        notes.append(f"{table.listed_rows(~measured)} left out, without a measured position")
         table = table.take(measured)
     cells = _cells(table, columns, robot)
     used = list(columns.values())

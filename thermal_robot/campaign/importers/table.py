@@ -86,9 +86,9 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         found = f"{len(measured.rows)} and {len(commanded.rows)} rows{', without that line' if headless else ''}"
         expected = "as many, in the same order, or a column of names in both"
         raise CampaignError(measured.file, f"{together}{headless}", found=found, expected=expected)
-    columns = _settled(measured, range(len(measured.rows)))
+    columns = _reordered(measured, range(len(measured.rows)))
     first = len(columns)
-    for k, (name, cells) in enumerate(_settled(commanded, order).items(), start=1):
+    for k, (name, cells) in enumerate(_reordered(commanded, order).items(), start=1):
         # columns without names are known by their numbers, which go on from those of the first table
         called = str(first + k) if commanded.unnamed else name
         if name != taken and called in columns:
@@ -134,7 +134,7 @@ def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[T
     return measured.take(np.array([name in where for name in points])), order, tuple(notes)
 
 
-def _settled(table: Table, order: Sequence[int]) -> dict[str, Cells]:
+def _reordered(table: Table, order: Sequence[int]) -> dict[str, Cells]:
     """Reorder rows, and convert columns of numbers, decimal commas included."""
     columns: dict[str, Cells] = {}
     for name in table.columns:

@@ -22,7 +22,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults import settings
-from thermal_robot.inference.registration import Placed, alternate, middle, starts
+from thermal_robot.inference.registration import BaseAndTarget, alternate, middle, starts
 from thermal_robot.inference.settings import LEVER, START_ROUNDS
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
@@ -99,7 +99,7 @@ class Readings:
             away2 = away2 + LEVER**2 * _norm2(log3(seen @ (u @ vt)[..., None, :, :].swapaxes(-1, -2)))
         return np.asarray(np.sqrt(middle(away2)))
 
-    def align(self, *, coarse: bool = False, begun: Array | None = None) -> Placed:
+    def align(self, *, coarse: bool = False, begun: Array | None = None) -> BaseAndTarget:
         """Register the unknown frames robustly; ``coarse``: in few iterations from one start.
 
         ``begun`` (..., P, 3) are other places of the target to start from, m.
@@ -110,7 +110,7 @@ class Readings:
         poses = self.poses if self.simulated_position is None else None
         return alternate(self, self.declared, begun, rounds, poses=poses)[1]
 
-    def distance(self, frames: Placed, *, turns: bool = True) -> Array:
+    def distance(self, frames: BaseAndTarget, *, turns: bool = True) -> Array:
         """Distance (..., N) between measured and predicted pose, m; an angle counts times ``LEVER``.
 
         Without ``turns`` that of positions alone.
@@ -367,7 +367,7 @@ _ANGLES = {
 """Three numbers that tell a turn, as SciPy names them, and in words."""
 
 
-def _retold(taken: str, meant: str, factor: float = 1.0) -> Repair:
+def _converted(taken: str, meant: str, factor: float = 1.0) -> Repair:
     """Repair of orientations whose three numbers have another convention or another unit."""
 
     def change(wxyz: Array) -> Array:
@@ -380,7 +380,7 @@ def _retold(taken: str, meant: str, factor: float = 1.0) -> Repair:
     return _changed("orientation", change)
 
 
-def _turn_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
+def _orientation_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
     """Kind of fault of measured orientations."""
     found = tuple(proposals)
     return Kind(name, says, remedy, lambda readings: () if readings.orientation is None else found)
@@ -398,27 +398,27 @@ AXES = (
     Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", lambda _: _MIRRORS),
 )
 TURNS = (
-    _turn_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ORDERS),
-    _turn_kind(
+    _orientation_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ORDERS),
+    _orientation_kind(
         "conjugate quaternion",
         "quaternions turn the measurement frame into the target's, not back",
         "change the sign of qx, qy, qz",
         [("", _mapped("orientation", _CONJUGATE))],
     ),
-    _turn_kind(
+    _orientation_kind(
         "angles of orientations",
         "orientations are made of {}",
         "convert them anew",
         [
-            (f"{_ANGLES[meant]}, not of {_ANGLES[taken]}", _retold(taken, meant))
+            (f"{_ANGLES[meant]}, not of {_ANGLES[taken]}", _converted(taken, meant))
             for taken, meant in permutations(_ANGLES, 2)
         ],
     ),
-    _turn_kind(
+    _orientation_kind(
         "angles in degrees",
         "angles in rad are read as degrees in {}",
         "convert them anew",
-        [(words, _retold(own, own, 180 / np.pi)) for own, words in _ANGLES.items()],
+        [(words, _converted(own, own, 180 / np.pi)) for own, words in _ANGLES.items()],
     ),
 )
 MEASUREMENT_KINDS = (*UNITS, *AXES, *TURNS)

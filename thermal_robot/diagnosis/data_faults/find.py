@@ -39,7 +39,7 @@ from thermal_robot.diagnosis.data_faults.faults import (
 )
 from thermal_robot.diagnosis.values import DataFault
 from thermal_robot.inference.algebra import rms
-from thermal_robot.inference.registration import Placed, middle, soft
+from thermal_robot.inference.registration import BaseAndTarget, cauchy_weights, middle
 from thermal_robot.inference.settings import LEVEL
 
 
@@ -67,7 +67,7 @@ def geometric_mean(distance: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class Repaired:
     """One repaired fault and the distances of a sample of rows after the repair, m."""
 
     fault: Fault  # what was mended
@@ -87,16 +87,18 @@ class Tried:
 
 
 @dataclass(frozen=True, eq=False)
-class Struck:
+class AffectedRows:
     """Rows that a data fault may concern, and their distances from the prediction."""
 
     readings: Readings  # all rows as they stand
     rows: Rows  # (N,) those in question
     distance: Array  # (N,) of all rows as they stand, m
-    frames: Placed | None  # where the other rows put them; ``None`` where all rows are in question, and the frames too
+    frames: (
+        BaseAndTarget | None
+    )  # where the other rows put them; ``None`` where all rows are in question, and the frames too
 
     @classmethod
-    def whole(cls, readings: Readings) -> Struck:
+    def whole(cls, readings: Readings) -> AffectedRows:
         """All rows; the frames are fitted anew to each candidate."""
         sample = readings.take(spread(np.arange(len(readings.q))))
         distance = readings.distance(sample.align(coarse=True))
@@ -137,15 +139,15 @@ class Struck:
         # fewer than three rows determine no frame
         return mended.take(evenly(own, min(most, asked))) if len(own) >= max(3, asked / 2) else None
 
-    def tried(self, fault: Fault, begun: Array) -> Tried | None:
+    def tried(self, fault: Fault, begun: Array) -> Repaired | None:
         """Repair a fault in these rows and register a sample, from ``begun`` and from the declared target."""
         part = self.sketch(fault, settings.SAMPLED)
         if part is None:
             return None
         frames = self.frames or part.align(begun=np.stack([begun, part.declared.tool[:3, 3]]))
-        return Tried(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
+        return Repaired(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
 
-    def hit(self, found: Tried) -> Rows:
+    def improved_rows(self, found: Repaired) -> Rows:
         """Rows (N,) that fit better with the repair than without.
 
         Rows that nothing mends, and those that are not determined, count as the others.
@@ -157,7 +159,7 @@ class Struck:
         return self.rows if better.sum() > (1.0 - settings.FEW_STRAYS) * known.sum() else better
 
 
-def part_of(readings: Readings, begun: Placed) -> Struck | None:
+def part_of(readings: Readings, begun: BaseAndTarget) -> AffectedRows | None:
     """Outlying rows where they are many but a minority; else ``None``."""
     frames, distance = begun, readings.distance(begun)
     for _ in range(settings.PART_ROUNDS):
@@ -168,7 +170,7 @@ def part_of(readings: Readings, begun: Placed) -> Struck | None:
         distance = readings.distance(frames)
     away = _strays(readings, distance)
     many = max(3, settings.FEW_STRAYS * len(away)) <= away.sum() <= len(away) / 2
-    return Struck(readings, away, distance, frames) if many else None
+    return AffectedRows(readings, away, distance, frames) if many else None
 
 
 def _strays(readings: Readings, distance: Array) -> Rows:
@@ -177,7 +179,7 @@ def _strays(readings: Readings, distance: Array) -> Rows:
     return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * readings.tolerance))
 
 
-def consensus(sample: Readings) -> Placed:
+def consensus(sample: Readings) -> BaseAndTarget:
     """Random sample consensus (RANSAC): frames that bring many rows near where half of them may be wrong.
 
     Fischler and Bolles, *Communications of the ACM* 24 (1981). All draws go side by side.
@@ -191,7 +193,7 @@ def consensus(sample: Readings) -> Placed:
         reach = np.quantile(distance, settings.NEAREST, axis=1)
         first = int(reach.argmin())
         if reach[first] < least:
-            best, least = Placed(frames.base[first], frames.tool[first]), float(reach[first])
+            best, least = BaseAndTarget(frames.base[first], frames.tool[first]), float(reach[first])
         # go on from the most promising draws, each with the rows that it brings near
         order = np.argsort(reach, kind="stable")[: max(len(reach) // settings.DRAWS_HALVED, 1)]
         near = max(int(settings.NEAREST * distance.shape[1]), settings.DRAWN)
@@ -199,7 +201,7 @@ def consensus(sample: Readings) -> Placed:
     return best
 
 
-def mixture(struck: Struck) -> Struck | None:
+def mixture(struck: AffectedRows) -> AffectedRows | None:
     """Two-component mixtures of unrepaired and repaired rows, one for each fault; returns the best one's repaired rows.
 
     For a robot whose own errors are not small beside the fault: no row strays far. The rows are told anew in each
@@ -210,7 +212,7 @@ def mixture(struck: Struck) -> Struck | None:
     own, begun = readings.take(rows), struck.sample.align(coarse=True)
     proposals = [p for kind in KINDS for p in kind.proposed(readings)]
     proposals += [family.of(number) for kind in KINDS for family in kind.families(readings) for number in family.tried]
-    best: list[tuple[float, Proposal, Placed]] = []
+    best: list[tuple[float, Proposal, BaseAndTarget]] = []
     for first in range(0, len(proposals), settings.ABREAST):
         some = proposals[first : first + settings.ABREAST]
         mended = [p.repair(readings, every).take(rows) for p in some]
@@ -222,13 +224,13 @@ def mixture(struck: Struck) -> Struck | None:
             frames = mixed.align(coarse=True, begun=np.atleast_2d(frames.tool[..., :3, 3])[:, None, :])
         left = np.where(better.any(axis=1) & ~better.all(axis=1), middle(mixed.distance(frames)), np.inf)
         k = int(left.argmin())
-        best.append((float(left[k]), some[k], Placed(frames.base[k], frames.tool[k])))
+        best.append((float(left[k]), some[k], BaseAndTarget(frames.base[k], frames.tool[k])))
     least, proposal, frames = min(best, key=lambda found: found[0])
     fall = struck.median / (2.0 * max(least, settings.LEAST_GAP))
     if fall < 1.0 or struck.is_chance(fall, len(proposals)):
         return None
     mended_all, distance = struck.mended((proposal,)), struck.readings.distance(frames)
-    return Struck(struck.readings, mended_all.known & (mended_all.distance(frames) < distance), distance, frames)
+    return AffectedRows(struck.readings, mended_all.known & (mended_all.distance(frames) < distance), distance, frames)
 
 
 Chosen = list[tuple[Fault, Array, float]]
@@ -238,25 +240,25 @@ Chosen = list[tuple[Fault, Array, float]]
 class Screen:
     """Candidate faults of some rows, screened on few rows before the full comparison."""
 
-    def __init__(self, struck: Struck) -> None:
+    def __init__(self, struck: AffectedRows) -> None:
         self.struck, self.asked = struck, 0
 
-    def singly(self) -> list[Tried]:
+    def singly(self) -> list[Repaired]:
         """Single faults with known frames: distances on a few rows."""
         parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(KINDS)]
         frames = self.struck.frames
         assert frames is not None
         self.asked += len(parts)
-        return [Tried(own, part.distance(frames), frames.tool[:3, 3]) for own, part in parts if part is not None]
+        return [Repaired(own, part.distance(frames), frames.tool[:3, 3]) for own, part in parts if part is not None]
 
-    def both_sides(self) -> list[Tried]:
+    def both_sides(self) -> list[Repaired]:
         """Faults of the joints, of the measurements, and pairs with one of each: distances on a few rows."""
-        joints = self._glanced([(), *((p,) for p in self._of_joints)])
+        joints = self._prescreened([(), *((p,) for p in self._of_joints)])
         measured = [*self._proposals(MEASUREMENT_KINDS)]
         units, axes, turns = ([p for p in measured if p.kind in kinds] for kinds in (UNITS, AXES, TURNS))
         sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *product(units, axes)]
         asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
-        looked = self._looked(asked)
+        looked = self._screened(asked)
         if self.struck.readings.orientation is None:
             return looked
         looked.sort(key=attrgetter("typical"))
@@ -264,9 +266,9 @@ class Screen:
             t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]
         ]
         more = [((*t.fault, *turn), t.place, 0.0) for t in near for turn in ((), *((p,) for p in turns))]
-        return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
+        return self._screened([own for own in more if len(own[0]) <= 2], turns=True)
 
-    def two_of_joints(self) -> list[Tried]:
+    def two_of_joints(self) -> list[Repaired]:
         """Pairs of faults of the joints, including sign reversals of any number of joints with another fault."""
         turned = [p for p in self._of_joints if p.joints][: settings.PAIRED_PATTERNS]
         others = [p for p in self._of_joints if not p.joints]
@@ -283,7 +285,7 @@ class Screen:
             return []
         self.asked += len(made)
         order = np.argsort(np.concatenate(scores), kind="stable")[: settings.MOST_SURVIVORS]
-        return self._looked(self._glanced([made[k] for k in order]), turns=True)
+        return self._screened(self._prescreened([made[k] for k in order]), turns=True)
 
     @cached_property
     def _of_joints(self) -> list[Proposal]:
@@ -305,7 +307,7 @@ class Screen:
         struck = self.struck
         if struck.frames is None:
             part = window(struck.readings)
-            struck = Struck(part, np.ones(len(part.q), dtype=bool), np.zeros(len(part.q)), None)
+            struck = AffectedRows(part, np.ones(len(part.q), dtype=bool), np.zeros(len(part.q)), None)
 
         def left(*fault: Proposal) -> float:
             part = struck.sketch(fault, settings.RELAXED)
@@ -326,21 +328,21 @@ class Screen:
         )
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
-    def _glanced(self, faults: Sequence[Fault]) -> Chosen:
+    def _prescreened(self, faults: Sequence[Fault]) -> Chosen:
         """Faults with the smallest residual of an affine map, refitted once without outliers."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
         if not own:
             return []
         several = stacked([part for _, part in own])
-        left, place = several.relaxed(soft(several.relaxed()[0]))
+        left, place = several.relaxed(cauchy_weights(several.relaxed()[0]))
         score = middle(left)
         order = np.argsort(score, kind="stable")[: settings.MOST_SURVIVORS]
         many = int((score <= settings.NEAR * max(score.min(), settings.LEAST_GAP)).sum())
         least = score * own[0][1].maps_place
         return [(own[k][0], place[k], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
 
-    def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
+    def _screened(self, chosen: Chosen, *, turns: bool = False) -> list[Repaired]:
         """Faults with their rigid-registration residual on a few rows, if measured points extend as far as the motion.
 
         Those of which even a map leaves more than a mend may are passed over.
@@ -349,13 +351,13 @@ class Screen:
         chosen = [own for own in chosen if own[2] <= settings.NEAR * settings.STILL[max(len(own[0]), 1) - 1]]
         parts = [(own, self.struck.sketch(own[0], settings.SKETCHED)) for own in chosen]
         extending = [(own, part) for own, part in parts if part is not None and _extends(part)]
-        found: list[Tried] = []
+        found: list[Repaired] = []
         for first in range(0, len(extending), settings.ABREAST):
             some, several = zip(*extending[first : first + settings.ABREAST], strict=True)
             side = stacked(several)
             frames = side.align(coarse=True, begun=np.stack([place for _, place, _ in some])[:, None, :])
             left = side.distance(frames, turns=turns)
-            found += [Tried(own[0], away, at[:3, 3]) for own, away, at in zip(some, left, frames.tool, strict=True)]
+            found += [Repaired(own[0], away, at[:3, 3]) for own, away, at in zip(some, left, frames.tool, strict=True)]
         return found
 
 
@@ -374,21 +376,21 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
     if campaign.samples <= settings.DRAWN:
         return None
     readings = Readings.of(campaign)
-    every = Struck.whole(readings)
+    every = AffectedRows.whole(readings)
     apart = every.median > readings.tolerance
     if apart:
         progress("faults of the data")
-    found = mending(every) if apart else []
+    found = repairs(every) if apart else []
     part = None if found else part_of(readings, consensus(every.sample) if apart else every.sample.align(coarse=True))
     if part is None and apart and not found:
         part = mixture(every)
     if part is not None:
         progress("faults of the data in some rows")
-        every, found = part, mending(part)
-    return _told(campaign, every, found) if found else None
+        every, found = part, repairs(part)
+    return _data_fault(campaign, every, found) if found else None
 
 
-def mending(struck: Struck) -> list[Tried]:
+def repairs(struck: AffectedRows) -> list[Repaired]:
     """Faults whose repair cannot be told apart by their residuals, in the order of their kinds; empty without any.
 
     Two faults at once are told where they leave so much less than one that it is no chance.
@@ -408,7 +410,7 @@ def mending(struck: Struck) -> list[Tried]:
     return two or one
 
 
-def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
+def _best(screen: Screen, tried: Sequence[Repaired], before: float) -> list[Repaired]:
     """Faults that reduce the gap, m, far enough, and nearly as far as the best of them."""
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
@@ -426,7 +428,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
     return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=_usual)
 
 
-def _says_more(one: Tried, other: Tried) -> bool:
+def _says_more(one: Repaired, other: Repaired) -> bool:
     """Whether a fault reverses further joints that do not improve the fit over another fault."""
     return (
         len(one.fault) == len(other.fault)
@@ -436,18 +438,18 @@ def _says_more(one: Tried, other: Tried) -> bool:
     )
 
 
-def _usual(tried: Tried) -> tuple[int, ...]:
+def _usual(tried: Repaired) -> tuple[int, ...]:
     """Sort key: the order of the kinds, then the fewest joints."""
     return (*(KINDS.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
 
 
-def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFault:
-    alike: dict[tuple[Kind, ...], list[Tried]] = {}
+def _data_fault(campaign: Campaign, struck: AffectedRows, found: Sequence[Repaired]) -> DataFault:
+    alike: dict[tuple[Kind, ...], list[Repaired]] = {}
     for tried in found:
         alike.setdefault(tuple(p.kind for p in tried.fault), []).append(tried)
     alike = dict([*alike.items()][: settings.TOLD])
     best = min(found, key=attrgetter("median"))
-    hit = struck.hit(best)
+    hit = struck.improved_rows(best)
     remedies = (" and ".join(dict.fromkeys(kind.remedy for kind in kinds)) for kinds in alike)
     return DataFault(
         kinds=tuple(dict.fromkeys(kind.name for kinds in alike for kind in kinds)),
@@ -459,7 +461,7 @@ def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFau
     )
 
 
-def _words(alike: Sequence[Tried]) -> str:
+def _words(alike: Sequence[Repaired]) -> str:
     """Describe a fault: what is wrong, in which place, and what else is."""
     parts = []
     for k, proposal in enumerate(alike[0].fault):

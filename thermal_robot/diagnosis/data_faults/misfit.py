@@ -26,14 +26,14 @@ from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import spread
-from thermal_robot.diagnosis.residual_tests import examine
+from thermal_robot.diagnosis.residual_tests import analyse_residual
 from thermal_robot.diagnosis.values import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit
-from thermal_robot.inference.registration import middle, soft
+from thermal_robot.inference.registration import cauchy_weights, middle
 from thermal_robot.inference.scatter import nothing_random
 from thermal_robot.kinematics import (
     ChainFrames,
@@ -141,7 +141,7 @@ class Recalibrated:
         gap = self._seen[2]
         distance = np.linalg.norm(gap, axis=1)
         scale = max(float(middle(distance)) / settings.MEDIAN, settings.LEAST_GAP)
-        weight = np.sqrt(soft(distance))[:, None] / scale
+        weight = np.sqrt(cauchy_weights(distance))[:, None] / scale
         columns = self._columns() * weight[:, :, None]
         design = columns.reshape(gap.size, -1)
         matrix, vector = design.T @ design, design.T @ (gap * weight).ravel()
@@ -355,7 +355,7 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
     return factor, longer(factor)
 
 
-def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
+def mismatch(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
     """Test before any effect whether robot and table match: unit of the URDF, data faults, another robot.
 
     A fault that leaves a gap no robot leaves is none where another robot leaves clearly less.
@@ -392,7 +392,7 @@ def another_motion(fitted: Fit) -> Misfit | None:
 
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
     """Conclusion if its exact model is the one that was compared; else the frames alone, with the reason."""
-    note = unsettled(last.fit)
+    note = unconverged(last.fit)
     return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
 
@@ -401,11 +401,11 @@ def frames_alone(
 ) -> Conclusion:
     """Conclusion with the unknown frames alone, where no effect can be tested without the columns in ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
-    left = examine(bare)
+    left = analyse_residual(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
 
 
-def unsettled(fit: Fit) -> str:
+def unconverged(fit: Fit) -> str:
     """Sentence if the exact model of a fit is not the one that was compared and held out; else empty.
 
     Combinations are compared, and rows held out, with the model linearised at the exact one. Where Gauss-Newton ends

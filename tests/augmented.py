@@ -7,20 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.links import growing
 from thermal_robot.kinematics.model import unit_motion
-
-if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
-
+from thermal_robot.robot import Robot
 
 ELONGATION = "elongation of "
 """What the name of a virtual joint begins with; the name of its segment follows."""
@@ -30,27 +25,9 @@ ELONGATION = "elongation of "
 class AugmentedModel:
     """Pinocchio model of the chain with M movable joints and S virtual prismatic ones; its world is the root frame.
 
-    It knows positions only: it carries no masses, for which ``robot.model`` is there. A joint that mimics another has
-    a coordinate in the model, which this class fills in: M = n unless there are such joints.
-
-    Parameters
-    ----------
-    model
-        ``pinocchio.Model`` with M + S joints of one coordinate each; a continuous joint is a revolute one without
-        limits. The links of the chain are frames of type ``BODY`` with their own names.
-    joints
-        (n,) columns of the driving joints in a configuration, rad or m; of one beside the chain, that of its first
-        follower.
-    elongations
-        (S,) columns of the virtual joints, m; their joints are called ``"elongation of <segment>"``.
-    segments
-        S names of the segments that have a length, from the root on.
-    placements
-        For every segment of the robot, with a length or not, the joint whose placement it is.
-    tool
-        Number of the tool's frame.
-    coupling, offset
-        (M + S, M + S) and (M + S,): a configuration, from one in which the mimicking joints are zero.
+    ``joints`` (n,) and ``elongations`` (S,): columns of driving and virtual joints in a configuration. ``segments``:
+    the S names of those with a length; ``placements``: of every segment, the joint whose placement it is. ``coupling``
+    (M + S, M + S) and ``offset`` (M + S,) fill in the joints that mimic others.
     """
 
     model: pin.Model
@@ -63,34 +40,10 @@ class AugmentedModel:
     offset: Array
 
     def configurations(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Return the configurations of the model from joint positions and elongations.
-
-        Parameters
-        ----------
-        q
-            (N, n) rad or m; (n,) counts as one configuration.
-        elongations
-            (N, S) or (S,) m, or one number for all.
-
-        Returns
-        -------
-        ndarray
-            (N, M + S).
-
-        Raises
-        ------
-        RobotError
-            If a shape does not fit.
-        """
+        """Return the configurations (N, M + S) from joint positions (N, n), rad or m, and elongations (N, S), m."""
         rows = np.atleast_2d(np.asarray(q, dtype=float))
-        grown = np.asarray(elongations, dtype=float)
-        if rows.ndim != 2 or rows.shape[1] != len(self.joints):
-            raise RobotError(f"joint positions of shape {np.shape(q)} do not fit: expected (N, {len(self.joints)})")
-        wanted = (len(rows), len(self.elongations))
-        if grown.shape not in ((), wanted[1:], wanted):
-            raise RobotError(f"elongations of shape {grown.shape} do not fit: expected {wanted[1:]} or {wanted}")
         out = np.zeros((len(rows), self.model.nq))
-        out[:, self.joints], out[:, self.elongations] = rows, grown
+        out[:, self.joints], out[:, self.elongations] = rows, elongations
         return out @ self.coupling.T + self.offset
 
     def tool_poses(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
@@ -118,22 +71,11 @@ def augmented_model(robot: Robot) -> AugmentedModel:
     """Build the Pinocchio model in which every segment with a length begins with a virtual prismatic joint.
 
     A fixed frame with a length between two joints (``column_top`` of the RV-M2) gets a virtual joint of its own, so
-    that two elongations of one body are two coordinates.
-
-    Parameters
-    ----------
-    robot
-        The robot. Placements are those of its Pinocchio model, so that the batch functions can be checked against it;
-        of its ``chain`` only names and coupling are read, and of its segments the directions.
-
-    Returns
-    -------
-    AugmentedModel
-        At zero elongations the same robot.
+    that two elongations of one body are two coordinates. Placements are those of the robot's Pinocchio model; of its
+    ``chain`` only names and coupling are read, and of its segments the directions.
     """
     source, model = robot.model, pin.Model()
     model.name = robot.model.name
-    model.gravity.linear = robot.gravity
     directions = {segment.index: segment.direction for segment in robot.segments}
     root = _frame(source, robot.root_frame, pin.FrameType.BODY)
     model.addFrame(pin.Frame(robot.root_frame, 0, 0, pin.SE3.Identity(), pin.FrameType.BODY))
@@ -188,15 +130,7 @@ def _add_movable(model: pin.Model, parent: int, robot: Robot, name: str, placeme
     joint = robot.model.joints[robot.model.getJointId(name)]
     # A continuous joint has two coordinates in Pinocchio, its cosine and sine; here it has one.
     one = joint if joint.nq == 1 else pin.JointModelRevoluteUnaligned(unit_motion(robot.model, joint)[3:])
-    free = np.full(1, np.inf)
-    low, high = -free, free
-    coupling = robot.chain.coupling
-    row = [robot.chain.names[k] for k in robot.chain.movable].index(name)
-    if row in coupling.driving:
-        j = coupling.driving.tolist().index(row)
-        ends = coupling.matrix[row, j] * np.array([robot.lower[j], robot.upper[j]]) + coupling.offset[row]
-        low, high = ends.min(keepdims=True), ends.max(keepdims=True)
-    added: int = model.addJoint(parent, one, placement, name, free, free, low, high)
+    added: int = model.addJoint(parent, one, placement, name)
     return added
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 
-class Teller(Protocol):
+class Renderer(Protocol):
     """Renderer: a module, or an object, with these functions of one result.
 
     A headline and an advice are one plain sentence, a text is all of it, a fragment is HTML without a page around it.
@@ -30,15 +30,15 @@ class Teller(Protocol):
     motion_comparison_text: Callable[[Any], str]
 
 
-_tellers: list[Teller] = []
+_renderers: list[Renderer] = []
 
 
-def told_by(teller: Any) -> None:
-    """Register the renderer of all results: see :class:`Teller`."""
-    _tellers[:] = [teller]
+def register_renderer(renderer: Any) -> None:
+    """Register the renderer of all results: see :class:`Renderer`."""
+    _renderers[:] = [renderer]
 
 
-def registered() -> Teller:
+def registered_renderer() -> Renderer:
     """Return the renderer that was registered last.
 
     Raises
@@ -46,6 +46,6 @@ def registered() -> Teller:
     RuntimeError
         If nobody was.
     """
-    if not _tellers:
-        raise RuntimeError("nobody can tell a diagnosis: import thermal_robot, or call told_by")
-    return _tellers[0]
+    if not _renderers:
+        raise RuntimeError("no renderer of results: import thermal_robot, or call register_renderer")
+    return _renderers[0]

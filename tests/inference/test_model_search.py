@@ -11,8 +11,8 @@ from scipy.special import logsumexp
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import evidence
-from thermal_robot.inference.explain import PLAIN, Ladder
-from thermal_robot.inference.kernels import Form
+from thermal_robot.inference.explain import PLAIN, ModelSearch
+from thermal_robot.inference.kernels import Kernel
 
 PRIOR = (-1.0, -2.0, -0.5)
 CHOSEN = [c for size in range(4) for c in combinations(range(3), size)]
@@ -21,20 +21,20 @@ CHOSEN = [c for size in range(4) for c in combinations(range(3), size)]
 def two_forms(rows, seed=0):
     """One that is the same matrix for all rows, few functions; one of a matrix each, more functions than rows."""
     rng = np.random.default_rng(seed)
-    narrow = Form("narrow", rng.normal(size=(rows, 3)), np.eye(3))
-    wide = Form("wide", rng.normal(size=(rows, 40)), rng.normal(size=(rows, 3, 2)))
+    narrow = Kernel("narrow", rng.normal(size=(rows, 3)), np.eye(3))
+    wide = Kernel("wide", rng.normal(size=(rows, 40)), rng.normal(size=(rows, 3, 2)))
     return [narrow, wide]
 
 
-def inside(form, whitening):
-    """Dense covariance of a form, weighed, of the rows in use, in units of the noise."""
+def inside(kernel, whitening):
+    """Dense covariance of a kernel, weighed, of the rows in use, in units of the noise."""
     root = np.repeat(np.sqrt(whitening.weights), 3)
     used = root > 0.0
-    return (root[:, None] * dense(form, whitening.noise) * root)[np.ix_(used, used)]
+    return (root[:, None] * dense(kernel, whitening.noise) * root)[np.ix_(used, used)]
 
 
 def drawn(seed, rows=24, present=(1,), tau=0.0, which=0):
-    """A small problem with a discrepancy of known form and size, and the ladder on it."""
+    """A small problem with a discrepancy of known kernel and amplitude, and the model search on it."""
     linear, whitening = small_problem(seed, rows=rows, present=present)
     whitening = replace(whitening, weights=np.where(whitening.weights > 0, 1.0, 0.0))
     offered = two_forms(rows, seed)
@@ -44,23 +44,23 @@ def drawn(seed, rows=24, present=(1,), tau=0.0, which=0):
         value, vector = np.linalg.eigh(covariance)
         error = tau * (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.normal(size=3 * rows)
         linear = replace(linear, gap=linear.gap + error.reshape(rows, 3))
-    return linear, whitening, Ladder(linear, whitening, offered, PRIOR)
+    return linear, whitening, ModelSearch(linear, whitening, offered, PRIOR)
 
 
-def belief(ladder):
-    """Probability that there is a discrepancy; those of all forms and of none are one."""
-    odds = ladder.forms_in_question()
+def belief(models):
+    """Probability that there is a discrepancy; those of all kernels and of none are one."""
+    odds = models.kernel_probabilities()
     assert sum(odds.values()) == pytest.approx(1.0)
     return 1.0 - odds.get("", 0.0)
 
 
-def rungs(ladder):
-    return [PLAIN, *((k, tau) for k in range(len(ladder.forms)) for tau in settings.TAUS)]
+def hyperparameters(models):
+    return [PLAIN, *((k, tau) for k in range(len(models.kernels)) for tau in settings.TAUS)]
 
 
-def less_density(ladder, rung, blocks, beside):
+def less_density(models, hyper, blocks, beside):
     """What the evidence of a combination beside a discrepancy is more than the density of the gap."""
-    linear, whitening, search = ladder.linear, ladder.whitening, ladder.beside(rung)
+    linear, whitening, search = models.linear, models.whitening, models.search_at(hyper)
     found = evidence(search.gram, blocks, sum(search.log_prior[b] for b in blocks), None)
     density = direct(linear, whitening, found, PRIOR, beside=beside)
     return found.log_evidence - density - volume(linear, whitening, found, beside=beside)
@@ -76,24 +76,26 @@ def near_nothing(off):
 
 
 def test_evidence_beside_a_discrepancy_is_the_density_of_the_gap():
-    """Of all combinations and rungs, weights included, but for one constant and the prior odds of rungs."""
+    """Of all combinations and hyperparameters, but for one constant and the prior odds of the latter."""
     for seed in range(2):
         linear, whitening = small_problem(seed, rows=12, present=(1,))
         offered, off = two_forms(12, seed), []
-        ladder = Ladder(linear, whitening, offered, PRIOR)
-        for rung in (PLAIN, (0, 0.5), (0, 8.0), (1, 1.0), (1, 16.0)):
-            form, tau = rung
-            beside = None if form < 0 else tau**2 * inside(offered[form], whitening)
-            # two forms share what a discrepancy is given, and so do the sizes of each
-            odds = np.log(0.5) if form < 0 else np.log(0.5 / (2 * len(settings.TAUS)))
-            off += [less_density(ladder, rung, blocks, beside) - odds for blocks in CHOSEN]
+        models = ModelSearch(linear, whitening, offered, PRIOR)
+        for hyper in (PLAIN, (0, 0.5), (0, 8.0), (1, 1.0), (1, 16.0)):
+            kernel, tau = hyper
+            beside = None if kernel < 0 else tau**2 * inside(offered[kernel], whitening)
+            # two kernels share what a discrepancy is given, and so do the sizes of each
+            odds = np.log(0.5) if kernel < 0 else np.log(0.5 / (2 * len(settings.TAUS)))
+            off += [less_density(models, hyper, blocks, beside) - odds for blocks in CHOSEN]
         near_nothing(off - np.nanmedian(off))
 
 
-def everything(ladder):
-    """Log evidence of all combinations beside all rungs, each computed."""
+def everything(models):
+    """Log evidence of all combinations beside all hyperparameters, each computed."""
     return {
-        (rung, blocks): ladder.beside(rung).evaluate(blocks).log_evidence for rung in rungs(ladder) for blocks in CHOSEN
+        (hyper, blocks): models.search_at(hyper).evaluate(blocks).log_evidence
+        for hyper in hyperparameters(models)
+        for blocks in CHOSEN
     }
 
 
@@ -101,31 +103,31 @@ def everything(ladder):
 @pytest.mark.parametrize("tau", [0.0, 0.7, 4.0, 20.0])
 @pytest.mark.parametrize("present", [(), (1,), (0, 2)], ids=str)
 def test_the_best_and_summed_probabilities_are_those_of_all_combinations_and_discrepancies(present, tau, seeds):
-    """What the search leaves out of the sum, rungs 4 nats below the best, changes none by more than some hundredths."""
+    """Hyperparameters 4 nats below the best, left out of the sum, change none by more than some hundredths."""
     for seed in seeds:
-        linear, whitening, ladder = drawn(seed, present=present, tau=tau, which=(seed + len(present)) % 2)
-        best = ladder.run()[1]
-        compared, chances = ladder.probabilities()
+        linear, whitening, models = drawn(seed, present=present, tau=tau, which=(seed + len(present)) % 2)
+        best = models.run()[1]
+        compared, chances = models.probabilities()
         assert chances.sum() == pytest.approx(1.0)
         assert (np.diff(chances) <= 0.0).all()
-        log = everything(Ladder(linear, whitening, ladder.forms, PRIOR))
+        log = everything(ModelSearch(linear, whitening, models.kernels, PRIOR))
         assert best.log_evidence == pytest.approx(max(log.values()), abs=1e-2)
         total = logsumexp(list(log.values()))
         for b in range(3):
             ours = sum(p for c, p in zip(compared, chances, strict=True) if b in c.blocks)
             brute = np.exp(logsumexp([v for (_, blocks), v in log.items() if b in blocks]) - total)
             assert ours == pytest.approx(brute, abs=0.04)
-        brute = 1.0 - np.exp(logsumexp([v for (rung, _), v in log.items() if rung == PLAIN]) - total)
-        assert belief(ladder) == pytest.approx(brute, abs=0.04)
+        brute = 1.0 - np.exp(logsumexp([v for (hyper, _), v in log.items() if hyper == PLAIN]) - total)
+        assert belief(models) == pytest.approx(brute, abs=0.04)
 
 
 def test_where_the_search_starts_and_in_which_order_does_not_matter():
     for seed in range(2):
         answers = set()
         for order in ((), *permutations([(0,), (1, 2), (2,)])):
-            _, _, ladder = drawn(seed, present=(0, 2), tau=3.0)
-            rung, best = ladder.run(order) if order else ladder.run()
-            answers.add((rung, best.blocks, round(best.log_evidence, 2)))
+            _, _, models = drawn(seed, present=(0, 2), tau=3.0)
+            hyper, best = models.run(order) if order else models.run()
+            answers.add((hyper, best.blocks, round(best.log_evidence, 2)))
         assert len(answers) == 1, answers
 
 
@@ -133,24 +135,24 @@ def test_where_the_search_starts_and_in_which_order_does_not_matter():
 def test_form_and_size_of_a_discrepancy_are_told(which):
     sizes, beliefs = [], []
     for seed in range(10):
-        _, _, ladder = drawn(seed, rows=40, tau=4.0, which=which)
-        (form, tau), best = ladder.run()
+        _, _, models = drawn(seed, rows=40, tau=4.0, which=which)
+        (kernel, tau), best = models.run()
         assert best.blocks == (1,)
-        beliefs.append(belief(ladder))
-        sizes.append(tau if form == which else np.nan)
+        beliefs.append(belief(models))
+        sizes.append(tau if kernel == which else np.nan)
     assert min(beliefs) > 0.99
     assert np.isfinite(sizes).mean() >= 0.9
     assert 2.0 < np.nanmedian(sizes) < 8.0
 
 
 @pytest.mark.parametrize("tau", [0.0, 3.0])
-def test_without_a_block_it_is_the_ladder_that_never_had_it(tau):
+def test_without_a_block_the_search_is_as_if_it_never_had_it(tau):
     """The best, and what is probable beside it, whatever was weighed before."""
     for seed in range(2):
-        _, _, ladder = drawn(seed, present=(1, 2), tau=tau, which=seed % 2)
+        _, _, models = drawn(seed, present=(1, 2), tau=tau, which=seed % 2)
         _, _, fresh = drawn(seed, present=(1, 2), tau=tau, which=seed % 2)
-        ladder.run()
-        found, never = ladder.without(frozenset({1})), fresh.without(frozenset({1}))
+        models.run()
+        found, never = models.without(frozenset({1})), fresh.without(frozenset({1}))
         best, other = found.run()[1], never.run()[1]
         assert best.blocks == other.blocks
         assert best.log_evidence == pytest.approx(other.log_evidence, abs=1e-2)
@@ -161,26 +163,26 @@ def test_without_a_block_it_is_the_ladder_that_never_had_it(tau):
             assert b != 1 or one == 0.0
         assert belief(found) == pytest.approx(belief(never), abs=0.04)
         # the evidence is that of the problem of the other blocks alone
-        alone = Ladder(
-            replace(ladder.linear, blocks=(ladder.linear.blocks[0], ladder.linear.blocks[2])),
-            ladder.whitening,
-            ladder.forms[:2],
+        alone = ModelSearch(
+            replace(models.linear, blocks=(models.linear.blocks[0], models.linear.blocks[2])),
+            models.whitening,
+            models.kernels[:2],
             (PRIOR[0], PRIOR[2]),
         )
         assert best.log_evidence == pytest.approx(alone.run()[1].log_evidence, abs=1e-2)
 
 
 def test_forms_that_are_out_of_the_question_are_told():
-    """A discrepancy of one form, twenty times the noise: the other is no rival, and that there is none even less."""
-    _, _, ladder = drawn(5, rows=40, tau=20.0, which=0)
-    rung, best = ladder.run()
-    assert rung[0] == 0
-    assert [form.name for form in ladder.in_question(best)] == ["narrow"]
+    """A discrepancy of one kernel, twenty times the noise: the other is no rival, and that there is none even less."""
+    _, _, models = drawn(5, rows=40, tau=20.0, which=0)
+    hyper, best = models.run()
+    assert hyper[0] == 0
+    assert [kernel.name for kernel in models.plausible_kernels(best)] == ["narrow"]
     # where nothing is there, each is most probable at the smallest size, and so out of the question
-    _, _, ladder = drawn(5, rows=40)
-    rung, best = ladder.run()
-    assert rung == PLAIN
-    assert ladder.in_question(best) == ()
+    _, _, models = drawn(5, rows=40)
+    hyper, best = models.run()
+    assert hyper == PLAIN
+    assert models.plausible_kernels(best) == ()
 
 
 SCATTERED = ("joint_2", "joint_4")
@@ -195,63 +197,63 @@ def scattering(places, seed, rows=60, tau=6.0, present=()):
     for k in range(1, 6):
         moves = rng.normal(size=(rows, 3, 1))
         name = f"joint_{k}"
-        offered.append(Form(f"poses, {name}", each, moves, True, ("joint", name)))
+        offered.append(Kernel(f"poses, {name}", each, moves, True, ("joint", name)))
         if name in places:
             gap = gap + tau * (moves @ rng.normal(size=(rows, 1, 1)))[:, :, 0]
-    return Ladder(replace(linear, gap=gap), whitening, offered, PRIOR)
+    return ModelSearch(replace(linear, gap=gap), whitening, offered, PRIOR)
 
 
 @pytest.mark.parametrize("places", [SCATTERED, SCATTERED[:1]], ids=["two joints", "one joint"])
 def test_joints_that_scatter_are_told_whether_one_or_two(places):
     for seed in range(5):
-        ladder = scattering(places, seed)
-        rung, best = ladder.run()
-        assert set(ladder.forms[rung[0]].name.split(", ")[1:]) == set(places)
-        assert ladder.forms[rung[0]].several == (len(places) > 1)
+        models = scattering(places, seed)
+        hyper, best = models.run()
+        assert set(models.kernels[hyper[0]].name.split(", ")[1:]) == set(places)
+        assert models.kernels[hyper[0]].several == (len(places) > 1)
         assert best.blocks == ()
-        assert belief(ladder) > 0.999
-        # what was put together is no form to start with: single ones are
-        assert not any(form.several for form in ladder.in_question(best))
-        assert {f"poses, {name}" for name in places} <= {form.name for form in ladder.in_question(best)}
+        assert belief(models) > 0.999
+        # what was put together is no kernel to start with: single ones are
+        assert not any(kernel.several for kernel in models.plausible_kernels(best))
+        assert {f"poses, {name}" for name in places} <= {kernel.name for kernel in models.plausible_kernels(best)}
 
 
 def test_joints_that_scatter_are_told_beside_an_effect():
     """They are put together beside the best combination and beside none, once each, and no trial is kept."""
     for seed in range(5):
-        ladder = scattering(SCATTERED, seed, present=(1,))
-        rung, best = ladder.run()
-        assert set(ladder.forms[rung[0]].name.split(", ")[1:]) == set(SCATTERED)
+        models = scattering(SCATTERED, seed, present=(1,))
+        hyper, best = models.run()
+        assert set(models.kernels[hyper[0]].name.split(", ")[1:]) == set(SCATTERED)
         assert best.blocks == (1,)
-        joined = [form for form in ladder.forms if form.several]
+        joined = [kernel for kernel in models.kernels if kernel.several]
         assert 1 <= len(joined) <= 2 * (settings.SCATTERING - 1)
-        assert len(ladder.forms) == 5 + len(joined)
-        asked = {r[0] for r in (*ladder.searches, *(r for r, _ in ladder._quick))}
-        assert asked <= {-1, *range(len(ladder.forms))}
+        assert len(models.kernels) == 5 + len(joined)
+        asked = {r[0] for r in (*models.searches, *(r for r, _ in models._log_evidences))}
+        assert asked <= {-1, *range(len(models.kernels))}
 
 
 def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
     """Beside one joint and beside two, but for a constant each: against the gap's density."""
-    ladder = scattering(SCATTERED, 2, rows=30, present=(1,))
-    rung, _ = ladder.run()
-    assert ladder.forms[rung[0]].several
-    one = ladder.forms.index(next(form for form in ladder.forms if form.name == "poses, joint_2"))
+    models = scattering(SCATTERED, 2, rows=30, present=(1,))
+    hyper, _ = models.run()
+    assert models.kernels[hyper[0]].several
+    one = models.kernels.index(next(kernel for kernel in models.kernels if kernel.name == "poses, joint_2"))
     off = []
-    for number, tau in (rung, (one, 1.0), (one, 8.0)):
-        form = replace(ladder.forms[number], functions=np.eye(30))
-        beside = tau**2 * inside(form, ladder.whitening)
-        own = [less_density(ladder, (number, tau), blocks, beside) for blocks in CHOSEN]
+    for number, tau in (hyper, (one, 1.0), (one, 8.0)):
+        kernel = replace(models.kernels[number], functions=np.eye(30))
+        beside = tau**2 * inside(kernel, models.whitening)
+        own = [less_density(models, (number, tau), blocks, beside) for blocks in CHOSEN]
         off += (own - np.nanmedian(own)).tolist()
     near_nothing(off)
 
 
 def test_joints_are_as_probable_however_often_blocks_are_left_out():
     """Weaker than the noise, so that one joint, the other and both are in question."""
-    ladder, odds = scattering(SCATTERED, 1, tau=0.7, present=(1,)), []
-    ladder.run()
+    models, odds = scattering(SCATTERED, 1, tau=0.7, present=(1,)), []
+    models.run()
     for _ in range(3):
-        ladder = ladder.without(frozenset({0}))
-        ladder.run([(1,)])
-        odds.append(ladder.forms_in_question())
+        models = models.without(frozenset({0}))
+        models.run([(1,)])
+        odds.append(models.kernel_probabilities())
     for again in odds[1:]:
         assert {name: again.get(name, 0.0) for name in odds[0]} == pytest.approx(odds[0], abs=0.05)
 
@@ -272,10 +274,10 @@ def test_joints_are_as_probable_however_often_blocks_are_left_out():
 )
 def test_the_consensus_is_the_best_setting_of_the_most_probable_name(seen, names, best):
     linear, whitening, _ = drawn(4, present=())
-    ladder = Ladder(linear, whitening, two_forms(24), PRIOR)
-    for rung in dict.fromkeys(rung for rung, _ in seen):
-        search = ladder.beside(rung)
-        own = {blocks: log for (beside, blocks), log in seen.items() if beside == rung}
+    models = ModelSearch(linear, whitening, two_forms(24), PRIOR)
+    for hyper in dict.fromkeys(hyper for hyper, _ in seen):
+        search = models.search_at(hyper)
+        own = {blocks: log for (beside, blocks), log in seen.items() if beside == hyper}
         search.seen = {blocks: replace(search.evaluate(blocks), log_evidence=log) for blocks, log in own.items()}
-    rung, found = ladder.consensus(list(names))
-    assert (rung, found.blocks) == (PLAIN, best)
+    hyper, found = models.consensus(list(names))
+    assert (hyper, found.blocks) == (PLAIN, best)
