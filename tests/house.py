@@ -22,7 +22,7 @@ FREE = {
     "paper": {"arrays", "errors", "kinematics", "robot", "assembly", "paper"},
 }
 """Rooms that may import less than what stands before them: one draws what it is given, three need no campaign."""
-TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "values", "calibration")}}
+TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "values", "calibration", "crash")}}
 TYPES["report"] |= {"thermal_robot.fleet.wear_result", "thermal_robot.shapes"}
 TYPES["report"] |= {f"thermal_robot.motion.{n}" for n in ("result", "compare")}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""

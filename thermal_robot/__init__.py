@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosing import compare, diagnose
     from thermal_robot.diagnosis import Diagnosis
     from thermal_robot.diagnosis.calibration import Calibration, calibrate
+    from thermal_robot.diagnosis.crash import Crash, after_crash
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
     from thermal_robot.fleet.comparison import Comparison
@@ -60,6 +61,8 @@ _HOME = {
     "Robot": "robot",
     "RobotError": "errors",
     "ThermalRobotError": "errors",
+    "Crash": "diagnosis.crash",
+    "after_crash": "diagnosis.crash",
     "calibrate": "diagnosis.calibration",
     "campaign_from_table": "campaign",
     "demo_campaign": "datasets",
@@ -97,6 +100,7 @@ __all__ = [
     "CampaignError",
     "Comparison",
     "CorrectedModel",
+    "Crash",
     "Diagnosis",
     "Effect",
     "EffectError",
@@ -108,6 +112,7 @@ __all__ = [
     "Robot",
     "RobotError",
     "ThermalRobotError",
+    "after_crash",
     "calibrate",
     "campaign_from_table",
     "compare",

@@ -25,7 +25,7 @@ from thermal_robot.effects.arguments import with_arguments
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError, RobotError
 from thermal_robot.observations import Frames, observe
-from thermal_robot.prediction import Spread
+from thermal_robot.prediction import FileGap, Spread
 from thermal_robot.robot import ENDS, Robot, load_robot
 from thermal_robot.schema import (
     NOT_NEGATIVE,
@@ -156,6 +156,13 @@ def _spread(value: Any, path: str) -> Spread:
     return Spread(**{**held, **vectors, "levels": levels})
 
 
+def _file_gap(value: Any, path: str) -> FileGap:
+    """Validate the expected gap with a robot file."""
+    kinds = {"holds": text("what a file holds"), "min_sigma": optional(NOT_NEGATIVE), "shrinkage": number()}
+    sizes = {"rms_before": NOT_NEGATIVE, "rms_after": NOT_NEGATIVE, "shrinkage_ci95": _ends}
+    return FileGap(**record({**kinds, **sizes, "alone": listed(number())})(value, path))
+
+
 def _written_robot(robot: Robot) -> dict[str, Any]:
     return {
         "urdf": robot.urdf,
@@ -180,13 +187,15 @@ PARTS: dict[str, Part] = {
     "simulated": Part(boolean),
     "last_order": Part(optional(_ends), lambda order: None if order is None else list(order)),
     "spread": Part(_spread, Spread.to_dict, optional=True),
+    "files": Part(listed(_file_gap), lambda files: [vars(file) for file in files], optional=True),
 }
-"""Every key but ``schema`` and ``checksum``; a key of a model's field that may be absent is ``optional``."""
+"""Every key but ``schema`` and ``checksum``; a key of a model's field that may be absent, or empty, is ``optional``."""
 
 
 def written(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a model as plain values, with version and checksum."""
-    body = {key: part.write(fields[key]) for key, part in PARTS.items() if not (part.optional and fields[key] is None)}
+    kept = {key: part for key, part in PARTS.items() if not (part.optional and fields[key] in (None, ()))}
+    body = {key: part.write(fields[key]) for key, part in kept.items()}
     found = {"schema": f"{SCHEMA}{VERSION}", **body}
     return {"schema": found["schema"], "checksum": checksum(found), **body}
 

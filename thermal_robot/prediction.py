@@ -19,6 +19,34 @@ from thermal_robot.inference.kernels import chunks
 from thermal_robot.observations import Observations
 
 
+@dataclass(frozen=True)
+class FileGap:
+    """Expected rms distance, m, on rows held out with a robot file alone: base and tool are registered anew.
+
+    Attributes
+    ----------
+    holds
+        What the file holds: ``placements``, ``zeros`` or ``ticks``.
+    min_sigma
+        Standard deviations from zero below which parameters are left out; ``None`` for a file with all.
+    rms_before, rms_after
+        With the nominal robot and with the file.
+    shrinkage, shrinkage_ci95
+        Share of the gap's mean square that the file removes, and the 95 % interval for other rows of the same kind.
+    alone
+        Displacement (n + 6 S) of joints and segments, m and rad, of a file that was fitted anew, to be used without the
+        rest of the model; empty for one that holds the model's own values.
+    """
+
+    holds: str
+    min_sigma: float | None
+    rms_before: float
+    rms_after: float
+    shrinkage: float
+    shrinkage_ci95: tuple[float, float]
+    alone: tuple[float, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Spread:
     """Predictive uncertainty of a model, and the range in which it was measured.

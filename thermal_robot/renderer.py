@@ -18,6 +18,8 @@ class Renderer(Protocol):
     fragment: Callable[[Any], str]
     explain_figure: Callable[[Any], Any]
     calibration_text: Callable[[Any], str]
+    crash_headline: Callable[[Any], str]
+    crash_text: Callable[[Any], str]
     comparison_headline: Callable[[Any], str]
     comparison_text: Callable[[Any], str]
     comparison_fragment: Callable[[Any], str]

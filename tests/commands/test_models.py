@@ -1,5 +1,6 @@
 """`thermal-robot predict` and `correct`: the same rows with what is predicted of them, commands, the robot's files."""
 
+import json
 import sys
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import ur_arm
 from commanded import refused, table
 from readers import by_mujoco, held, model_of
 
-from thermal_robot import CorrectedModel, read_campaign
+from thermal_robot import CorrectedModel, calibrate, read_campaign, simulate
 from thermal_robot.campaign import write_campaign
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.commands.robot_files import OUTPUTS
@@ -132,7 +133,8 @@ def test_commands_take_the_place_of_joint_positions(run, folder, diagnosed, stdi
     stdin(folder / "fresh.csv")
     assert run("correct", diagnosed.model, "-", "-o", "-") == (0, out.read_text(), "")
     both = ("-o", tmp_path / "c.parquet", "--urdf", tmp_path / "r.urdf")
-    assert run("correct", diagnosed.model, folder / "fresh.csv", *both) == (0, "", "")
+    status, said, _ = run("correct", diagnosed.model, folder / "fresh.csv", *both)
+    assert (status, said.splitlines()[0]) == (0, f"{tmp_path / 'r.urdf'}: a URDF, holds placements")
     assert len(pd.read_parquet(tmp_path / "c.parquet")) == 30
     assert (tmp_path / "r.urdf").exists()
 
@@ -153,14 +155,19 @@ def test_poses_that_cannot_be_used_are_refused(run, folder, diagnosed, tmp_path)
 
 
 def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
-    every = [name for name in OUTPUTS if name != "ur_kinematics"]  # which is of other robots
+    every = [name for name in OUTPUTS if name not in ("ur_kinematics", "pal", "lerobot")]  # which are of other robots
     files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in every}
     options = [word for name, file in files.items() for word in (f"--{name}", file)]
-    assert run("correct", diagnosed.model, *options, "--temperature", "26") == (0, "", "")
+    status, said, noted = run("correct", diagnosed.model, *options, "--temperature", "26")
+    assert (status, noted) == (0, "")
+    assert all(f"{file}: " in said for file in files.values())
+    assert "worth applying, 2 standard deviations from zero: " in said
+    assert "Expected" not in said  # lengths at another temperature are those of no fold
     model = CorrectedModel.load(diagnosed.model)
     q = np.zeros((1, 5))
-    poses, displaced = tool_poses(load_robot(files["urdf"], "tool0_target"), q), calibrated(model, temperature=26.0)
-    expected = tool_poses(model.robot, q, displaced.displacement) @ model.frames.tool
+    poses = tool_poses(load_robot(files["urdf"], "tool0_target"), q)
+    displaced = calibrated(model, temperature=26.0, min_sigma=2.0)
+    expected = tool_poses(model.robot, q, displaced.displacement) @ displaced.target
     np.testing.assert_allclose(poses, expected, atol=1e-12)
     seen = by_mujoco(files["mjcf"].read_text(), "base_link", "tool0_target", held(model.robot, q))
     np.testing.assert_allclose(list(seen), poses, atol=1e-9)
@@ -179,14 +186,51 @@ def test_a_robot_of_universal_robots_has_a_file_of_its_own(run, diagnosed, tmp_p
     robot = load_robot(ur_arm.urdf(), "tool0")
     offsets = np.array([1e-3, -2e-3, 3e-3, 1e-3, 2e-3, 0.0])
     model_of(robot, (JointOffset(), offsets)).save(tmp_path / "m.json")
-    assert run("correct", tmp_path / "m.json", "--ur-kinematics", out) == (0, "", "")
+    status, said, _ = run("correct", tmp_path / "m.json", "--ur-kinematics", out)
+    assert status == 0
+    assert "it cannot hold frames behind the last joint, the target" in said
     q = np.random.default_rng(1).uniform(-3, 3, (5, 6))
     np.testing.assert_allclose(with_kinematics(robot, out).forward(q), robot.forward(q + offsets), atol=1e-9)
 
 
+def test_what_is_expected_of_a_file_and_worth_applying_is_told(run, tmp_path):
+    zeros = {"joint_offset": {"joint_2": 1e-3, "joint_3": -8e-4}}
+    campaign = simulate("builtin:rv_m2", zeros, tool_frame="tool0", rows=60, noise=3e-5, seed=1, base_known=False)
+    model, out = tmp_path / "m.json", tmp_path / "r.urdf"
+    calibrate(campaign, "joint_offset").model.save(model)
+    status, said, _ = run("correct", model, "--urdf", out, "--offsets", tmp_path / "o.csv")
+    assert status == 0
+    assert said.count("Expected of this file alone, on rows held out") == 2
+    assert "Expected of this file alone" in out.read_text(encoding="utf-8")
+    worth, _, left = said.partition("left out as too weak")
+    assert "zero offset, joint_2" in worth
+    assert "zero offset, joint_1" in left  # the base takes it up
+    status, alone, _ = run("correct", model, "--urdf", out, "--alone")
+    assert (status, "Fitted anew" in out.read_text(encoding="utf-8")) == (0, True)
+    assert "worth applying" not in alone
+    assert "left out" not in run("correct", model, "--urdf", out, "--min-sigma", "0")[1]
+
+
+def test_zeros_for_lerobot_come_from_the_arms_own_file(run, rv_m2, tmp_path):
+    model_of(rv_m2, (JointOffset(), [0.0, 0.01, 0.0, 0.0, 0.0]), base_known=True, tool_known=True).save(
+        tmp_path / "m.json"
+    )
+    own, out = tmp_path / "arm.json", tmp_path / "new.json"
+    before = {
+        f"joint_{k}": {"id": k, "drive_mode": 0, "homing_offset": 0, "range_min": 0, "range_max": 4095}
+        for k in range(1, 6)
+    }
+    own.write_text(json.dumps(before))
+    words = ("--lerobot", out, "--from-lerobot", own)
+    for more, sign in ((), -1), (("--dynamixel",), 1):
+        assert run("correct", tmp_path / "m.json", *words, *more)[0] == 0
+        assert json.loads(out.read_text())["joint_2"]["homing_offset"] == sign * 7  # ticks of 1.53 mrad
+
+
 def test_a_file_of_a_robot_is_printed_and_a_model_read_from_a_stream(run, diagnosed, stdin, tmp_path):
     out = tmp_path / "r.urdf"
-    assert run("correct", diagnosed.model, "--urdf", out) == (0, "", "")
+    assert run("correct", diagnosed.model, "--urdf", out)[0] == 0
+    assert run("-q", "correct", diagnosed.model, "--urdf", out) == (0, "", "")
     stdin(diagnosed.model)
     assert run("correct", "-", "--urdf", "-") == (0, out.read_text(encoding="utf-8"), "")
     status, printed, _ = run("correct", diagnosed.model, "--dh", "-", "--modified")
@@ -200,12 +244,13 @@ def test_lengths_far_from_what_was_measured_are_told_to_be_extrapolated(run, dia
     low, high = model.spread.ranges["temperature"]
     said = f"lengths at 600 °C are extrapolated: it was measured at {low:.3g} to {high:.3g} °C"
     far = run("correct", diagnosed.model, "--urdf", out, "--temperature", "600")
-    assert far == (0, "", f"thermal-robot: note: {said}\n")
+    assert (far[0], far[2]) == (0, f"thermal-robot: note: {said}\n")
     assert said[1:] in out.read_text(encoding="utf-8")
     for told in ([], ["--temperature", f"{(low + high) / 2.0}"]):
-        assert run("correct", diagnosed.model, "--urdf", out, *told) == (0, "", "")
+        status, _, noted = run("correct", diagnosed.model, "--urdf", out, *told)
+        assert (status, noted) == (0, "")
         assert "extrapolated" not in out.read_text(encoding="utf-8")
-        assert "Left out" not in out.read_text(encoding="utf-8")
+        assert "less than 2 standard deviations from zero:" in out.read_text(encoding="utf-8")
     few = ("--min-sigma", "1e6", "--temperature", "25")
     assert run("correct", diagnosed.model, "--urdf", out, *few)[0] == 0
     written = out.read_text(encoding="utf-8")
@@ -222,6 +267,11 @@ def test_options_that_make_no_sense_are_refused(run, folder, diagnosed, tmp_path
         (["--urdf", out, "--temperature", "-400"], "temperature", "°C"),
         (["--from-mjcf", model, "--urdf", out], "--mjcf"),
         (["--urdf", out, "--modified"], "--modified", "of use with --dh only"),
+        (["--urdf", out, "--from-pal", model], "--from-pal", "of use with --pal only"),
+        (["--lerobot", out], "--from-lerobot"),
+        (["--urdf", out, "--alone", "--min-sigma", "2"], "--alone"),
+        (["--urdf", out, "--alone"], "alone", "does not hold a fit"),
+        (["--pal", out], "'rv_m2' has no joint of an arm"),
         (["--mjcf", out, "--from-mjcf", tmp_path / "no.xml"], "no.xml"),
         (["--urdf", model], "is read from"),
         (["--urdf", out, "--dh", out], "two outputs"),

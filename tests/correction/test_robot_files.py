@@ -1,8 +1,10 @@
 """The calibrated robot and its files: every reader sees the corrected model in them, and says what is in them."""
 
 import io
+import json
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,7 +21,14 @@ from simulate import simulate
 from thermal_robot import CampaignError, diagnose
 from thermal_robot.campaign import Units
 from thermal_robot.campaign.ur_kinematics import with_kinematics
-from thermal_robot.correction import calibrated, calibrated_urdf, dh_table, ur_kinematics
+from thermal_robot.correction import (
+    calibrated,
+    calibrated_urdf,
+    dh_table,
+    joint_parameters,
+    mjcf_of_urdf,
+    ur_kinematics,
+)
 from thermal_robot.effects import BaseFrame, JointGain, JointOffset, ThermalElongation, ToolFrame
 from thermal_robot.kinematics import Displacement, exp6, tool_poses
 from thermal_robot.observations import Frames
@@ -59,14 +68,14 @@ def test_base_and_tool_are_where_the_model_puts_them(rv_m2):
 
 def test_notes_list_what_is_in_it_and_what_is_not(rv_m2):
     model = model_of(rv_m2, (JointOffset(), [1e-3, 0, 0, 0, 0]), (JointGain(), [0, 2e-3, 0, 0, 0]))
-    notes = calibrated(model).notes("a URDF")
+    notes = calibrated(model).notes("urdf")
     at = [notes.index(line) for line in notes if line.endswith(":")]
     assert [notes[k].split(",")[0] for k in at] == ["Written here:", "Not written"]
     assert notes[at[0] + 1] == "  joint_offset: zero offset, joint_1 = 0.001 rad"
     assert "  joint_gain: gain error, joint_2 = 0.002" in notes[at[1] :]
     assert "°C" not in notes[0]
     growing = model_of(rv_m2, (ThermalElongation(common=True), [2e-5]), needs=("temperature",))
-    assert "its lengths at 24 °C" in calibrated(growing, temperature=24.0).notes("a URDF")[0]
+    assert "its lengths at 24 °C" in calibrated(growing, temperature=24.0).notes("urdf")[0]
     assert calibrated(growing).temperature == 20.0
     with pytest.raises(CampaignError, match="how the robot grows"):
         calibrated(model, temperature=24.0)
@@ -168,6 +177,34 @@ def test_a_kinematics_yaml_leads_where_the_model_does(tmp_path, seed, prefix):
     (tmp_path / "again.yaml").write_text(ur_kinematics(sound(replace(moved, robot=read))))
     again = with_kinematics(robot, tmp_path / "again.yaml")
     np.testing.assert_allclose(tool_poses(again, q), expected, rtol=0, atol=1e-12)
+
+
+def test_a_simulator_whose_joints_are_set_stands_where_the_model_does(rv_m2, configurations):
+    """MuJoCo's own bodies: set to the frames, and moved by the changes."""
+    robot, q = displaced(rv_m2, seed=5, target=False), configurations(rv_m2, 5)
+    told = json.loads(joint_parameters(robot))["joints"]
+    expected = tool_poses(rv_m2, q, robot.displacement)
+    for by_change in (False, True):
+        model = mujoco.MjModel.from_xml_string(mjcf_of_urdf(rv_m2.urdf))
+        for joint in told.values():
+            body = model.body(joint["child"])
+            new = placed(joint["pos"], joint["quat"])
+            if by_change:
+                new = placed(joint["change_pos"], joint["change_quat"]) @ placed(body.pos, body.quat)
+            turn = Rotation.from_matrix(new[:3, :3]).as_quat()
+            body.pos[:], body.quat[:] = new[:3, 3], np.roll(turn, 1)
+        data = mujoco.MjData(model)
+        for row, pose in zip(held(rv_m2, q), expected, strict=True):
+            for name, position in row.items():
+                data.qpos[model.joint(name).qposadr[0]] = position
+            mujoco.mj_kinematics(model, data)
+            np.testing.assert_allclose(data.body("tool0").xpos - data.body("base_link").xpos, pose[:3, 3], atol=1e-9)
+
+
+def placed(pos, quat):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_quat(np.roll(quat, -1)).as_matrix(), pos
+    return pose
 
 
 def test_robots_of_others_have_no_kinematics_yaml(rv_m2):

@@ -269,12 +269,23 @@ def is_yaml(file: Path) -> bool:
     return file.suffix.lower() in (".yaml", ".yml")
 
 
-def read_yaml(file: Path) -> list[Any]:
-    """Non-empty documents of a YAML file, of plain values only."""
+def _yaml(file: str) -> Any:
+    """Import ``yaml``, or say how to install it."""
     try:
         import yaml
     except ImportError as error:
-        raise CampaignError(str(file), "YAML files need PyYAML, which is not installed", expected=WITH_YAML) from error
+        raise CampaignError(file, "YAML files need PyYAML, which is not installed", expected=WITH_YAML) from error
+    return yaml
+
+
+def yaml_text(plain: Any) -> str:
+    """YAML text of plain values, in their order, with all digits."""
+    return str(_yaml("YAML").safe_dump(plain, sort_keys=False, allow_unicode=True))
+
+
+def read_yaml(file: Path) -> list[Any]:
+    """Non-empty documents of a YAML file, of plain values only."""
+    yaml = _yaml(str(file))
     if not is_file(file):
         problem = "is a directory" if is_folder(file) else "there is no such file"
         raise CampaignError(str(file), problem, expected="a YAML file")

@@ -1,4 +1,4 @@
-"""Commands that take one campaign: check, effects, diagnose, demo, view, iso9283."""
+"""Commands that take one campaign: check, effects, diagnose, crash, demo, view, iso9283."""
 
 from __future__ import annotations
 
@@ -115,6 +115,17 @@ def demo(options: argparse.Namespace) -> None:
     tell(options, f"{intro}\n\n{found}", found.summary)
     write_one(options.report, as_page(options.report, html, found)[1])
     tell(options, f"Drawn in {options.report}")
+
+
+def crash(options: argparse.Namespace) -> None:
+    """Run ``crash``: find what moved, print it and write the requested file."""
+    from thermal_robot.diagnosis.crash import after_crash
+    from thermal_robot.report import crash_headline
+
+    require_free((options.json,), read_from(options.campaign, Path() if options.piped else None))
+    with stages(options.loudness) as progress:
+        found = after_crash(read(options), progress=progress)
+    deliver(options, [as_json(options.json, found.to_dict())], str(found), crash_headline(found))
 
 
 def iso9283(options: argparse.Namespace) -> None:

@@ -13,18 +13,19 @@ from thermal_robot.robot import ENDS, load_robot
 
 def plan(options: argparse.Namespace) -> None:
     """Run ``plan``: plan a campaign, write it, and print the expected precision."""
-    from thermal_robot.planning import plan, text, write_plan
+    from thermal_robot.effects import KINEMATIC
+    from thermal_robot.planning import CRASH_ROWS, ROWS, plan, text, write_plan
 
     found = plan(
         load_robot(options.robot, options.tool, root_frame=options.root),
-        options.rows,
-        options.effects,
+        options.rows or (CRASH_ROWS if options.after_crash else ROWS),
+        options.effects or (KINEMATIC if options.after_crash else None),
         repeats=options.repeats,
         noise=1e-3 * options.noise,
         orientation=options.orientation,
         target=[1e-3 * part for part in options.target],
         loads=options.loads,
-        rise=options.warming,
+        rise=0.0 if options.after_crash else options.warming,
         base_known="base" in options.known,
         tool_known="tool" in options.known,
         units=Units(options.angle_unit, options.length_unit),

@@ -38,17 +38,19 @@ def correct(options: argparse.Namespace) -> None:
         raise CampaignError("correct", "poses and -o go together", expected="both, as in poses.csv -o commands.csv")
     named = [options.output, *(getattr(options, name) for name in OUTPUTS)]
     if not any(named):
-        wanted = "poses.csv -o commands.csv, --urdf, --mjcf, --dh or --offsets"
+        wanted = "poses.csv -o commands.csv, --urdf, --offsets or another file of the robot"
         raise CampaignError("correct", "nothing to write was named", expected=wanted)
     require_of_use(options)
-    require_free(named, [file for file in (options.model, options.poses, options.from_mjcf) if file])
+    given = (options.model, options.poses, options.from_mjcf, options.from_pal, options.from_lerobot)
+    require_free(named, [file for file in given if file])
     model = CorrectedModel.load(options.model)
 
     def filled(own: pd.DataFrame, poses: Campaign) -> pd.DataFrame:
         return model.commanded(own, model.corrected_commands(poses))
 
     table = [_table(options, model, options.poses, filled)] if options.poses else []
-    deliver(options, [*table, *(robot_files(options, model) if any(named[1:]) else [])])
+    files, said = robot_files(options, model) if any(named[1:]) else ([], "")
+    deliver(options, [*table, *files], said)
 
 
 def _table(

@@ -270,7 +270,7 @@ TOLD, UNSEEN, NONE = "determined", "not determined", "not in the model"
 
 
 def zero_offsets(
-    model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
+    model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None, alone: bool = False
 ) -> pd.DataFrame:
     """Joint zeros to enter in a controller.
 
@@ -278,8 +278,8 @@ def zero_offsets(
     ----------
     model
         The corrected model.
-    temperature, min_sigma
-        As for :func:`~thermal_robot.correction.calibrated`.
+    temperature, min_sigma, alone
+        As for :func:`~thermal_robot.correction.calibrated`; alone, zeros are fitted without anything else.
 
     Returns
     -------
@@ -308,28 +308,71 @@ def zero_offsets(
     """
     import pandas as pd
 
-    if min_sigma is not None:
-        model = determined(model, min_sigma, temperature)[0]
+    zeros = zeros_in(model, temperature, min_sigma, alone)
+    units, robot = model.settings.units, model.robot
+    scales = np.array([units.joint_scale(kind) for kind in robot.joint_types])
+    return pd.DataFrame(
+        {
+            "joint": robot.joint_names,
+            "add_to_command": -zeros.values / scales + 0.0,
+            "std": zeros.std / scales,
+            "unit": [units.joint_unit(kind) for kind in robot.joint_types],
+            "zero": zeros.said,
+        }
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Zeros:
+    """Zeros of a model's joints: q_actual = q_command + zero.
+
+    ``matrix`` (n, P): zero of each joint per unit of each parameter, 0 where it is not told; ``values``, ``std`` (n,)
+    rad or m, the latter NaN where unknown or not told; ``said`` a word for each of :data:`TOLD`, :data:`UNSEEN`,
+    :data:`NONE`.
+    """
+
+    matrix: Array
+    values: Array
+    std: Array
+    said: tuple[str, ...]
+
+
+def zeros_in(
+    model: CorrectedModel, temperature: float | None = None, min_sigma: float | None = None, alone: bool = False
+) -> Zeros:
+    """Zeros of a file: those of a model, without its weak parameters, or as they were fitted without anything else."""
+    if not alone:
+        return joint_zeros(model if min_sigma is None else determined(model, min_sigma, temperature)[0], temperature)
+    known = constant(model, temperature)
+    _, said = _coordinates(model, known, np.zeros(0, dtype=np.int64))
+    told = np.array([word != UNSEEN for word in said])
+    values = np.where(told, fitted_alone(model, "zeros")[: model.robot.n], 0.0)
+    words = tuple(TOLD if own else UNSEEN for own in told)
+    return Zeros(np.zeros((len(said), len(known.parameters))), values, np.full(len(said), np.nan), words)
+
+
+def fitted_alone(model: CorrectedModel, holds: str) -> Array:
+    """Displacement (n + 6 S) of joints and segments of a file that was fitted without the rest of the model."""
+    for gap in model.files:
+        if gap.holds == holds and gap.alone:
+            return np.array(gap.alone)
+    raise CampaignError("alone", "the model does not hold a fit of the file alone", expected="a model of this version")
+
+
+def joint_zeros(model: CorrectedModel, temperature: float | None = None) -> Zeros:
+    """Zeros of a model's joints, with those inside its geometry."""
     known = constant(model, temperature)
     used = np.flatnonzero(
         known.responses[:, :-12].any(axis=1) & np.array([t.value != 0.0 for t in known.parameters], dtype=bool)
     )
     change, said = _coordinates(model, known, used)
-    units, robot = model.settings.units, model.robot
-    scales = np.array([units.joint_scale(kind) for kind in robot.joint_types])
-    values = change @ np.array([known.parameters[k].value for k in used])
     std, expected = _zero_spread(model, known, used, change)
     told = np.array([word == TOLD for word in said]) & (np.isnan(std) | identified(std, expected))
     said = [UNSEEN if word == TOLD and not own else word for word, own in zip(said, told, strict=True)]
-    return pd.DataFrame(
-        {
-            "joint": robot.joint_names,
-            "add_to_command": np.where(told, -values, 0.0) / scales + 0.0,
-            "std": np.where(told, std, np.nan) / scales,
-            "unit": [units.joint_unit(kind) for kind in robot.joint_types],
-            "zero": said,
-        }
-    )
+    matrix = np.zeros((model.robot.n, len(known.parameters)))
+    matrix[:, used] = np.where(told[:, None], change, 0.0)
+    values = matrix @ np.array([told.value for told in known.parameters])
+    return Zeros(matrix, values, np.where(told, std, np.nan), tuple(said))
 
 
 def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64], change: Array) -> tuple[Array, Array]:

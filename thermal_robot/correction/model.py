@@ -43,7 +43,7 @@ from thermal_robot.kinematics import (
 )
 from thermal_robot.model_file import fields_of, read, written
 from thermal_robot.observations import Frames, Observations, observe
-from thermal_robot.prediction import Prediction, Spread
+from thermal_robot.prediction import FileGap, Prediction, Spread
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -173,6 +173,8 @@ class CorrectedModel:
         First and last ``order`` of the campaign, where it had that column.
     spread
         Predictive uncertainty; ``None`` for a file of version 0.2, which lacks it.
+    files
+        Expected gap with the robot files that can be made of it; empty where nobody asked.
 
     Examples
     --------
@@ -191,6 +193,7 @@ class CorrectedModel:
     simulated: bool = False
     last_order: tuple[float, float] | None = None
     spread: Spread | None = None
+    files: tuple[FileGap, ...] = ()
 
     @overload
     def predict(self, samples: Campaign | str | Path) -> tuple[Array, Array | None]: ...

@@ -175,7 +175,7 @@ def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
     >>> "tool0_target" in calibrated_mjcf(warm)
     True
     """
-    notes = [*robot.notes("an MJCF"), *_BEYOND]
+    notes = [*robot.notes("mjcf"), *_BEYOND]
     if mjcf is None:  # the translation drops all comments
         return text_of(tree(mjcf_of_urdf(calibrated_urdf(robot))), "", notes)
     patched = _Patched.of(robot, mjcf)

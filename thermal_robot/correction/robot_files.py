@@ -14,6 +14,7 @@ that they lead to: base · Π_i [Tx(a_i) Rx(α_i) Ry(β_i) Rz(θ_i + q_i) Tz(d_i
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -24,13 +25,15 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Units
 from thermal_robot.campaign.names import PER_LINK, split_name
 from thermal_robot.campaign.ur_kinematics import FIGURES, elements
-from thermal_robot.correction.constant import Told, constant, determined
+from thermal_robot.correction.constant import Told, constant, determined, fitted_alone
+from thermal_robot.correction.holding import FORMATS, PLACEMENTS, expectation
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.effects import settings
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import Displacement, exp3, exp6, rotation_to_rpy
+from thermal_robot.kinematics import Displacement, exp3, exp6, rotation_to_quaternion, rotation_to_rpy
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.kinematics.urdf import rewritten, xyz_rpy
+from thermal_robot.prediction import FileGap
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -63,6 +66,10 @@ class Calibrated:
         of the user's own, which has it; ``None`` where it was compared with the URDF.
     beyond
         Warning if the temperature is outside the measured range; else empty.
+    gaps
+        Expected gap with robot files; empty where it is not known, as at another temperature.
+    alone
+        Whether what is in it was fitted without the rest of the model.
 
     Examples
     --------
@@ -84,6 +91,8 @@ class Calibrated:
     min_sigma: float | None = None
     compared: Array | None = None
     beyond: str = ""
+    gaps: tuple[FileGap, ...] = ()
+    alone: bool = False
 
     @property
     def joints(self) -> Array:
@@ -118,8 +127,8 @@ class Calibrated:
         tool = self.robot.tool_frame
         return {target_link(tool): (tool, self.target)} if (self.target != np.eye(4)).any() else {}
 
-    def notes(self, holds: str) -> list[str]:
-        """Remarks for the reader of a robot file, in lines; ``holds`` names such a file."""
+    def notes(self, name: str) -> list[str]:
+        """Remarks for the reader of a robot file, in lines; ``name`` is one of :data:`FORMATS`."""
         xyz, rpy = xyz_rpy(self.base)
         warm = "" if self.temperature is None else f", its lengths at {self.temperature:g} °C"
         lines = [
@@ -130,6 +139,11 @@ class Calibrated:
             "Joint positions are those that are commanded, and so are the limits: they stay as they were.",
         ]
         parts = {"Written here:": self.held}
+        lines += expectation(self.gaps, name, self.min_sigma, self.alone)
+        if self.alone:
+            lines.append(
+                "Fitted anew without what stays in the model: the values below are not those that are written."
+            )
         if self.beyond:
             lines.append(f"{self.beyond[:1].upper()}{self.beyond[1:]}.")
         if self.compared is not None:
@@ -137,14 +151,19 @@ class Calibrated:
         if self.min_sigma is not None:
             small = f"Left out, as they are less than {self.min_sigma:g} standard deviations from zero:"
             parts[small] = self.undetermined
-        parts[f"Not written, as {holds} cannot hold them; they stay in the model:"] = self.kept
+        own = FORMATS[name]
+        parts[f"Not written, as {own.title} cannot hold them; they stay in the model:"] = self.kept
         for title, told in parts.items():
             lines += [title, *(f"  {each}" for each in told)] if told else [f"{title} nothing"]
-        return lines
+        return [*lines, f"It cannot hold {own.lacks}."] if own.lacks else lines
 
 
 def calibrated(
-    model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
+    model: CorrectedModel,
+    *,
+    temperature: float | None = None,
+    min_sigma: float | None = None,
+    alone: bool = False,
 ) -> Calibrated:
     """Calibrated robot of a corrected model.
 
@@ -158,6 +177,9 @@ def calibrated(
     min_sigma
         Keep only what is so many standard deviations from zero (:func:`~thermal_robot.correction.determined`); all
         where absent.
+    alone
+        Take what a file can hold as it was fitted without the rest of the model, for a robot that is used without that:
+        then it takes up what it can of compliance and the like. Neither of the others is then of use.
 
     Raises
     ------
@@ -170,10 +192,12 @@ def calibrated(
     >>> import thermal_robot as tr
     >>> from thermal_robot.correction import calibrated
     >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
-    >>> print(warm.notes("a URDF")[0])
+    >>> print(warm.notes("urdf")[0])
     Calibrated by thermal_robot: the robot 'rv_m2' from 'base_link' to 'tool0' as it was measured, ...
     """
     gone: tuple[Told, ...] = ()
+    if alone:
+        min_sigma, temperature = None, None
     if min_sigma is not None:
         model, gone = determined(model, min_sigma, temperature)
     found = constant(model, temperature)
@@ -185,7 +209,7 @@ def calibrated(
     held = [told for told, own in zip(found.parameters, found.held, strict=True) if own]
     return Calibrated(
         robot=model.robot,
-        displacement=Displacement(moved.joint, moved.segment),
+        displacement=_fitted_alone(model) if alone else Displacement(moved.joint, moved.segment),
         base=model.frames.base @ exp6(np.asarray(moved.base)),
         target=exp6(np.asarray(moved.tool)) @ model.frames.tool,
         temperature=found.temperature if found.grows else None,
@@ -195,7 +219,14 @@ def calibrated(
         min_sigma=min_sigma,
         compared=model.frames.tool if model.simulated else None,
         beyond="" if temperature is None else _beyond(model, found.temperature),
+        gaps=model.files if temperature is None else (),
+        alone=alone,
     )
+
+
+def _fitted_alone(model: CorrectedModel) -> Displacement:
+    joint, segment = np.split(fitted_alone(model, PLACEMENTS), [model.robot.n])
+    return Displacement(joint, segment.reshape(-1, 6))
 
 
 def _beyond(model: CorrectedModel, temperature: float) -> str:
@@ -245,7 +276,7 @@ def calibrated_urdf(robot: Calibrated) -> str:
     >>> tr.load_robot(calibrated_urdf(warm), "tool0_target").n
     5
     """
-    return rewritten(robot.robot.urdf, robot.origins, links=robot.links, notes=robot.notes("a URDF"))
+    return rewritten(robot.robot.urdf, robot.origins, links=robot.links, notes=robot.notes("urdf"))
 
 
 def ur_kinematics(robot: Calibrated) -> str:
@@ -290,7 +321,7 @@ def ur_kinematics(robot: Calibrated) -> str:
         own = np.eye(4)
         own[:3, :3], own[:3, 3] = chain.rotations[k], chain.translations[k]
         nominal = nominal @ own
-    notes = robot.notes("a kinematics.yaml")
+    notes = robot.notes("ur_kinematics")
     if not np.allclose(nominal, real, rtol=0, atol=1e-9):
         notes.append("Frames behind the last joint are displaced as well, which only a URDF holds.")
     lines = [*(f"# {note}" for note in notes), "kinematics:"]
@@ -299,6 +330,56 @@ def ur_kinematics(robot: Calibrated) -> str:
         figures = (np.format_float_positional(float(figure), trim="0") for figure in " ".join(xyz_rpy(pose)).split())
         lines += [f"  {link}:", *(f"    {key}: {figure}" for key, figure in zip(FIGURES, figures, strict=True))]
     return "\n".join([*lines, "  hash: calib_thermal_robot", ""])
+
+
+def joint_parameters(robot: Calibrated) -> str:
+    """Frames of joints as JSON, to be set in a running simulator: MuJoCo's bodies, Isaac's USD joints.
+
+    Parameters
+    ----------
+    robot
+        The calibrated robot.
+
+    Returns
+    -------
+    str
+        JSON. ``joints``: by name, those that move and those that are displaced, with ``parent`` and ``child`` link,
+        ``pos`` (m) and ``quat`` (w, x, y, z) of the joint's frame in the parent link, with its zero in them; and
+        ``change_pos``, ``change_quat``: the same pose times the inverse of the nominal one. Whatever frame a simulator
+        has for that joint in the same parent, this change from the left calibrates it: ``body_pos`` and ``body_quat``
+        of the child in MuJoCo, ``physics:localPos0`` and ``physics:localRot0`` of a USD joint. ``notes`` say what is
+        in it and what is not.
+
+    Examples
+    --------
+    >>> import json
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated, joint_parameters
+    >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
+    >>> sorted(json.loads(joint_parameters(warm))["joints"]["joint_2"])
+    ['change_pos', 'change_quat', 'child', 'parent', 'pos', 'quat']
+    """
+    chain, joints = robot.robot.chain, {}
+    moved = {*robot.origins, *(chain.names[k] for k in chain.movable)}
+    links = [*chain.parent_links, robot.robot.tool_frame]
+    for k, (name, pose) in enumerate(zip(chain.names, robot.placements, strict=True)):
+        if name not in moved:
+            continue
+        nominal = np.eye(4)
+        nominal[:3, :3], nominal[:3, 3] = chain.rotations[k], chain.translations[k]
+        change = pose @ np.linalg.inv(nominal)
+        held = {"parent": links[k], "child": links[k + 1]}
+        joints[name] = {**held, **_pos_quat(pose), **_pos_quat(change, "change_")}
+    told = {"schema": JOINT_PARAMETERS, "notes": robot.notes("joints"), "joints": joints}
+    return json.dumps(told, indent=1, ensure_ascii=False) + "\n"
+
+
+JOINT_PARAMETERS = "thermal-robot/joint-parameters/1"
+
+
+def _pos_quat(pose: Array, before: str = "") -> dict[str, list[float]]:
+    """Position, m, and quaternion (w, x, y, z) of a pose (4, 4)."""
+    return {f"{before}pos": pose[:3, 3].tolist(), f"{before}quat": rotation_to_quaternion(pose[:3, :3]).tolist()}
 
 
 Convention: TypeAlias = Literal["standard", "modified"]

@@ -13,6 +13,7 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.data_checks import cautions
+from thermal_robot.diagnosis.file_gaps import file_gaps
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.gauges import unseen
 from thermal_robot.diagnosis.next_measurement import wanted
@@ -224,7 +225,7 @@ def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
     campaign = fit.campaign
     needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))
     clock = campaign.covariates.get("order")
-    return CorrectedModel(
+    model = CorrectedModel(
         robot=campaign.robot,
         settings=campaign.settings,
         frames=fit.corrected.frames,
@@ -235,6 +236,7 @@ def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),
         spread=None if floor is None else uncertainty(fit, needs, floor),
     )
+    return replace(model, files=file_gaps(fit, model))
 
 
 def _rows(fit: Fit, shrinkage: Shrinkage) -> Rows:

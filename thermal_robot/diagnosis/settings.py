@@ -25,6 +25,13 @@ MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
 """Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
 rows that a point stands for otherwise, and that are taken together to ask whether an error follows a quantity."""
+MOST_MOVED, LIKELY, ORDINARY = 2, 0.5, (1.0, 3.0)
+"""Zeros and links that are taken to move in one crash at most, as an arm stops at the first contact; the probability
+above which one is named: more probable than not; and times the expected sizes that zeros and placements without a crash
+are at most: 1 mrad, which mastering with a gauge leaves, and 1.5 mm, what a light arm shows that nobody calibrated."""
+CALM, STRUCK = 0.3, 10.0
+"""Times the expected sizes at which scales are first taken: of an arm's ordinary errors, and of what a crash moved, 10
+mrad and 5 mm; the most probable ones are found from there."""
 UNSETTLED = 1.5
 """Times what the linear model leaves: an exact one that leaves more is another model. They agree to a thousandth where
 errors are those of robots."""

@@ -434,7 +434,7 @@ class Updated:
         }
         covariance = _covariance(fitted, choice, unknown_frames(self.fit.campaign))
         spread = replace(known, covariance=covariance, prior=fitted.expected(choice), ranges=ranges)
-        return replace(model, spread=spread)
+        return replace(model, spread=spread, files=())  # held out were the old rows alone
 
     @property
     def samples(self) -> int:

@@ -230,6 +230,8 @@ def _left(precision: Array, which: NDArray[np.int64]) -> Array:
 
 NOISE, NOISE_TURN = 20e-6, 1e-4
 """m and rad, one sigma per axis: a laser tracker at a few metres, and the turn of its target with three reflectors."""
+ROWS, CRASH_ROWS = 60, 40
+"""Rows of a plan unless asked otherwise: an hour's; and those after a crash, a quarter of a minute each, ten in all."""
 CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
 """Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
 than that."""
@@ -305,7 +307,7 @@ class Plan:
 
 def plan(
     robot: Robot,
-    rows: int = 60,
+    rows: int = ROWS,
     effects: str | Iterable[str] | None = None,
     *,
     repeats: int = 1,

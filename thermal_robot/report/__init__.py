@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         plot_which,
     )
     from thermal_robot.report.text_campaigns import comparison_headline, comparison_text, fleet_text
+    from thermal_robot.report.text_crash import crash_headline, crash_text
     from thermal_robot.report.text_motions import motion_comparison_headline, motion_comparison_text, motion_text
     from thermal_robot.report.words import advice, headline
 
@@ -37,6 +38,8 @@ __all__ = [
     "comparison_html",
     "comparison_schema",
     "comparison_text",
+    "crash_headline",
+    "crash_text",
     "explain_figure",
     "fleet_html",
     "fleet_text",
@@ -69,6 +72,7 @@ _HOMES = {
     "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_html"),
     "plain_text": ("calibration_text", "text"),
     "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
+    "text_crash": ("crash_headline", "crash_text"),
     "words": ("advice", "headline"),
 }
 

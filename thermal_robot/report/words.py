@@ -51,7 +51,7 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
     size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
     if diagnosis.misfit is not None:
-        yield from _misfit(diagnosis.misfit, diagnosis.reach)
+        yield from misfit_sentences(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
         floor = length(diagnosis.gap.noise_floor)
         if diagnosis.gap.noise_known:
@@ -114,7 +114,8 @@ def _worse(diagnosis: Diagnosis) -> str:
     return f"Correcting harms rows held out by {scheme.name} ({pair}): "
 
 
-def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
+def misfit_sentences(misfit: Misfit, reach: float) -> Iterator[str]:
+    """Yield the sentence on why robot and table do not belong together, the fullest wording first."""
     fault, model = misfit.fault, misfit.model
     if model is not None:
         yield _another_model(model)
