@@ -128,7 +128,7 @@ def test_commands_take_the_place_of_joint_positions(run, folder, diagnosed, stdi
     assert (written[STD].to_numpy(float) > 0.0).all()
     # what it writes can be predicted, and lies where the nominal robot would have been
     nominal = observe(model.samples(folder / "fresh.csv"), model.frames).predicted_position
-    np.testing.assert_allclose(model.predict(out)[0], nominal, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(model.prediction(out)[0], nominal, rtol=0, atol=1e-9)
     stdin(folder / "fresh.csv")
     assert run("correct", diagnosed.model, "-", "-o", "-") == (0, out.read_text(), "")
     both = ("-o", tmp_path / "c.parquet", "--urdf", tmp_path / "r.urdf")

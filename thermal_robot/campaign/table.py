@@ -186,6 +186,10 @@ WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
+TABLES = {".csv": "", **dict.fromkeys(PARQUET, "pyarrow"), ".xlsx": "openpyxl", ".ods": "odf"}
+"""Endings of tables that are written, and the module that writes each."""
+TYPED = tuple(ending for ending, module in TABLES.items() if module)
+"""Those whose cells have a type."""
 _ONE_ROW = "one row per measurement"
 SPACE = " "  # A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye
 
@@ -244,6 +248,14 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
             return replace(_read_text(path, layout, "cp1252"), warnings=(odd,))
     except OSError as error:
         raise CampaignError(file, f"cannot be read: {error.strerror}") from error
+
+
+def without_library(file: str, ending: str) -> CampaignError:
+    """Error of a file whose ending needs a library that is not installed."""
+    if ending in PARQUET:
+        return CampaignError(file, NO_PARQUET, expected=WITH_PARQUET)
+    problem = f"workbooks need {WORKBOOKS[ending]}, which is not installed"
+    return CampaignError(file, problem, expected=WITH_EXCEL)
 
 
 def _encoding(path: Path) -> str:
@@ -324,7 +336,7 @@ def _read_parquet(path: Path) -> Table:
         _require_size(file, held.num_rows, held.num_columns)
         frame = pd.read_parquet(path)
     except ImportError as error:
-        raise CampaignError(file, NO_PARQUET, expected=WITH_PARQUET) from error
+        raise without_library(file, PARQUET[0]) from error
     except CampaignError:
         raise
     except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
@@ -343,8 +355,7 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
     try:
         sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
     except ImportError as error:
-        problem = f"workbooks need {WORKBOOKS[path.suffix.lower()]}, which is not installed"
-        raise CampaignError(file, problem, expected=WITH_EXCEL) from error
+        raise without_library(file, path.suffix.lower()) from error
     except Exception as error:  # each reader raises its own
         raise CampaignError(file, f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
     first, frame = next(iter(sheets.items()))

@@ -15,7 +15,7 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.cross_validation import held_out
-from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
+from thermal_robot.diagnosis.data_checks import as_counted, counted
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.prune import beside_scatter, concluded, grown, pruned
 from thermal_robot.diagnosis.residual_tests import examine
@@ -94,9 +94,7 @@ def diagnose(
 
     if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
-    campaign, notes = usable(campaign)
-    campaign, left = not_executed(campaign)
-    notes += left
+    campaign, notes = counted(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
         last = _concluded(campaign, candidates, effects, progress)

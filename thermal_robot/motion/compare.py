@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.special import erfc
 
 from thermal_robot.diagnosis.values import Estimate, jsonable
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import write_text
 from thermal_robot.motion import settings
 from thermal_robot.motion.result import MotionDiagnosis
-from thermal_robot.teller import registered
+from thermal_robot.teller import Told, registered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +56,7 @@ class Compared:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotionComparison:
+class MotionComparison(Told):
     """What changed between two logs of one robot's motion.
 
     Attributes
@@ -80,6 +77,8 @@ class MotionComparison:
     >>> [(one.effect, one.joint, one.z) for one in found.changes]  # doctest: +SKIP
     [('coulomb', 'elbow', 6.1)]
     """
+
+    _kind: ClassVar[str] = "motion_comparison_"
 
     logs: tuple[str, str]
     parameters: tuple[Compared, ...]
@@ -115,13 +114,6 @@ class MotionComparison:
         told = [{**asdict(one), "changed": one.changed} for one in self.parameters]
         plain = {"schema": SCHEMA, "robot": self.robot, "logs": self.logs, "weak": self.weak, "parameters": told}
         return dict(jsonable({**plain, "summary": self.summary}))
-
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
-
-    def __str__(self) -> str:
-        return str(registered().motion_comparison_text(self))
 
     def __repr__(self) -> str:
         changed = ", ".join(dict.fromkeys(one.effect for one in self.changes)) or "nothing"
