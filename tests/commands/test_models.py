@@ -214,7 +214,8 @@ def test_lengths_far_from_what_was_measured_are_told_to_be_extrapolated(run, dia
 
 
 def test_options_that_make_no_sense_are_refused(run, folder, diagnosed, tmp_path, monkeypatch):
-    model, out = diagnosed.model, tmp_path / "r.urdf"
+    model, out = diagnosed.model, tmp_path / "robot"
+    (tmp_path / "model.urdf").symlink_to(model)
     for words, *said in (
         ([], "nothing to write", "--urdf"),
         (["--min-sigma", "2"], "nothing to write", "--urdf"),
@@ -223,11 +224,11 @@ def test_options_that_make_no_sense_are_refused(run, folder, diagnosed, tmp_path
         (["--from-mjcf", model, "--urdf", out], "--mjcf"),
         (["--urdf", out, "--modified"], "--modified", "of use with --dh only"),
         (["--mjcf", out, "--from-mjcf", tmp_path / "no.xml"], "no.xml"),
-        (["--urdf", model], "is read from"),
+        (["--urdf", tmp_path / "model.urdf"], "is read from"),
         (["--urdf", out, "--dh", out], "two outputs"),
     ):
         refused(run("correct", model, *words), *said)
     refused(run("correct", folder / "truth.json", "--urdf", out), "truth.json", "not a model")
     monkeypatch.setitem(sys.modules, "mujoco", None)
     refused(run("correct", model, "--mjcf", tmp_path / "r.xml", "--urdf", out), "thermal-robot[blind]")
-    assert not any(tmp_path.iterdir())
+    assert [file.name for file in tmp_path.iterdir()] == ["model.urdf"]
