@@ -232,7 +232,7 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
             if ending in PARQUET:
                 predictions.to_parquet(place, index=False)
             elif ending in WORKBOOKS:
-                predictions.to_excel(place, index=False, engine=TABLES[ending])
+                predictions.to_excel(place, index=False)
             else:
                 predictions.to_csv(place, index=False, lineterminator="\n")
     except ImportError as error:
