@@ -170,7 +170,7 @@ def test_the_number_that_contributing_follows(diagnosed_once):
     told = re.findall(r"(?:gap of|remainder of|\|) (\d+) µm", text)
     distance = [np.linalg.norm(part[67]) for part in (found.rows.gap, found.rows.remainder)]
     np.testing.assert_allclose([*distance, found.rows.held_out_after[67]], [1e-6 * float(t) for t in told], atol=2e-6)
-    assert f"−{-1e3 * found.model.predict(campaign)[0][67, 0]:.3f} mm" in text
+    assert f"−{-1e3 * found.model.prediction(campaign)[0][67, 0]:.3f} mm" in text
 
 
 def named_files(line):

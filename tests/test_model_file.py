@@ -92,7 +92,7 @@ def test_a_file_holds_all_of_a_model(model, tmp_path):
     again = CorrectedModel.load(tmp_path / "model.json")
     assert again.to_dict() == known.to_dict()
     assert [effect for effect, _ in again.effects] == [effect for effect, _ in known.effects]
-    np.testing.assert_array_equal(again.predict(fresh)[0], known.predict(fresh)[0])
+    np.testing.assert_array_equal(again.prediction(fresh)[0], known.prediction(fresh)[0])
 
 
 def test_a_file_of_the_first_version_is_read(model, tmp_path):
@@ -100,7 +100,7 @@ def test_a_file_of_the_first_version_is_read(model, tmp_path):
     first = {**plain(known), "schema": "thermal-robot/model/1"}
     del first["checksum"]
     again = CorrectedModel.load(stored(first, tmp_path))
-    np.testing.assert_array_equal(again.predict(fresh)[0], known.predict(fresh)[0])
+    np.testing.assert_array_equal(again.prediction(fresh)[0], known.prediction(fresh)[0])
 
 
 def test_a_file_of_a_newer_version_is_told_from_one_that_is_no_model(settled, tmp_path):
@@ -127,7 +127,7 @@ def test_another_layout_is_the_same_file(settled, tmp_path):
     for content in (text.encode(), b"\xef\xbb\xbf" + text.encode(), broad.encode()):
         (tmp_path / "model.json").write_bytes(content)
         again = CorrectedModel.load(tmp_path / "model.json")
-        np.testing.assert_array_equal(again.predict(fresh)[0], known.predict(fresh)[0])
+        np.testing.assert_array_equal(again.prediction(fresh)[0], known.prediction(fresh)[0])
 
 
 def test_a_possible_value_that_nobody_wrote_is_refused(settled, tmp_path):
@@ -322,7 +322,7 @@ def summed(document):
 def outcome(file, fresh, right):
     """Tell what becomes of a file: refused in one line that names it, another finite prediction, or the right one."""
     try:
-        predicted = CorrectedModel.load(file).predict(fresh)[0]
+        predicted = CorrectedModel.load(file).prediction(fresh)[0]
     except ThermalRobotError as error:
         told = str(error)
         sound = "\n" not in told and told.startswith((str(file), "effect '", fresh.name))
@@ -335,7 +335,7 @@ def outcome(file, fresh, right):
 @pytest.mark.parametrize("step", [pytest.param(1, marks=pytest.mark.slow), 29])
 def test_no_damage_gives_a_wrong_number_and_none_with_a_checksum_of_its_own_a_traceback(model, tmp_path, step):
     known, fresh = model
-    right, document = known.predict(fresh)[0], plain(known)
+    right, document = known.prediction(fresh)[0], plain(known)
     found = [outcome(stored(each, tmp_path), fresh, right) for each in islice(spoilt(document), 0, None, step)]
     assert set(found) <= {"refused", "right"}
     assert found.count("refused") > 0.95 * len(found)
@@ -365,7 +365,7 @@ def test_an_effect_of_ones_own_is_asked_when_it_predicts(settled, tmp_path):
     own = replace(known, effects=((Own(), np.array([1e-4])),))
     own.save(tmp_path / "model.json")
     again = CorrectedModel.load(tmp_path / "model.json", effects=[Own()])
-    np.testing.assert_array_equal(again.predict(fresh)[0], own.predict(fresh)[0])
+    np.testing.assert_array_equal(again.prediction(fresh)[0], own.prediction(fresh)[0])
     more = replace(own, effects=((Own(), np.array([1e-4, 1e-4])),))
     with pytest.raises(EffectError, match="'own' was fitted with 2 parameters and has 1 in these rows"):
         more.predict(fresh)
@@ -375,6 +375,6 @@ def test_a_law_that_these_rows_cannot_tell_is_an_error_that_says_why(settled):
     known, fresh = settled
     turn = Discovered(place="joint_3", quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25,))
     memory = replace(known, effects=((turn, np.array([1e-4, 1e-4])),), needs=("time",))
-    assert np.isfinite(memory.predict(fresh)[0]).all()
+    assert np.isfinite(memory.prediction(fresh)[0]).all()
     with pytest.raises(EffectError, match=r"has 0 in these rows, which lack since_turn\.joint_3"):
         memory.predict(replace(fresh, covariates={"time": np.full(6, 60.0)}, travelled={}))

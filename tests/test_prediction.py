@@ -29,17 +29,17 @@ def test_a_step_of_frames_and_parameters_moves_the_prediction_as_its_columns_say
     for p, size in enumerate(block(found.fit.corrected, effect).sizes):
         step = np.zeros(len(values))
         step[p] = 1e-3 * size
-        there, here = (replace(model, effects=((effect, v),)).predict(campaign)[0] for v in (values + step, values))
+        there, here = (replace(model, effects=((effect, v),)).prediction(campaign)[0] for v in (values + step, values))
         np.testing.assert_allclose((there - here) / step[p], moved[:, :, p], rtol=0, atol=2e-3 * np.abs(moved).max())
 
 
 def test_deviations_are_those_of_refits_with_fresh_noise(warm):
     """The spread of many fits to the same robot, each with noise of its own, is what one of them says of itself."""
     campaign, found, fresh = warm
-    rng, exact, predicted = np.random.default_rng(8), found.model.predict(campaign)[0], []
+    rng, exact, predicted = np.random.default_rng(8), found.model.prediction(campaign)[0], []
     for _ in range(12):
         again = replace(campaign, position=exact + rng.normal(scale=NOISE, size=exact.shape))
-        predicted.append(diagnose(again, only="thermal_elongation").model.predict(fresh)[0])
+        predicted.append(diagnose(again, only="thermal_elongation").model.prediction(fresh)[0])
     spread = np.std(predicted, axis=0, ddof=1)
     told = replace(found.model, spread=replace(found.model.spread, beyond=np.zeros(3))).prediction(fresh).std
     assert 0.85 < np.sqrt((spread**2).mean() / (told**2).mean()) < 1.15

@@ -25,7 +25,7 @@ def predicted_mm(found, samples, directory):
     """What the model predicts once it is saved and loaded, millimetres."""
     found.model.save(directory / "model.json")
     model = CorrectedModel.load(directory / "model.json")
-    return 1e3 * model.predict(model.samples(samples))[0]
+    return 1e3 * model.prediction(model.samples(samples))[0]
 
 
 @pytest.mark.parametrize(("name", "least"), [("ur5_jacobi", 0.95), ("ipa_ur10_b", 0.5)])

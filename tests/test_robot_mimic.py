@@ -52,7 +52,7 @@ def test_a_zero_of_the_driving_joint_is_found(campaign):
     off = {p.name: p for p in finding.parameters}["zero offset, reach"]
     assert abs(off.value - OFFSET) < 3.0 * off.std
     assert off.std < 0.1 * OFFSET
-    predicted = found.model.predict(campaign)[0]
+    predicted = found.model.prediction(campaign)[0]
     assert np.sqrt(((predicted - campaign.position) ** 2).mean()) < 1.1 * NOISE
 
 
@@ -91,7 +91,7 @@ def test_a_joint_beside_the_chain_is_read_diagnosed_and_corrected(tmp_path):
     off = {p.name: p for p in found.finding("joint_offset").parameters}["zero offset, lever"]
     assert abs(off.value - 10 * OFFSET) < 3.0 * off.std
     commands = found.model.corrected_commands(campaign)
-    reached = found.model.predict(replace(campaign, q=commands.q))[0]
+    reached = found.model.prediction(replace(campaign, q=commands.q))[0]
     frames = found.model.frames
     wanted = frames.base @ kin.tool_poses(robot, campaign.q) @ frames.tool
     np.testing.assert_allclose(reached, wanted[:, :3, 3], atol=1e-6)

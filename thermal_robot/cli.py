@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from thermal_robot.campaign.names import did_you_mean
+from thermal_robot.commands.endings import require_endings
 from thermal_robot.commands.table import COMMANDS
 from thermal_robot.console import NORMAL, VERBOSE, add_loudness, heard
 from thermal_robot.errors import OwnEffectError, ThermalRobotError, ours
@@ -66,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         options.prepare(options)
+        require_endings(options)
         with heard(options.loudness), piped(options):
             options.run(options)
         sys.stdout.flush()  # a disk may be full only now
@@ -113,7 +115,7 @@ def _parser() -> Parser:
     parser.add_argument("-V", "--version", action="version", version=f"thermal-robot {__version__}")
     add_loudness(parser, NORMAL)
     commands = parser.add_subparsers(metavar="COMMAND")
-    parser.set_defaults(run=lambda _: parser.bare(COMMANDS), prepare=lambda _: None, reads=(), writes=())
+    parser.set_defaults(run=lambda _: parser.bare(COMMANDS), prepare=lambda _: None, reads=(), writes=(), forms={})
     for name, command in COMMANDS.items():
         does = f"{command.does[0].upper()}{command.does[1:]}.\n\nexample:\n  thermal-robot {name}{command.example}"
         made: Parser = commands.add_parser(name, help=command.does, description=does)

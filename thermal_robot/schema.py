@@ -181,7 +181,7 @@ def increasing(item: Kind) -> Kind:
 
 
 def optional(item: Kind) -> Kind:
-    """Return a validator of a value, or null."""
+    """Return a validator of a value, or None."""
 
     def kind(value: Any, path: str) -> Any:
         return None if value is None else item(value, path)

@@ -61,7 +61,7 @@ def ur5(data, folder):
     diagnosis = tr.diagnose(campaign.take(np.sort(mixed[:700])))
     seconds = time.perf_counter() - begun
     held_out = campaign.take(np.sort(mixed[700:]))
-    error = 1e3 * rms(held_out.position - diagnosis.model.predict(held_out)[0])
+    error = 1e3 * rms(held_out.position - diagnosis.model.prediction(held_out)[0])
     print(f"ur5_jacobi, 700 of its rows: {', '.join(diagnosis.verdict)}; {seconds:.1f} s")
     print(f"    rms on the other 300: {error:.4f} mm")
 

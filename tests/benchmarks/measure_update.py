@@ -87,7 +87,7 @@ def equal(seeds, old=400, more=200):
             if same and fresh.fit.effects:
                 _, values, deviations, noise, rms = figures(fresh)
                 own = updated.parameters
-                far = np.abs(updated.model.predict(whole)[0] - fresh.model.predict(whole)[0]).max()
+                far = np.abs(updated.model.prediction(whole)[0] - fresh.model.prediction(whole)[0]).max()
                 told = np.abs(values) > 3.0 * deviations
                 apart = np.abs(own["value"].to_numpy() - values)
                 wide = np.abs(own["std"].to_numpy() / deviations - 1.0).max()

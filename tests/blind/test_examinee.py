@@ -46,7 +46,7 @@ def test_the_answer_holds_the_diagnosis_and_where_its_model_has_the_fresh_sample
     assert reply["said"]["verdict"]["effects"] == ["thermal_elongation"]
     assert reply["seconds"] > 0.0
     model = CorrectedModel.load(folder / "model.json")
-    position, _ = model.predict(model.samples(folder / "fresh.csv"))
+    position, _ = model.prediction(model.samples(folder / "fresh.csv"))[:2]
     np.testing.assert_allclose(reply["predicted"], position, atol=1e-9)  # to a nanometre
     # frames alone, and with the one effect that is in the model
     assert set(reply["refitted"]) == {"", "thermal_elongation"}
@@ -236,7 +236,7 @@ def model():
 def test_all_effects_together_predict_what_the_model_does(model):
     found, _, samples, _, predicted = model
     names = "+".join(effect.name for effect, _ in found.model.effects)
-    assert rms(predicted[names], found.model.predict(samples)[0]) < 0.3 * NOISE
+    assert rms(predicted[names], found.model.prediction(samples)[0]) < 0.3 * NOISE
 
 
 def test_without_effects_the_frames_are_those_of_least_squares(model):

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from campaign.files import PLAIN, PLAIN_TOML, ROWS, add, put, read, refusal, renamed, says, with_column
+from scipy.io import savemat
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign import table as tables
@@ -52,6 +53,29 @@ def saved(folder: Path, ending: str) -> Path:
     toml = put(folder) / "campaign.toml"
     toml.write_text(toml.read_text().replace("measurements.csv", f"measurements.{ending}"))
     return folder / f"measurements.{ending}"
+
+
+def test_the_one_matrix_of_a_matlab_file_is_a_table_without_names(tmp_path):
+    rows = np.arange(12.0).reshape(4, 3)
+    savemat(tmp_path / "t.mat", {"Positions": rows, "note": "of Monday"})
+    table = read_table(tmp_path / "t.mat")
+    assert (list(table.columns), table.rows.tolist(), table.unnamed) == (["1", "2", "3"], [1, 2, 3, 4], True)
+    np.testing.assert_array_equal(table.numbers("2"), rows[:, 1])
+    savemat(tmp_path / "two.mat", {"Positions": rows, "Angles": rows[:, :2]})
+    with pytest.raises(CampaignError, match=r"one matrix of numbers; found Positions \(4 x 3\), Angles \(4 x 2\)"):
+        read_table(tmp_path / "two.mat")
+    (tmp_path / "no.mat").write_text("x,y\n1,2\n")
+    with pytest.raises(CampaignError, match="cannot be read as a MATLAB file"):
+        read_table(tmp_path / "no.mat")
+
+
+@pytest.mark.parametrize(
+    ("name", "what"), [("s.json", "text of another kind"), ("log.BAG", "a recording"), ("p.ls", "a robot's program")]
+)
+def test_a_file_that_holds_no_table_is_called_what_it_is(tmp_path, name, what):
+    (tmp_path / name).write_text("{\n")
+    with pytest.raises(CampaignError, match=f"is {what} by its ending, and no table"):
+        read_table(tmp_path / name)
 
 
 @pytest.mark.parametrize("ending", ["xlsx", "ods", "parquet", "pq"])

@@ -42,6 +42,29 @@ def test_check_describes_a_campaign_and_takes_a_urdf_that_pinocchio_takes(run, f
         assert described.splitlines()[1:] == out.splitlines()[1:]  # but for the folder's name
 
 
+def test_check_says_what_a_diagnosis_would(run, folder, tmp_path):
+    cell = tmp_path / "cell"
+    shutil.copytree(folder, cell)
+    table = pd.read_csv(cell / "measurements.csv")
+    kept = [name for name in table.columns if not name.startswith("approach.")]
+    pd.concat([table, table.iloc[[3, 10]]])[kept].to_csv(cell / "measurements.csv", index=False)
+    said = " ".join(run("check", cell)[1].split())
+    left = "2 rows (122, 123) repeat another one to the last digit: these copies are left out"
+    assert left in said
+    assert "rows that count 120 of 122" in said
+    assert left in read_and_warned(cell)
+    table[[name for name in kept if name not in ("time", "order")]].to_csv(cell / "measurements.csv", index=False)
+    said = " ".join(run("check", cell)[1].split())
+    assert "not testable backlash: add approach.<joint> or order" in said
+    assert "not testable drift: add time or order" in said
+    table[kept].head(4).to_csv(cell / "measurements.csv", index=False)
+    assert "none is possible 4 different poses are too few" in " ".join(run("check", cell)[1].split())
+
+
+def read_and_warned(cell):
+    return diagnose(cell, only=["thermal_elongation"]).warnings
+
+
 def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(run, folder, diagnosed, diagnosed_poses):
     out = diagnosed.text
     assert (diagnosed.status, diagnosed.complaint) == (0, "")
@@ -146,10 +169,15 @@ def test_what_is_read_is_never_written(run, folder, diagnosed, tmp_path):
     model.write_bytes(diagnosed.model.read_bytes())
     before = {f: f.read_bytes() for f in (*spare.iterdir(), model) if f.is_file()}
     for name in ("campaign.toml", "measurements.csv", "robot.urdf"):
-        for option in ("--json", "--model", "--report"):
-            refused(run("diagnose", spare, option, spare / name), name, "would be overwritten")
+        for option, ending in (("--json", ".json"), ("--model", ".json"), ("--report", ".html")):
+            refused(run("diagnose", spare, option, spare / name), name, "by its ending")
+            link = tmp_path / f"{name}{ending}"
+            link.unlink(missing_ok=True)
+            link.symlink_to(spare / name)
+            refused(run("diagnose", spare, option, link), link.name, "would be overwritten")
     (tmp_path / "link.csv").symlink_to(spare / "fresh.csv")
-    for target in (spare / "fresh.csv", model, tmp_path / "link.csv"):
+    (tmp_path / "model.csv").symlink_to(model)
+    for target in (spare / "fresh.csv", tmp_path / "model.csv", tmp_path / "link.csv"):
         refused(run("predict", model, spare / "fresh.csv", "-o", target), target.name, "would be overwritten")
     refused(run("diagnose", spare, "--json", tmp_path / "a", "--model", tmp_path / "a"), "two outputs")
     assert before == {f: f.read_bytes() for f in before}
@@ -270,7 +298,7 @@ def test_a_campaign_on_standard_input_has_its_paths_in_the_current_folder(run, f
         stdin(folder / "campaign.toml")
         assert run("diagnose", "-q", *given) == run("diagnose", folder, "-q", *FEW)
     stdin(folder / "campaign.toml")
-    refused(run("diagnose", "-", "--json", "robot.urdf"), "robot.urdf", "would be overwritten")
+    refused(run("diagnose", "-", "--json", "robot.urdf"), "robot.urdf", "by its ending")
     stdin((folder / "campaign.toml").read_bytes().replace(b'"tool0"', b'"tool_0"'))
     refused(run("check", "-"), "standard input, [robot]", "'tool_0'", "tool0")
     stdin(folder / "measurements.csv")

@@ -129,7 +129,7 @@ def test_commands_take_the_place_of_joint_positions(run, folder, diagnosed, stdi
     assert (written[STD].to_numpy(float) > 0.0).all()
     # what it writes can be predicted, and lies where the nominal robot would have been
     nominal = observe(model.samples(folder / "fresh.csv"), model.frames).predicted_position
-    np.testing.assert_allclose(model.predict(out)[0], nominal, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(model.prediction(out)[0], nominal, rtol=0, atol=1e-9)
     stdin(folder / "fresh.csv")
     assert run("correct", diagnosed.model, "-", "-o", "-") == (0, out.read_text(), "")
     both = ("-o", tmp_path / "c.parquet", "--urdf", tmp_path / "r.urdf")
@@ -259,7 +259,8 @@ def test_lengths_far_from_what_was_measured_are_told_to_be_extrapolated(run, dia
 
 
 def test_options_that_make_no_sense_are_refused(run, folder, diagnosed, tmp_path, monkeypatch):
-    model, out = diagnosed.model, tmp_path / "r.urdf"
+    model, out = diagnosed.model, tmp_path / "robot"
+    (tmp_path / "model.urdf").symlink_to(model)
     for words, *said in (
         ([], "nothing to write", "--urdf"),
         (["--min-sigma", "2"], "nothing to write", "--urdf"),
@@ -273,11 +274,11 @@ def test_options_that_make_no_sense_are_refused(run, folder, diagnosed, tmp_path
         (["--urdf", out, "--alone"], "alone", "does not hold a fit"),
         (["--pal", out], "'rv_m2' has no joint of an arm"),
         (["--mjcf", out, "--from-mjcf", tmp_path / "no.xml"], "no.xml"),
-        (["--urdf", model], "is read from"),
+        (["--urdf", tmp_path / "model.urdf"], "is read from"),
         (["--urdf", out, "--dh", out], "two outputs"),
     ):
         refused(run("correct", model, *words), *said)
     refused(run("correct", folder / "truth.json", "--urdf", out), "truth.json", "not a model")
     monkeypatch.setitem(sys.modules, "mujoco", None)
     refused(run("correct", model, "--mjcf", tmp_path / "r.xml", "--urdf", out), "thermal-robot[blind]")
-    assert not any(tmp_path.iterdir())
+    assert [file.name for file in tmp_path.iterdir()] == ["model.urdf"]

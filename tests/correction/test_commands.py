@@ -245,7 +245,7 @@ def test_a_robot_on_the_floor_goes_where_its_model_says(robot, tmp_path, monkeyp
         found = diagnose(read_campaign(folder))
         poses = found.model.samples(folder / "fresh.csv")
         nominal = observe(poses, found.model.frames).predicted_position
-        predicted = found.model.predict(poses)[0] - np.array(answers["fresh_position"])
+        predicted = found.model.prediction(poses)[0] - np.array(answers["fresh_position"])
         left = again(found.model.corrected_commands(poses).q) - nominal
         # what is wrong with the robot then is what was wrong with the prediction, and nothing else
         assert abs(rms(left) - rms(predicted)) < 0.05 * answers["noise"]

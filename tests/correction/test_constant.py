@@ -179,7 +179,7 @@ def test_what_is_left_out_costs_less_than_the_noise(bent):
     model, fresh, place = bent
 
     def off(model):
-        return np.sqrt(((model.predict(fresh)[0] - place) ** 2).mean())
+        return np.sqrt(((model.prediction(fresh)[0] - place) ** 2).mean())
 
     kept, gone = determined(model, 2.0)
     assert 5 < len(gone) < len(values(model)) - 5

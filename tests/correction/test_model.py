@@ -41,7 +41,7 @@ def test_predictions_are_within_half_a_noise_of_the_truth(arm):
     misses = {}
     for name, effects in MIXTURES.items():
         _, model, fresh, place = corrected(arm, effects)
-        predicted, orientation = model.predict(fresh)
+        predicted, orientation = model.prediction(fresh)[:2]
         assert orientation is None
         misses[name] = np.sqrt(((predicted - place) ** 2).mean()) / NOISE
     assert max(misses.values()) < 0.5, misses
@@ -64,20 +64,20 @@ def test_a_model_needs_what_its_effects_read_and_nothing_more(rv_m2, effect, nee
     needs = {f"approach.{v.split()[-1]}" for v in truth["parts"][effect]["values"]} if needs is None else needs
     assert set(model.needs) == needs
     bare = replace(fresh, covariates={k: v for k, v in fresh.covariates.items() if k in needs})
-    np.testing.assert_array_equal(model.predict(bare)[0], model.predict(fresh)[0])
+    np.testing.assert_array_equal(model.prediction(bare)[0], model.prediction(fresh)[0])
 
 
 def test_one_sample_is_predicted_as_among_many_and_wherever_the_base_stands(hall):
     _, model, fresh, _ = hall
-    together, _ = model.predict(fresh)
+    together, _ = model.prediction(fresh)[:2]
     for rows in ([0], [42], [99], np.arange(100)[::-1]):
-        np.testing.assert_allclose(model.predict(fresh.take(rows))[0], together[rows], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(model.prediction(fresh.take(rows))[0], together[rows], rtol=0, atol=1e-13)
     # the base carries the whole prediction: turned base, turned prediction
     turn = np.eye(4)
     turn[:3, :3], turn[:3, 3] = exp3([0.4, -1.0, 2.0]), [1.0, 2.0, 3.0]
     there = replace(model, frames=replace(model.frames, base=turn @ model.frames.base))
     expected = together @ turn[:3, :3].T + turn[:3, 3]
-    np.testing.assert_allclose(there.predict(fresh)[0], expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(there.prediction(fresh)[0], expected, rtol=0, atol=1e-12)
 
 
 def test_what_is_lacking_is_named(hall, rv_m2, tmp_path):
@@ -95,11 +95,11 @@ def test_what_is_lacking_is_named(hall, rv_m2, tmp_path):
     with pytest.raises(CampaignError, match="an empty cell") as refused:
         model.predict(model.samples(tmp_path / "gap.csv"))
     assert (refused.value.column, refused.value.row) == ("temperature", 8)
-    whole = model.predict(read_samples(tmp_path / "fresh.csv", model.settings, model.robot))[0]
-    np.testing.assert_allclose(whole, model.predict(fresh)[0], rtol=0, atol=1e-9)
+    whole = model.prediction(read_samples(tmp_path / "fresh.csv", model.settings, model.robot))[0]
+    np.testing.assert_allclose(whole, model.prediction(fresh)[0], rtol=0, atol=1e-9)
     # in which nobody reads it does not matter
     gaps = replace(fresh, missing={"payload": np.arange(100) == 3})
-    np.testing.assert_array_equal(model.predict(gaps)[0], model.predict(fresh)[0])
+    np.testing.assert_array_equal(model.prediction(gaps)[0], model.prediction(fresh)[0])
     both = model_of(rv_m2, (Drift(), np.ones(6)), (ThermalElongation(), np.ones(5)), needs=("temperature", "time"))
     with pytest.raises(CampaignError, match=r"column 'time': the model \(drift\) needs this column.*no such column"):
         both.predict(fresh.drop_covariate("time"))
@@ -152,7 +152,7 @@ def test_an_order_is_taken_at_its_word_unless_it_starts_again(rv_m2):
     campaign, _, (fresh, place) = simulate(rv_m2, ["drift"], seed=3, fresh=100)
     model = diagnose(by_order(campaign, campaign.covariates["time"])).model
     assert model.needs == ("order",)
-    within = model.predict(by_order(fresh, fresh.covariates["time"]))[0]
+    within = model.prediction(by_order(fresh, fresh.covariates["time"]))[0]
     assert np.sqrt(((within - place) ** 2).mean()) < 0.5 * NOISE
 
     rank = np.argsort(np.argsort(campaign.covariates["time"])).astype(float)
@@ -160,7 +160,7 @@ def test_an_order_is_taken_at_its_word_unless_it_starts_again(rv_m2):
     few = campaign.take(np.arange(20))
 
     def at(order):
-        return model.predict(by_order(few, order))[0]
+        return model.prediction(by_order(few, order))[0]
 
     settled = at(np.full(20, rank.max()))
     np.testing.assert_array_equal(at(np.arange(20)), settled)
@@ -179,7 +179,7 @@ def test_orientation_is_predicted_where_it_was_measured(arm):
     train, rest = campaign.take(np.arange(0, 220, 2)), campaign.take(np.arange(1, 220, 2))
     found = diagnose(train)
     assert found.measures == "pose"
-    position, orientation = found.model.predict(replace(rest, position=None, orientation=None))
+    position, orientation = found.model.prediction(replace(rest, position=None, orientation=None))[:2]
     np.testing.assert_allclose(np.linalg.norm(orientation, axis=1), 1.0, atol=1e-12)
     apart = quaternion_to_rotation(rest.orientation).transpose(0, 2, 1) @ quaternion_to_rotation(orientation)
     turned = np.sqrt((log3(apart) ** 2).mean()) / TURNING
@@ -193,7 +193,7 @@ def test_orientation_does_not_depend_on_the_sign_of_quaternions(rv_m2):
     campaign, _, _ = simulate(rv_m2, ["joint_offset"], seed=5, turning=TURNING)
     flipped = replace(campaign, orientation=campaign.orientation * np.where(np.arange(120) % 2, 1.0, -1.0)[:, None])
     one, other = diagnose(campaign).model, diagnose(flipped).model
-    np.testing.assert_allclose(other.predict(campaign)[0], one.predict(campaign)[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(other.prediction(campaign)[0], one.prediction(campaign)[0], rtol=0, atol=1e-12)
 
 
 def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
@@ -204,11 +204,11 @@ def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
     nominal = replace(model, effects=(), needs=())
     both = {}
     for name, rows in (("campaign", campaign), ("fresh", fresh)):
-        both[name] = replace(rows, simulated_position=nominal.predict(rows)[0] @ root[:3, :3].T + root[:3, 3])
+        both[name] = replace(rows, simulated_position=nominal.prediction(rows)[0] @ root[:3, :3].T + root[:3, 3])
     found = diagnose(both["campaign"])
     assert found.verdict == ("joint_offset",)
     assert found.model.simulated
-    assert np.sqrt(((found.model.predict(both["fresh"])[0] - place) ** 2).mean()) < 0.5 * NOISE
+    assert np.sqrt(((found.model.prediction(both["fresh"])[0] - place) ** 2).mean()) < 0.5 * NOISE
     with pytest.raises(CampaignError, match=r"column 'sim\.x': the model corrects the prediction of your simulator"):
         found.model.predict(fresh)
 
@@ -217,7 +217,7 @@ def test_more_columns_than_the_campaign_had_change_no_prediction():
     campaign, _, (fresh, _) = simulate(load_arm("ur10"), ["backlash"], samples=100, seed=5, fresh=20)
     first = f"approach.{campaign.robot.joint_names[0]}"
     model = diagnose(campaign.drop_covariate(first)).model
-    np.testing.assert_array_equal(model.predict(fresh)[0], model.predict(fresh.drop_covariate(first))[0])
+    np.testing.assert_array_equal(model.prediction(fresh)[0], model.prediction(fresh.drop_covariate(first))[0])
 
 
 def test_a_table_is_predicted_as_its_file_is(hall, tmp_path):
@@ -234,7 +234,14 @@ def test_a_table_is_predicted_as_its_file_is(hall, tmp_path):
     kept = [name for name in frame.columns if name not in ("x", "y", "z")]
     assert list(of_table.columns) == [*kept, "x", "y", "z", "std.x", "std.y", "std.z", "outside"]
     pd.testing.assert_frame_equal(of_table[kept], frame[kept])
-    np.testing.assert_array_equal(model.predict(tmp_path / "fresh.csv")[0], of_file.position)
+    np.testing.assert_array_equal(model.prediction(tmp_path / "fresh.csv")[0], of_file.position)
+    # whatever the samples are, one kind of answer
+    at = ["x", "y", "z", "std.x", "std.y", "std.z", "outside"]
+    conditions = {name: fresh.covariates[name] for name in model.needs}
+    for answer in (model.predict(fresh), model.predict(tmp_path / "fresh.csv"), model.predict(fresh.q, conditions)):
+        pd.testing.assert_frame_equal(answer[at].reset_index(drop=True), of_table[at].reset_index(drop=True))
+    with pytest.raises(CampaignError, match="of use with an array only"):
+        model.predict(frame, conditions)
     # and it shows itself in one line
     assert repr(model) == "CorrectedModel('rv_m2': backlash, thermal_elongation)"
     assert repr(replace(model, effects=())) == "CorrectedModel('rv_m2': no effect)"

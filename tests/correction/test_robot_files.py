@@ -133,7 +133,7 @@ def test_the_written_robot_predicts_what_its_model_does(rv_m2, kind):
     robot = calibrated(model, temperature=31.0 if model.needs else None)
     assert robot.kept == ()
     poses = robot.base @ tool_poses(load_robot(calibrated_urdf(robot), "tool0_target"), warm.q)
-    predicted = model.predict(warm)[0]
+    predicted = model.prediction(warm)[0]
     np.testing.assert_allclose(poses[:, :3, 3], predicted, rtol=0, atol=1e-9)
     plain = model.frames.base @ tool_poses(rv_m2, warm.q) @ model.frames.tool
     assert np.abs(plain[:, :3, 3] - predicted).max() > 1e-5
@@ -158,7 +158,7 @@ def test_the_written_robot_is_the_one_on_the_floor(rv_m2, kind):
     poses = robot.base @ tool_poses(load_robot(calibrated_urdf(robot), "tool0_target"), fresh.q)
     plain = model.frames.base @ tool_poses(rv_m2, fresh.q) @ model.frames.tool
     left, before = (np.sqrt(((p[:, :3, 3] - fresh.position) ** 2).mean()) for p in (poses, plain))
-    np.testing.assert_allclose(poses[:, :3, 3], model.predict(fresh)[0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(poses[:, :3, 3], model.prediction(fresh)[0], rtol=0, atol=1e-9)
     assert before > 1.8 * NOISE
     assert left < 1.25 * NOISE
 

@@ -45,7 +45,7 @@ def test_turns_shrink_as_places_do_and_its_model_leaves_what_it_says(campaign, p
     assert poses.rms_after == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.2)
     positions = tr.calibrate(tr.simulate("builtin:rv_m2", rows=40, noise=NOISE, tool_frame="tool0"), "backlash")
     assert positions.turned_before is positions.turned_after is None
-    left = poses.model.predict(campaign)[0] - campaign.position
+    left = poses.model.prediction(campaign)[0] - campaign.position
     assert np.sqrt((left**2).sum(axis=1).mean()) == pytest.approx(poses.rms_after, rel=1e-6)
     assert poses.model.frames is poses.fit.corrected.frames
     assert list(poses.frames.index) == ["base", "tool"]
@@ -101,7 +101,7 @@ def test_what_is_left_is_the_noise(found):
 def test_fresh_poses_are_predicted(found):
     drawn = tr.simulate(ROBOT, rows=300, seed=99).q
     true = measured(1, commands=drawn, rows=None, noise=0.0)
-    away = found.model.predict(true)[0] - true.position
+    away = found.model.prediction(true)[0] - true.position
     assert np.sqrt((away**2).sum(axis=1).mean()) < 1.5 * TRACKER * np.sqrt(3.0)
 
 

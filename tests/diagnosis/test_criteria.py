@@ -35,7 +35,7 @@ def found(repeated):
 
 def test_accuracy_before_is_that_of_the_campaign_and_after_of_poses_held_out(repeated, found):
     told, alone = found.performance, performance(repeated)
-    fitted = performance(repeated, predicted=found.model.predict(repeated))
+    fitted = performance(repeated, predicted=found.model.prediction(repeated))
     assert told.accuracy == pytest.approx(alone.accuracy, rel=1e-6)
     assert told.repeatability == alone.repeatability
     assert told.corrected < 0.5 * told.accuracy

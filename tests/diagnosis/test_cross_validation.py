@@ -167,7 +167,7 @@ def test_held_out_rows_are_fitted_as_badly_as_fresh_ones(arm):
     for seed in range(3):
         campaign, _, (fresh, place) = simulate(arm, ["geometric"], seed=seed, samples=60, fresh=200)
         found = diagnose(campaign, only=["geometric"])
-        miss2 = ((found.model.predict(fresh)[0] - place) ** 2).sum(axis=1).mean() + 3.0 * 25e-6**2
+        miss2 = ((found.model.prediction(fresh)[0] - place) ** 2).sum(axis=1).mean() + 3.0 * 25e-6**2
         to_fresh.append(found.gap.held_out.rms_after / np.sqrt(miss2))
         to_own.append(found.gap.held_out.rms_after / found.gap.rms_after)
     assert 0.9 < np.mean(to_fresh) < 1.15
@@ -216,7 +216,7 @@ def test_noise_is_not_explained_and_does_not_shrink(arm):
 def far(campaign, found, row):
     """Whether a row lies ten noises from where the target is."""
     index = int(np.flatnonzero(campaign.rows == row)[0])
-    return np.linalg.norm(campaign.position[index] - found.model.predict(campaign)[0][index]) > 10.0 * 25e-6
+    return np.linalg.norm(campaign.position[index] - found.model.prediction(campaign)[0][index]) > 10.0 * 25e-6
 
 
 def test_shares_do_not_depend_on_the_order_of_effects(rv_m2):

@@ -201,12 +201,10 @@ def test_the_model_reads_samples_and_new_rows_as_the_campaign(rv_m2, tmp_path):
     found.model.save(tmp_path / "model.json")
     for model in (found.model, CorrectedModel.load(tmp_path / "model.json")):
         for samples in (spoilt, spoilt.to_frame()):
-            position = model.predict(samples)
-            position = position[0] if isinstance(position, tuple) else position[["x", "y", "z"]].to_numpy()
-            expected = sound.model.predict(plain)[0] / (1.0 if samples is spoilt else plain.units.length_scale)
-            np.testing.assert_allclose(position, expected, rtol=1e-7)
+            position = plain.units.length_scale * model.predict(samples)[["x", "y", "z"]].to_numpy()
+            np.testing.assert_allclose(position, sound.model.prediction(plain).position, rtol=1e-7)
     more = found.update(spoilt.take(np.arange(10)))
-    np.testing.assert_allclose(more.model.predict(spoilt)[0], found.model.predict(spoilt)[0], atol=2e-4)
+    np.testing.assert_allclose(more.model.prediction(spoilt)[0], found.model.prediction(spoilt)[0], atol=2e-4)
 
 
 ROWS = 80

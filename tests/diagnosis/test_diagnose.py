@@ -72,7 +72,7 @@ def test_the_rows_set_aside_are_the_spoilt_ones(cases):
         spoilt, listed = set(case.truth["outliers"]), set(case.found.outliers)
         falsely += len(listed - spoilt)
         missed = np.isin(case.campaign.rows, sorted(spoilt - listed))
-        predicted, _ = case.found.model.predict(case.campaign)
+        predicted, _ = case.found.model.prediction(case.campaign)[:2]
         distance = np.linalg.norm(case.campaign.position - predicted, axis=1)
         assert (distance[missed] < 10.0 * NOISE).all()
     assert sum(len(c.truth["outliers"]) for c in cases) > 10
@@ -129,7 +129,7 @@ def test_shrinkage_on_held_out_rows_is_that_on_fresh_samples(cases):
         kept = ~np.isin(case.campaign.rows, case.found.outliers)
         nominal = replace(case.found.model, effects=(), needs=(), frames=register(case.campaign, kept))
         square = [
-            ((model.predict(case.fresh)[0] - case.place) ** 2).sum(axis=1).mean() + 3.0 * NOISE**2
+            ((model.prediction(case.fresh)[0] - case.place) ** 2).sum(axis=1).mean() + 3.0 * NOISE**2
             for model in (nominal, case.found.model)
         ]
         real = 1.0 - square[1] / square[0]
@@ -168,7 +168,7 @@ def test_figures_are_consistent(cases):
         fitted = observe(case.campaign, register(case.campaign, kept)).gap[kept]
         assert gap.rms_before == pytest.approx(np.sqrt((fitted**2).sum(axis=1).mean()), rel=1e-9)
         assert gap.rms_after == pytest.approx(np.sqrt((found.rows.remainder[kept] ** 2).sum(axis=1).mean()))
-        predicted, _ = found.model.predict(case.campaign)
+        predicted, _ = found.model.prediction(case.campaign)[:2]
         apart = np.linalg.norm(case.campaign.position - predicted, axis=1)
         np.testing.assert_allclose(apart, np.linalg.norm(found.rows.remainder, axis=1), rtol=1e-6, atol=1e-12)
 

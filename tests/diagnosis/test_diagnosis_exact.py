@@ -66,7 +66,7 @@ def test_large_effects_are_corrected_to_the_nanometre(arm, sizes):
     assert found.gap.rms_before > 1e-4
     assert found.gap.rms_after < 1e-8
     assert found.gap.held_out.rms_before > 1e-4
-    assert np.abs(found.model.predict(fresh)[0] - place).max() < 1e-7
+    assert np.abs(found.model.prediction(fresh)[0] - place).max() < 1e-7
     assert found.outliers == ()
     assert not found.unexplained.flagged
 
@@ -77,7 +77,7 @@ def test_large_effects_are_corrected_in_poses_too(rv_m2):
     assert found.gap.rms_after < 3e-9
     assert found.gap.orientation_before > 1e-3
     assert found.gap.orientation_after < 3e-9
-    assert np.abs(found.model.predict(fresh)[0] - place).max() < 1e-7
+    assert np.abs(found.model.prediction(fresh)[0] - place).max() < 1e-7
 
 
 @pytest.mark.slow

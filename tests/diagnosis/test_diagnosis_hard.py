@@ -251,7 +251,7 @@ def test_a_fit_that_runs_away_is_not_delivered(campaign, monkeypatch):
     assert found.finding("joint_offset").needs == ("a fit that settles",)
     assert any("did not settle" in told and "joint_offset" in told for told in found.warnings)
     # the model that is saved leaves what is told: what registration leaves
-    left = np.linalg.norm(found.model.predict(campaign)[0] - campaign.position, axis=1)
+    left = np.linalg.norm(found.model.prediction(campaign)[0] - campaign.position, axis=1)
     assert np.sqrt((left**2).mean()) == pytest.approx(found.gap.rms_after, rel=1e-6)
     assert found.gap.held_out.rms_after == pytest.approx(found.gap.rms_after, rel=0.5)
 
@@ -261,7 +261,7 @@ def test_large_errors_are_told_of_the_model_that_is_saved(rv_m2):
     q = simulate(rv_m2, samples=60, seed=4)[0]
     spoilt = replace(q, q=q.q + np.radians([0.0, 10.0, -12.0, 9.0, 0.0]))
     found = diagnose(spoilt, only=["joint_offset", "joint_gain"])
-    left = np.linalg.norm(found.model.predict(spoilt)[0] - spoilt.position, axis=1)
+    left = np.linalg.norm(found.model.prediction(spoilt)[0] - spoilt.position, axis=1)
     kept = ~found.rows.outliers
     assert np.sqrt((left[kept] ** 2).mean()) == pytest.approx(found.gap.rms_after, rel=1e-6)
     assert found.gap.rms_after < 3.0 * found.gap.held_out.rms_after

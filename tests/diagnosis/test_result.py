@@ -34,6 +34,12 @@ class Parrot:
     def explain_figure(self, explained):
         return f"figure of {explained.effect}"
 
+    def html(self, diagnosis):
+        return f"<html>{diagnosis.campaign}</html>"
+
+    def overview(self, diagnosis):
+        return f"drawing of {diagnosis.campaign}"
+
 
 @pytest.fixture
 def nobody(monkeypatch):
@@ -41,7 +47,14 @@ def nobody(monkeypatch):
 
 
 def test_without_a_renderer_it_says_what_to_do(hall, nobody):
-    for ask in (with_summary, str, lambda d: d._repr_html_(), lambda d: d.explain("backlash")):
+    for ask in (
+        with_summary,
+        str,
+        lambda d: d._repr_html_(),
+        lambda d: d.to_html(),
+        lambda d: d.plot(),
+        lambda d: d.explain("backlash"),
+    ):
         with pytest.raises(RuntimeError, match="import thermal_robot, or call register_renderer"):
             ask(hall)
     assert "backlash" in repr(hall)
@@ -58,6 +71,8 @@ def test_whoever_was_named_last_is_asked(hall, nobody):
     assert (said.summary, said.advice) == (f"headline of {hall.campaign}", f"advice for {hall.campaign}")
     assert str(hall) == f"text of {hall.campaign}"
     assert hall._repr_html_() == f"<p>{hall.campaign}</p>"
+    assert hall.to_html() == f"<html>{hall.campaign}</html>"
+    assert hall.plot() == f"drawing of {hall.campaign}"
     assert hall.explain("backlash") == "figure of backlash"
     register_renderer(Other())
     assert with_summary(hall).summary == "other"
@@ -67,6 +82,7 @@ def test_whoever_was_named_last_is_asked(hall, nobody):
 def test_json_holds_all_and_nothing_that_json_cannot(hall, tmp_path):
     hall.to_json(tmp_path / "diagnosis.json")
     text = (tmp_path / "diagnosis.json").read_text(encoding="utf-8")
+    assert hall.to_json() == text
     again = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
     assert again == hall.to_dict()
     jsonschema.validate(again, schema())

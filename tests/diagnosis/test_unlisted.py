@@ -75,7 +75,7 @@ def test_a_law_is_named_with_its_place_and_predicts_to_less_than_the_noise(found
     _, _, diagnosis, fresh, true = found[name]
     diagnosis.model.save(tmp_path / "model.json")
     for model in (diagnosis.model, CorrectedModel.load(tmp_path / "model.json")):
-        left = model.predict(fresh)[0] - true
+        left = model.prediction(fresh)[0] - true
         assert np.sqrt((left**2).mean()) < NOISE
     jsonschema.validate(json.loads(json.dumps(diagnosis.to_dict())), schema())
 
@@ -148,7 +148,7 @@ def test_a_wheel_on_the_motor_is_found_where_its_effect_is_not_in_the_library(rv
     # beyond the range that was measured a wave is no longer claimed
     inside = (fresh.q[:, 1] > data.q[:, 1].min()) & (fresh.q[:, 1] < data.q[:, 1].max())
     assert 0.9 < inside.mean() < 1.0
-    assert np.abs(found.model.predict(fresh)[0] - true)[inside].max() < 25e-6
+    assert np.abs(found.model.prediction(fresh)[0] - true)[inside].max() < 25e-6
 
 
 def test_what_a_law_follows_does_not_depend_on_the_law(rv_m2):
@@ -171,7 +171,7 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
         error[:, 1] = 3e-3 * np.cos(q) - 1.4e-3 * np.sin(q) - 7e-4 * np.cos(2 * q) - 2e-4 * np.sin(2 * q)
         found, true = diagnose(erring(plain, seed, joint=error)), erring(plain, seed, 0.0, joint=error).position
         assert not found.unexplained.flagged
-        assert np.sqrt(((found.model.predict(plain)[0] - true) ** 2).mean()) < 0.5 * NOISE
+        assert np.sqrt(((found.model.prediction(plain)[0] - true) ** 2).mean()) < 0.5 * NOISE
         names.append(found.verdict)
     # where the parabola is lost in the noise a zero and a gain say the same with fewer numbers
     assert names.count(("transmission_error",)) >= 6, names

@@ -75,7 +75,7 @@ def test_an_effect_of_ones_own_is_found_with_its_values_and_its_model_needs_its_
     assert plain["verdict"]["effects"] == ["joint_sag"]
     assert (plain["effects"][0]["name"], plain["effects"][0]["status"]) == ("joint_sag", "found")
     assert found.model.needs == ("speed",)
-    assert np.sqrt(((found.model.predict(data)[0] - data.position) ** 2).mean()) < 1.1 * NOISE
+    assert np.sqrt(((found.model.prediction(data)[0] - data.position) ** 2).mean()) < 1.1 * NOISE
     bare = data.drop_covariate("speed")
     with pytest.raises(CampaignError) as refused:
         found.model.predict(bare)

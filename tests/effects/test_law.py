@@ -316,7 +316,7 @@ def test_a_law_is_kept_whole_by_a_model_a_file_rows_taken_away_and_its_own_range
     model.save(tmp_path / "model.json")
     again = CorrectedModel.load(tmp_path / "model.json")
     assert again.effects[0][0] == law
-    np.testing.assert_array_equal(again.predict(campaign)[0], model.predict(campaign)[0])
+    np.testing.assert_array_equal(again.prediction(campaign)[0], model.prediction(campaign)[0])
     made = {}
     exec(text := law.to_source(values, "slipping_belt"), made)
     named = made["SlippingBelt"]()

@@ -41,7 +41,7 @@ def fresh(found, folder):
     found.model.save(folder / "model.json")
     model = CorrectedModel.load(folder / "model.json")
     true = np.genfromtxt(test, delimiter=",", names=True)
-    miss = 1e3 * model.predict(model.samples(test))[0] - np.column_stack([true[c] for c in "xyz"])
+    miss = 1e3 * model.prediction(model.samples(test))[0] - np.column_stack([true[c] for c in "xyz"])
     rms = np.sqrt((miss**2).sum(axis=1).mean())
     print(f"ur5_jacobi: {rms:.4f} mm on test.csv")
     return rms

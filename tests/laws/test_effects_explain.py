@@ -39,14 +39,14 @@ def test_an_effect_explains_what_it_made_and_is_saved_whole(arm, made, tmp_path)
     assert list(found.verdict) == effects
     assert not found.unexplained.flagged
     assert found.gap.held_out.rms_after < 1.15 * np.sqrt(3.0) * NOISE
-    predicted, _ = found.model.predict(fresh)
+    predicted, _ = found.model.prediction(fresh)[:2]
     assert np.sqrt(((predicted - place) ** 2).mean()) < 0.5 * NOISE
     found.model.save(tmp_path / "model.json")
     again = CorrectedModel.load(tmp_path / "model.json")
     assert again.effects[0][0] == found.model.effects[0][0]
-    np.testing.assert_array_equal(again.predict(fresh)[0], predicted)
+    np.testing.assert_array_equal(again.prediction(fresh)[0], predicted)
     # a row knows nothing of the rows beside it
-    np.testing.assert_allclose(again.predict(fresh.take([7]))[0][0], predicted[7], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(again.prediction(fresh.take([7]))[0][0], predicted[7], rtol=0, atol=1e-13)
 
 
 def test_backlash_is_named_where_only_the_side_counts():
@@ -73,7 +73,7 @@ def test_weights_that_nobody_wrote_down_are_free(name, tmp_path):
     effect = found.model.effects[0][0]
     assert effect.joints
     fresh = replace(fresh, robot=bare)
-    predicted = found.model.predict(fresh)[0]
+    predicted = found.model.prediction(fresh)[0]
     assert np.sqrt(((predicted - place) ** 2).mean()) < 1.0 * NOISE
     found.model.save(tmp_path / "model.json")
-    np.testing.assert_array_equal(CorrectedModel.load(tmp_path / "model.json").predict(fresh)[0], predicted)
+    np.testing.assert_array_equal(CorrectedModel.load(tmp_path / "model.json").prediction(fresh)[0], predicted)

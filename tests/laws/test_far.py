@@ -58,7 +58,7 @@ def left_far(robot, seed):
     near, away = campaign.take(np.flatnonzero(~far)), campaign.take(np.flatnonzero(far))
     found = tr.diagnose(near, only="joint_offset")
     plain = replace(found.model, effects=(), needs=(), spread=None, frames=found.fit.nominal.frames)
-    off = [model.predict(away)[0] - away.position for model in (plain, found.model)]
+    off = [model.prediction(away)[0] - away.position for model in (plain, found.model)]
     return found.verdict, *(float(np.sqrt((d**2).sum(axis=1).mean())) for d in off)
 
 

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from compared import diagnosed, moved
+from lxml.html import document_fromstring
 from report.cases import HARD, case, rows, with_first
 from report.fleets import EMPTY, SUMMARY
 from wear_cases import by_hand
@@ -165,6 +166,27 @@ def test_the_page_is_a_document_with_every_section_that_has_content(written):
     assert shown.index("</style>") < shown.index("<h2>") < shown.index("</main>")
     assert f"{case('found').advice} to tell apart: thermal_elongation, drift" in Reader(shown).words
     assert headings(written(html, "nothing")) == ["How far", "Which", "Where", "Unexplained"]
+
+
+def test_cells_of_a_fragment_bring_their_style_along(written):
+    """JupyterLab's and VS Code's style sheets align cells right, stripe rows, and fix the widths of columns."""
+    piece = document_fromstring(written(fragment, "found"))
+    styles = {
+        tag: [dict(part.split(": ") for part in one.get("style").split("; ")) for one in piece.iter(tag)]
+        for tag in ("table", "tr", "th", "td")
+    }
+    assert all(len(found) > 1 for found in styles.values())
+    assert {style["table-layout"] for style in styles["table"]} == {"auto"}
+    assert {style["background"] for tag in ("tr", "th", "td") for style in styles[tag]} == {"none"}
+    for tag in ("th", "td"):
+        for one, style in zip(piece.iter(tag), styles[tag], strict=True):
+            assert style["text-align"] == ("right" if one.get("class") == "tr-n" else "left")
+    assert {style["width"] for style in styles["table"]} == {
+        "100%",
+        "auto",
+    }  # those within a cell are as wide as need be
+    page = document_fromstring(written(html, "found"))
+    assert not [one for tag in styles for one in page.iter(tag) if one.get("style")]
 
 
 def test_a_notebook_shows_the_fragment(written):

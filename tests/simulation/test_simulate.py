@@ -207,7 +207,7 @@ def test_effects_together_are_the_model_that_has_them(rv_m2):
         (known["instrument_scale"], np.array([2e-5])),
     )
     model = CorrectedModel(rv_m2, found.settings, Frames(base, tool), effects, "pose", tuple(found.covariates))
-    position, orientation = model.predict(found)
+    position, orientation = model.prediction(found)[:2]
     np.testing.assert_array_equal(found.position, position)
     np.testing.assert_array_equal(found.orientation, orientation)
     again = simulate(rv_m2, model.effects, base=base, tool=tool, measures="pose")

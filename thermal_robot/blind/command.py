@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="F", help="write the score as JSON ('-' prints it instead of the text)")
     parser.add_argument("--report", metavar="F.html", help="write a page with the score")
     parser.add_argument("--markdown", action="store_true", help="print the tables of the README instead of the text")
-    parser.set_defaults(run=run, writes=("json", "report"))
+    parser.set_defaults(run=run, writes=("json", "report"), forms={"json": "json", "report": "page"})
 
 
 def run(options: argparse.Namespace) -> None:

@@ -72,7 +72,7 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
     columns, gap, left = columns[kept], given.gap[kept], found.rows.remainder[kept]
     noise = np.maximum(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))), 1e-9)
     nominal, base = asked.predicted_position, frames.base[:3, :3]
-    predicted = {"+".join(effect.name for effect, _ in model.effects): model.predict(samples)[0]}
+    predicted = {"+".join(effect.name for effect, _ in model.effects): model.prediction(samples)[0]}
     for size in range(len(slices)):
         for chosen in combinations(range(len(slices)), size):
             used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
@@ -176,7 +176,7 @@ def answer(request: dict[str, Any]) -> Plain:
             # with the model as a user would have it: saved and loaded
             found.model.save(folder / MODEL)
             model = CorrectedModel.load(folder / MODEL)
-            position, _ = model.predict(model.samples(folder / FRESH))
+            position, _ = model.prediction(model.samples(folder / FRESH))[:2]
             if not np.all(np.isfinite(position)):
                 raise ValueError("a predicted position is not a number")
             reply["predicted"] = position.round(9).tolist()  # to a nanometre

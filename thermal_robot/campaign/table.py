@@ -183,9 +183,22 @@ MOST_COLUMNS = 1000  # Logs of two arms with every quantity that a controller kn
 PARQUET = (".parquet", ".pq")  # Endings of the names of Parquet files
 WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
 """Endings of the names of workbooks, and what pandas reads them with."""
+MATLAB = ".mat"
+"""Ending of MATLAB's files, of which one matrix is a table without names."""
+NO_TABLES = {
+    **dict.fromkeys((".json", ".yaml", ".yml", ".xml", ".urdf"), "text of another kind"),
+    **dict.fromkeys((".bag", ".db3", ".mcap"), "a recording"),
+    **dict.fromkeys((".npy", ".npz", ".pkl", ".h5", ".hdf5"), "a file of arrays"),
+    **dict.fromkeys((".src", ".ls", ".mod", ".modx", ".tp"), "a robot's program"),
+}
+"""Endings of files that people have beside a table and that hold none, and what they are."""
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
+TABLES = {".csv": "", **dict.fromkeys(PARQUET, "pyarrow"), ".xlsx": "openpyxl", ".ods": "odf"}
+"""Endings of tables that are written, and the module that writes each."""
+TYPED = tuple(ending for ending, module in TABLES.items() if module)
+"""Those whose cells have a type."""
 _ONE_ROW = "one row per measurement"
 SPACE = " "  # A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye
 
@@ -206,7 +219,7 @@ PLAIN = Layout()  # A header and rows, nothing else
 
 
 def read_table(path: Path, layout: Layout = PLAIN) -> Table:
-    """Read a CSV or, by its ending, a Parquet file or the first sheet of a workbook (.xlsx, .ods).
+    """Read a CSV or, by its ending, a Parquet file, the first sheet of a workbook (.xlsx, .ods) or a matrix (.mat).
 
     Columns of a CSV file may be separated by commas, semicolons, tabs or blanks, with decimal commas where the
     separator is not a comma; a byte-order mark, Windows line ends and blank lines do no harm.
@@ -230,6 +243,11 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
         raise CampaignError(file, problem, expected="the table of measurements")
     if path.stat().st_size > LARGEST_TABLE:
         raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
+    if what := NO_TABLES.get(path.suffix.lower()):
+        expected = "CSV, Parquet, .xlsx, .ods or .mat; `thermal-robot import --help` lists what else is read"
+        raise CampaignError(file, f"is {what} by its ending, and no table", found=path.suffix, expected=expected)
+    if path.suffix.lower() == MATLAB:
+        return _read_matlab(path)
     if path.suffix.lower() in PARQUET:
         return _read_parquet(path)
     if path.suffix.lower() in WORKBOOKS:
@@ -244,6 +262,14 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
             return replace(_read_text(path, layout, "cp1252"), warnings=(odd,))
     except OSError as error:
         raise CampaignError(file, f"cannot be read: {error.strerror}") from error
+
+
+def without_library(file: str, ending: str) -> CampaignError:
+    """Error of a file whose ending needs a library that is not installed."""
+    if ending in PARQUET:
+        return CampaignError(file, NO_PARQUET, expected=WITH_PARQUET)
+    problem = f"workbooks need {WORKBOOKS[ending]}, which is not installed"
+    return CampaignError(file, problem, expected=WITH_EXCEL)
 
 
 def _encoding(path: Path) -> str:
@@ -324,7 +350,7 @@ def _read_parquet(path: Path) -> Table:
         _require_size(file, held.num_rows, held.num_columns)
         frame = pd.read_parquet(path)
     except ImportError as error:
-        raise CampaignError(file, NO_PARQUET, expected=WITH_PARQUET) from error
+        raise without_library(file, PARQUET[0]) from error
     except CampaignError:
         raise
     except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
@@ -343,8 +369,7 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
     try:
         sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
     except ImportError as error:
-        problem = f"workbooks need {WORKBOOKS[path.suffix.lower()]}, which is not installed"
-        raise CampaignError(file, problem, expected=WITH_EXCEL) from error
+        raise without_library(file, path.suffix.lower()) from error
     except Exception as error:  # each reader raises its own
         raise CampaignError(file, f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
     first, frame = next(iter(sheets.items()))
@@ -357,6 +382,33 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
     )
     more = f"{file} has {len(sheets)} sheets: the first, {first!r}, was read"
     return replace(_table(file, kept, layout.header), warnings=(more,) if len(sheets) > 1 else ())
+
+
+def _read_matlab(path: Path) -> Table:
+    """Only matrix of a MATLAB file; columns are called 1, 2, 3 …, rows are counted from 1 as MATLAB does."""
+    import pandas as pd
+    from scipy.io import loadmat
+
+    file = str(path)
+    try:
+        held = loadmat(path)
+    except NotImplementedError as error:
+        again = "the matrix saved with -v7, or as CSV"
+        raise CampaignError(file, "is a MATLAB file of version 7.3", expected=again) from error
+    except Exception as error:  # the reader raises whatever it stumbles over
+        raise CampaignError(file, f"cannot be read as a MATLAB file ({' '.join(str(error).split())})") from error
+    matrices = {
+        name: value
+        for name, value in held.items()
+        if isinstance(value, np.ndarray) and value.ndim == 2 and value.size > 1 and value.dtype.kind in "fiu"
+    }
+    if len(matrices) != 1:
+        shapes = ", ".join(f"{name} ({' x '.join(map(str, value.shape))})" for name, value in matrices.items())
+        raise CampaignError(file, "does not hold one matrix of numbers", found=shapes or "none", expected="one")
+    values = next(iter(matrices.values()))
+    _require_size(file, *values.shape)
+    columns = [str(k) for k in range(1, values.shape[1] + 1)]
+    return replace(table_from_frame(pd.DataFrame(values, columns=columns), file, first_row=1), header=None)
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:

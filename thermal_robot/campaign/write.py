@@ -18,7 +18,7 @@ from thermal_robot.campaign.campaign import Campaign, table_columns
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
 from thermal_robot.campaign.settings import facts_in
-from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
+from thermal_robot.campaign.table import PARQUET, TABLES, WORKBOOKS, without_library
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError, require
@@ -217,21 +217,26 @@ def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[s
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
-    """Write the result of :func:`with_prediction` as CSV with all digits or, by its ending, as Parquet.
+    """Write the result of :func:`with_prediction` as CSV with all digits or, by its ending, as Parquet or a workbook.
 
     Raises
     ------
     CampaignError
-        A file that cannot be written, or Parquet without pyarrow.
+        An ending that no table has, a file that cannot be written, or a library that is missing.
     """
+    ending = Path(path).suffix.lower()
+    if ending and ending not in TABLES:
+        raise CampaignError(str(path), "is no table by its ending", found=ending, expected=", ".join(TABLES))
     try:
         with _writing(Path(path)), whole(path) as place:
-            if Path(path).suffix.lower() in PARQUET:
+            if ending in PARQUET:
                 predictions.to_parquet(place, index=False)
+            elif ending in WORKBOOKS:
+                predictions.to_excel(place, index=False)
             else:
                 predictions.to_csv(place, index=False, lineterminator="\n")
     except ImportError as error:
-        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
+        raise without_library(str(path), ending) from error
 
 
 def _document(campaign: Campaign) -> dict[str, Any]:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import argparse
 import sys
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from thermal_robot.campaign import describe, write_predictions
+from thermal_robot.campaign import Campaign, describe, write_predictions
+from thermal_robot.campaign.description import aligned
 from thermal_robot.commands.shared import as_json, as_page, deliver, read, read_from, tell
 from thermal_robot.console import stages
 from thermal_robot.datasets import demo_campaign, demo_directory
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, EstimationError
 from thermal_robot.files import require_free, write_one
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis import Diagnosis
+    from thermal_robot.effects import Effect
     from thermal_robot.motion.result import MotionDiagnosis
 
 
@@ -26,7 +29,7 @@ def check(options: argparse.Namespace) -> None:
     from thermal_robot.motion.read import declares_motion
 
     if not declares_motion(Path(options.campaign)):
-        return tell(options, describe(read(options)))
+        return tell(options, _foretold(read(options)))
     from thermal_robot.motion import find_faults, read_motion
     from thermal_robot.motion.description import text
 
@@ -34,22 +37,50 @@ def check(options: argparse.Namespace) -> None:
     return tell(options, text(log, find_faults(log)))
 
 
-def effects(options: argparse.Namespace) -> None:
-    """Run ``effects``: list the effects, with the columns that a campaign lacks for each."""
+def _foretold(campaign: Campaign) -> str:
+    """Describe a campaign, with what a diagnosis would say of it before anything is fitted."""
+    from thermal_robot.diagnosis.data_checks import counted
+    from thermal_robot.inference.fit import require_enough
+
+    if not campaign.measured or not campaign.samples:
+        return describe(campaign)
+    kept, notes = counted(campaign)
+    said = [("rows that count", f"{kept.samples} of {campaign.samples}")]
+    try:
+        require_enough(kept)
+    except EstimationError as error:
+        said.append(("none is possible", str(error)))
+    lacking: dict[str, list[str]] = {}
+    for effect, asked in _needs(kept):
+        if asked:
+            lacking.setdefault(asked, []).append(effect.name)
+    said += [("not testable", f"{', '.join(names)}: add {asked}") for asked, names in lacking.items()]
+    block = "\n".join(["What a diagnosis would say first", *aligned(iter(said))])
+    return f"{describe(replace(campaign, warnings=(*campaign.warnings, *notes)))}\n\n{block}"
+
+
+def _needs(campaign: Campaign) -> Iterator[tuple[Effect, str]]:
+    """Yield every known effect, and what the campaign lacks for it, in words; empty where nothing."""
     from thermal_robot.diagnosis import Finding
     from thermal_robot.effects import gate, library
     from thermal_robot.effects.catalogue import random_effects
     from thermal_robot.observations import observe
     from thermal_robot.report.words import needs
 
+    observations = observe(campaign)
+    for effect in (*library().values(), *random_effects()):
+        missing = gate.missing(effect, observations)
+        yield effect, needs(Finding(effect.name, "not_testable", needs=missing), campaign.robot.joint_names)
+
+
+def effects(options: argparse.Namespace) -> None:
+    """Run ``effects``: list the effects, with the columns that a campaign lacks for each."""
     bare = options.campaign is None  # poses and nothing else
     campaign = replace(demo_campaign(), covariates={}, labels={}) if bare else read(options)
-    known, observations = (*library().values(), *random_effects()), observe(campaign)
-    wide = max(len(effect.name) for effect in known)
+    known = [*_needs(campaign)]
+    wide = max(len(effect.name) for effect, _ in known)
     print("Effects that are considered, and what each needs beside measured poses:" if bare else campaign.name)
-    for effect in known:
-        missing = gate.missing(effect, observations)
-        asked = needs(Finding(effect.name, "not_testable", needs=missing), campaign.robot.joint_names)
+    for effect, asked in known:
         print(f"  {effect.name:{wide}}  {effect.title}{f'; needs {asked}' if asked else ''}")
 
 

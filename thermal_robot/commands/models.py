@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thermal_robot.campaign import Campaign, read_table, write_predictions
-from thermal_robot.campaign.table import PARQUET
+from thermal_robot.campaign.table import TYPED
 from thermal_robot.commands.robot_files import OUTPUTS, require_of_use, robot_files
 from thermal_robot.commands.shared import Output, deliver
 from thermal_robot.console import note
@@ -63,7 +63,7 @@ def _table(
     read = read_table(Path(file))
     samples = model.samples(read)
     _tell_unseen(options, model, samples, Path(file).name)
-    own = read.frame(numbers=Path(options.output).suffix.lower() in PARQUET)
+    own = read.frame(numbers=Path(options.output).suffix.lower() in TYPED)
     return options.output, partial(write_predictions, predictions=filled(own, samples))
 
 

@@ -25,11 +25,13 @@ _LAST_PORT = 65535
 
 
 class Option(NamedTuple):
-    """Arguments of ``add_argument``, and whether the option is an input or output file that may be ``-``."""
+    """Arguments of ``add_argument``, whether it is an input or output file that may be ``-``, and which it writes."""
 
     names: tuple[str, ...]
     how: dict[str, Any]
     stream: str = ""
+    form: str = ""
+    """One of :data:`~thermal_robot.commands.endings.FORMS`; empty for what is not written."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +69,10 @@ class Command:
             self.define(parser)
             return
         parser.epilog = self.epilog
-        files = [(parser.add_argument(*o.names, **o.how).dest, o.stream) for o in self.options]
-        reads, writes = ([name for name, stream in files if stream == way] for way in ("in", "out"))
-        parser.set_defaults(run=self._run, prepare=self.prepare, reads=reads, writes=writes, **self.fixed)
+        files = [(parser.add_argument(*o.names, **o.how).dest, o) for o in self.options]
+        reads, writes = ([name for name, option in files if option.stream == way] for way in ("in", "out"))
+        forms = {name: option.form for name, option in files if option.form}
+        parser.set_defaults(run=self._run, prepare=self.prepare, reads=reads, writes=writes, forms=forms, **self.fixed)
 
     def _run(self, options: argparse.Namespace) -> None:
         module, _, function = self.run.partition(":")
@@ -118,8 +121,12 @@ def _file(name: str, text: str, **how: Any) -> Option:
     return Option((name,), {"help": text, **how}, "in")
 
 
-def _output(metavar: str, *names_and_help: str, **how: Any) -> Option:
-    return _value(metavar, *names_and_help, **how)._replace(stream="out")
+def _output(form: str, metavar: str, *names_and_help: str, **how: Any) -> Option:
+    return _value(metavar, *names_and_help, **how)._replace(stream="out", form=form)
+
+
+def _folder(form: str, metavar: str, *names_and_help: str, **how: Any) -> Option:
+    return _value(metavar, *names_and_help, **how)._replace(form=form)
 
 
 def _flag(name: str, text: str) -> Option:
@@ -127,7 +134,7 @@ def _flag(name: str, text: str) -> Option:
 
 
 def _json(what: str) -> Option:
-    return _output("F", "--json", f"write the {what} as JSON ('-' prints it instead of the text)")
+    return _output("json", "F.json", "--json", f"write the {what} as JSON ('-' prints it instead of the text)")
 
 
 def _triple(metavar: str, name: str, text: str, *default: float) -> Option:
@@ -141,11 +148,12 @@ def _effects(name: str, text: str, **how: Any) -> Option:
 _NAMED = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
 _CAMPAIGN = _file("campaign", _NAMED)
 _MODEL = _file("model", "file that `diagnose --model` wrote, or - for standard input")
-_REPORT = _output("F.html", "--report", "write a page with figures ('-' prints it)")
+_REPORT = _output("page", "F.html", "--report", "write a page with figures ('-' prints it)")
 _CHOICE = (_effects("--without", "leave effects out", default=[]), _effects("--only", "consider these only"))
 _ROBOT = "its file, or a robot that comes along, as in campaign.toml"
 _ROOT = _value("LINK", "--root", "where the chain starts; the root of the URDF where left out")
 _TARGET = "the link that carries the target"
+_TABLE = "CSV, Parquet, .xlsx or .ods by its ending"
 ALL_FORMATS: dict[str, Format | MotionFormat] = {**FORMATS, **MOTION_FORMATS}
 _WIDE = max(map(len, ALL_FORMATS))
 _ALL = {"only": None, "without": ()}
@@ -155,7 +163,7 @@ COMMANDS = {
         "diagnose a campaign that comes with the package, and draw it",
         "",
         "campaigns:demo",
-        [_output("F.html", "--report", "page to draw (default: %(default)s)", default="demo.html")],
+        [_output("page", "F.html", "--report", "page to draw (default: %(default)s)", default="demo.html")],
         fixed=_ALL,
     ),
     "plan": Command(
@@ -164,7 +172,7 @@ COMMANDS = {
         "making:plan",
         [
             _value("URDF", "robot", _ROBOT),
-            _value("DIR", "-o", "--output", "folder of the campaign to measure; a table if F.csv"),
+            _folder("plan", "DIR", "-o", "--output", "folder of the campaign to measure; a table if F.csv"),
             _value("LINK", "--tool", _TARGET, default=""),
             _ROOT,
             _value("N", "--rows", "of the campaign, repeats included (60; after a crash 40)", type=int),
@@ -203,9 +211,9 @@ COMMANDS = {
             _file("campaign", _NAMED, nargs="?"),
             _json("diagnosis"),
             _REPORT,
-            _output("F", "--model", "save the corrected model for `predict` ('-' prints it)"),
-            _output("F.xml", "--mjcf", "of a log of motion: write your MJCF with the causes in it"),
-            _output("F.urdf", "--urdf", "of a log of motion: write your URDF with the causes in it"),
+            _output("model", "F.json", "--model", "save the corrected model for `predict` ('-' prints it)"),
+            _output("mjcf", "F.xml", "--mjcf", "of a log of motion: write your MJCF with the causes in it"),
+            _output("urdf", "F.urdf", "--urdf", "of a log of motion: write your URDF with the causes in it"),
             _value("F.xml", "--from-mjcf", "your own MJCF, where the log names a URDF"),
             _value("LOG", "--unseen", "another motion.toml: how far MuJoCo's own rollout shrinks its gap"),
             _effects("--without", "leave effects out; `thermal-robot effects` lists their names", default=[]),
@@ -256,9 +264,7 @@ COMMANDS = {
         [
             _MODEL,
             _file("samples", "table with the campaign's columns and units, or - for standard input (CSV)"),
-            _output(
-                "F", "-o", "--output", "table to write, Parquet by its ending ('-' prints it as CSV)", required=True
-            ),
+            _output("table", "F", "-o", "--output", f"table to write, {_TABLE} ('-': CSV)", required=True),
             _flag("--noise", "count the instrument's noise in std.x, std.y, std.z"),
         ],
     ),
@@ -269,18 +275,18 @@ COMMANDS = {
         [
             _MODEL,
             _file("poses", "table of nominal joint positions and conditions, as the campaign's; or - (CSV)", nargs="?"),
-            _output("F", "-o", "--output", "table to write, with commands in the place of joint positions ('-': CSV)"),
-            _output("F", "--urdf", "write the calibrated robot as a URDF ('-' prints it)"),
-            _output("F.xml", "--mjcf", "write it as an MJCF for MuJoCo; needs the extra `blind`"),
+            _output("table", "F", "-o", "--output", f"table of commands to write, {_TABLE} ('-': CSV)"),
+            _output("urdf", "F.urdf", "--urdf", "write the calibrated robot as a URDF ('-' prints it)"),
+            _output("mjcf", "F.xml", "--mjcf", "write it as an MJCF for MuJoCo; needs the extra `blind`"),
             _file("--from-mjcf", "MJCF of the nominal robot to write --mjcf from", metavar="F.xml"),
-            _output("F.csv", "--dh", "write its parameters of Denavit and Hartenberg"),
-            _output("F.yaml", "--ur-kinematics", "write it as Universal Robots' kinematics.yaml"),
+            _output("csv", "F.csv", "--dh", "write its parameters of Denavit and Hartenberg"),
+            _output("yaml", "F.yaml", "--ur-kinematics", "write it as Universal Robots' kinematics.yaml"),
             _flag("--modified", "those of Craig's modified convention"),
-            _output("F.json", "--joints", "write the frames of its joints for a running simulator (MuJoCo, Isaac)"),
-            _output("F.csv", "--offsets", "write what to add to the commands of each joint's zero"),
-            _output("F.yaml", "--pal", "write zeros as master_calibration.yaml of PAL Robotics (TIAGo)"),
+            _output("json", "F.json", "--joints", "write the frames of its joints for a simulator (MuJoCo, Isaac)"),
+            _output("csv", "F.csv", "--offsets", "write what to add to the commands of each joint's zero"),
+            _output("yaml", "F.yaml", "--pal", "write zeros as master_calibration.yaml of PAL Robotics (TIAGo)"),
             _file("--from-pal", "the robot's master_calibration.yaml, to which they are added", metavar="F.yaml"),
-            _output("F.json", "--lerobot", "write zeros as homing offsets of LeRobot"),
+            _output("json", "F.json", "--lerobot", "write zeros as homing offsets of LeRobot"),
             _file("--from-lerobot", "the arm's calibration, to write --lerobot from", metavar="F.json"),
             _flag("--dynamixel", "its motors are Dynamixel's, not Feetech's"),
             _value("K", "--min-sigma", "leave out what is less than K standard deviations from zero (2)", type=float),
@@ -311,7 +317,7 @@ COMMANDS = {
         [
             _CAMPAIGN,
             _json("criteria"),
-            _output("F", "--csv", "write a table, one row a figure, in m and rad ('-' prints it)"),
+            _output("table", "F", "--csv", f"write a table, one row a figure, in m and rad, {_TABLE} ('-': CSV)"),
         ],
     ),
     "fleet": Command(
@@ -320,7 +326,7 @@ COMMANDS = {
         "several:fleet",
         [
             _value("FOLDER|LIST", "source", "every campaign.toml below it; or CSV or TOML with paths and labels"),
-            _value("DIR", "-o", "--out", "folder of table and page, made if need be", required=True),
+            _folder("folder", "DIR", "-o", "--out", "folder of table and page, made if need be", required=True),
             _value("NAME", "--labels", "what the levels of folders are, from the top", nargs="+", default=[]),
             _value("N", "--workers", "processes on this machine (default: one a core)", type=int),
             _value(
@@ -341,7 +347,7 @@ COMMANDS = {
         [
             _value("FORMAT", "format", "what the files are, see below", choices=ALL_FORMATS),
             _value("FILES", "files", "to read, as many as the format has", nargs="+"),
-            _value("DIR", "-o", "--output", "folder of the campaign, made if need be", required=True),
+            _folder("folder", "DIR", "-o", "--output", "folder of the campaign, made if need be", required=True),
             _value("URDF", "--robot", _ROBOT),
             _value("LINK", "--tool", _TARGET),
             _ROOT,
@@ -386,7 +392,7 @@ COMMANDS = {
             _value("COLUMN", "--by", "what tells the best places (required_warm)", default="required_warm"),
             _value("RULE", "--where", "what they must have, such as 'capability_warm>=1.33'", nargs="+", default=[]),
             _value("N", "--count", "of them (5)", type=int, default=5),
-            _output("F.png", "--figure", "draw the column of --by: contours of a plane, else points in space"),
+            _output("picture", "F.png", "--figure", "draw the column of --by: contours in a plane, else points"),
             _json("best places"),
             _flag("--replace", "begin anew where another map stands there"),
         ],

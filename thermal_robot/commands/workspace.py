@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import re
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.backend_bases import FigureCanvasBase
 
 from thermal_robot.commands.shared import Output, deliver
 from thermal_robot.console import counted
@@ -35,8 +33,6 @@ _SHOWN = (
 
 def run(options: argparse.Namespace) -> None:
     """Run ``map``: map the workspace, draw it, and print the best places."""
-    if options.figure:
-        _require_picture(options.figure)
     robot = load_robot(options.robot, options.tool, root_frame=options.root)
     within = dict(_rule(rule) for rule in options.where)
     with counted(options.loudness) as show:
@@ -50,14 +46,6 @@ def run(options: argparse.Namespace) -> None:
         outputs.append((options.figure, lambda path: figure.savefig(path, dpi=150)))
     shown = _text(found, robot, best, options.by)
     deliver(options, outputs, shown, shown.partition("\n")[0])
-
-
-def _require_picture(figure: str) -> None:
-    """Refuse a file ending that is no picture's, before anything is computed."""
-    known = FigureCanvasBase.get_supported_filetypes()
-    ending = Path(figure).suffix.lower().removeprefix(".")
-    if ending and ending not in known:
-        raise CampaignError(figure, "is no picture by its ending", found=f".{ending}", expected=", ".join(known))
 
 
 def _over(options: argparse.Namespace) -> Positions | Joints:

@@ -57,7 +57,7 @@ _WARMER = 1.0
 
 
 @dataclass(frozen=True)
-class Told:
+class FittedParameter:
     """One parameter of a model, in its own unit; its standard deviation is NaN where unknown."""
 
     effect: str
@@ -82,7 +82,7 @@ class Constant:
     """
 
     temperature: float
-    parameters: tuple[Told, ...]
+    parameters: tuple[FittedParameter, ...]
     held: NDArray[np.bool_]
     responses: Array
     joints: int
@@ -106,14 +106,14 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
     if not ABSOLUTE_ZERO <= degrees < np.inf:
         raise CampaignError("temperature", "no robot is so warm", found=f"{degrees:g}", expected="a number of °C")
     kinds = [rows_of_every_kind(model, warmth) for warmth in (None, degrees, degrees + _WARMER)]
-    told: list[Told] = []
+    told: list[FittedParameter] = []
     found: list[tuple[str, Array | None, Array | None]] = []
     grows = False
     std = _deviations(model)
     for effect, values in model.effects:
         for value, *read in zip(values, *(gate.checked(effect, each) for each in kinds), strict=True):
             first = read[0]
-            told.append(Told(effect.name, first.name, float(value), float(std[len(told)]), first.unit))
+            told.append(FittedParameter(effect.name, first.name, float(value), float(std[len(told)]), first.unit))
             always, now, warmer = (_one_for_all(model.robot, parameter) for parameter in read)
             follows = always is None and now is not None and warmer is not None and bool((now != warmer).any())
             grows |= follows
@@ -187,7 +187,7 @@ def _deviations(model: CorrectedModel) -> Array:
 
 def determined(
     model: CorrectedModel, min_sigma: float, temperature: float | None = None
-) -> tuple[CorrectedModel, tuple[Told, ...]]:
+) -> tuple[CorrectedModel, tuple[FittedParameter, ...]]:
     """Remove the constants that the data do not determine from a model.
 
     Parameters
@@ -203,7 +203,7 @@ def determined(
     -------
     CorrectedModel
         Model with these parameters at zero, and all others conditional on that.
-    tuple of Told
+    tuple of FittedParameter
         Removed parameters with their fitted values.
 
     Raises

@@ -20,7 +20,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -195,27 +195,25 @@ class CorrectedModel:
     spread: Spread | None = None
     files: tuple[FileGap, ...] = ()
 
-    @overload
-    def predict(self, samples: Campaign | str | Path) -> tuple[Array, Array | None]: ...
-    @overload
-    def predict(self, samples: pd.DataFrame) -> pd.DataFrame: ...
-    def predict(self, samples: Campaign | str | Path | pd.DataFrame) -> tuple[Array, Array | None] | pd.DataFrame:
-        """Predict the measurement.
+    def predict(
+        self,
+        samples: Campaign | str | Path | pd.DataFrame | ArrayLike,
+        conditions: Mapping[str, ArrayLike] | None = None,
+    ) -> pd.DataFrame:
+        """Predict the measurement: one data frame, whatever the samples are; :meth:`prediction` returns arrays in SI.
 
         Parameters
         ----------
         samples
-            Commands and conditions; measurements, if any, are ignored. A table, or the path of one, is read as by
-            :meth:`samples`.
+            Commands and conditions; measurements, if any, are ignored. A campaign; a table, or the path of one, read as
+            by :meth:`samples`; or an array (N, n) of joint positions, rad or m.
+        conditions
+            With an array: by column name, one value for all rows or (N,), SI: ``{"temperature": 24.0}``.
 
         Returns
         -------
-        position
-            (N, 3) in the measurement frame, m.
-        orientation
-            (N, 4) quaternions wxyz; ``None`` where the campaign measured positions only.
-
-        A data frame is answered by a data frame: see :meth:`predicted`.
+        pandas.DataFrame
+            The samples' own columns and the predicted ones, in the units of the campaign: see :meth:`predicted`.
 
         Raises
         ------
@@ -227,12 +225,27 @@ class CorrectedModel:
 
         Examples
         --------
-        >>> tr.diagnose(tr.demo_campaign()).model.predict(tr.demo_campaign())[0].shape
-        (120, 3)
+        >>> model, campaign = tr.diagnose(tr.demo_campaign()).model, tr.demo_campaign()
+        >>> model.predict(campaign)[["x", "y", "z", "std.x"]].shape
+        (120, 4)
+        >>> still = {**dict.fromkeys(model.needs, 0.0), "temperature": 24.0}
+        >>> model.predict([[0.1, 0.2, -0.3, 0.4, 0.5]], still)[["x", "y", "z"]].round(1).to_numpy().tolist()
+        [[-1518.3, -234.3, -590.4]]
         """
-        if isinstance(samples, (Campaign, str, os.PathLike)):
-            return self.prediction(samples)[:2]
-        return self.predicted(samples, self.prediction(samples))
+        given: Any = samples
+        if isinstance(samples, (np.ndarray, list, tuple)):
+            given = self.samples_at(samples, conditions)
+        elif conditions is not None:
+            expected = "an array of joint positions; a table has them in its columns"
+            raise CampaignError("predict(), conditions", "are of use with an array only", expected=expected)
+        if isinstance(given, (str, os.PathLike)):
+            given = read_table(Path(given))
+        rows = given if isinstance(given, Campaign) else self.samples(given)
+        if isinstance(given, Campaign):
+            given = rows.to_frame()
+        elif isinstance(given, Table):
+            given = given.frame(numbers=True)
+        return with_prediction(given, self.robot, *self.prediction(rows), rows.units)
 
     def predicted(self, samples: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
         """Return the samples with predicted columns, in the units of the campaign.

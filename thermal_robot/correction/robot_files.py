@@ -25,7 +25,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Units
 from thermal_robot.campaign.names import PER_LINK, split_name
 from thermal_robot.campaign.ur_kinematics import FIGURES, elements
-from thermal_robot.correction.constant import Told, constant, determined, fitted_alone
+from thermal_robot.correction.constant import FittedParameter, constant, determined, fitted_alone
 from thermal_robot.correction.holding import FORMATS, PLACEMENTS, expectation
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.effects import settings
@@ -85,9 +85,9 @@ class Calibrated:
     base: Array
     target: Array
     temperature: float | None
-    held: tuple[Told, ...]
-    undetermined: tuple[Told, ...]
-    kept: tuple[Told, ...]
+    held: tuple[FittedParameter, ...]
+    undetermined: tuple[FittedParameter, ...]
+    kept: tuple[FittedParameter, ...]
     min_sigma: float | None = None
     compared: Array | None = None
     beyond: str = ""
@@ -195,7 +195,7 @@ def calibrated(
     >>> print(warm.notes("urdf")[0])
     Calibrated by thermal_robot: the robot 'rv_m2' from 'base_link' to 'tool0' as it was measured, ...
     """
-    gone: tuple[Told, ...] = ()
+    gone: tuple[FittedParameter, ...] = ()
     if alone:
         min_sigma, temperature = None, None
     if min_sigma is not None:

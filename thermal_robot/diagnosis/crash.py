@@ -23,8 +23,8 @@ from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis import settings as chosen
-from thermal_robot.diagnosis.data_checks import as_counted, usable
-from thermal_robot.diagnosis.data_faults.misfit import unfit
+from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
+from thermal_robot.diagnosis.data_faults.misfit import mismatch
 from thermal_robot.diagnosis.diagnose import solvable
 from thermal_robot.diagnosis.values import Misfit, jsonable
 from thermal_robot.effects import Geometric, JointOffset, gate
@@ -34,7 +34,7 @@ from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.fit import Fit, fit_named
 from thermal_robot.inference.problem import Linear, gram, parameter_values
-from thermal_robot.teller import registered
+from thermal_robot.renderer import registered_renderer
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,10 @@ class Crash:
         """Plain values, SI, ready for JSON."""
         moved = [vars(one) for one in self.moved]
         plain = {name: value for name, value in vars(self).items() if name not in ("moved", "misfit")}
-        return dict(jsonable({**plain, "summary": registered().crash_headline(self), "moved": moved}))
+        return dict(jsonable({**plain, "summary": registered_renderer().crash_headline(self), "moved": moved}))
 
     def __str__(self) -> str:
-        return registered().crash_text(self)
+        return registered_renderer().crash_text(self)
 
 
 def after_crash(campaign: Campaign | str | Path, *, progress: Callable[[str], None] = lambda _: None) -> Crash:
@@ -161,10 +161,10 @@ def after_crash(campaign: Campaign | str | Path, *, progress: Callable[[str], No
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, _ = usable(campaign)
     with threadpool_limits(1), solvable(campaign):
-        misfit = unfit(campaign, progress)
+        misfit = mismatch(campaign, progress)
         if misfit is not None:
             return Crash(campaign.name, campaign.samples, "misfit", reach=campaign.reach, misfit=misfit)
-        return _weighed(fit_named(as_counted(campaign), [Geometric(), JointOffset()], progress))
+        return _weighed(fit_named(with_corrected_signs(campaign), [Geometric(), JointOffset()], progress))
 
 
 def _weighed(fit: Fit) -> Crash:

@@ -121,14 +121,33 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     notes += contradicted(campaign)
     again, (lost, _) = copies(campaign), marks(campaign)
     if again.any():
-        rows = listed_rows(campaign.rows[again])
-        notes.append(f"{rows} repeat another one to the last digit: these copies are left out")
+        rows, one = listed_rows(campaign.rows[again]), again.sum() == 1
+        verb, these = ("repeats", "this copy is") if one else ("repeat", "these copies are")
+        notes.append(f"{rows} {verb} another one to the last digit: {these} left out")
     if lost.any():
         rows = listed_rows(campaign.rows[lost])
         what = "a mark of a missing value, or a robot that stood still"
         notes.append(f"{rows} measured one place or figure to the last digit, {what}: they are left out")
     out = again | lost
     return campaign.take(~out) if out.any() else campaign, tuple(notes)
+
+
+def counted(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Leave out what no diagnosis uses (:func:`usable`, :func:`not_executed`), with notes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> twice = campaign.take(np.r_[:campaign.samples, 5])
+    >>> kept, notes = counted(twice)
+    >>> kept.samples, notes
+    (120, ('1 row (7) repeats another one to the last digit: this copy is left out',))
+    """
+    campaign, notes = usable(campaign)
+    campaign, left = not_executed(campaign)
+    return campaign, (*notes, *left)
 
 
 def contradicted(campaign: Campaign) -> list[str]:

@@ -15,7 +15,7 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.cross_validation import held_out
-from thermal_robot.diagnosis.data_checks import not_executed, usable, with_corrected_signs
+from thermal_robot.diagnosis.data_checks import counted, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, mismatch
 from thermal_robot.diagnosis.prune import concluded, forward_selection, pruned, selected_with_scatter
 from thermal_robot.diagnosis.residual_tests import analyse_residual
@@ -94,9 +94,7 @@ def diagnose(
 
     if not campaign.measured or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
-    campaign, notes = usable(campaign)
-    campaign, left = not_executed(campaign)
-    notes += left
+    campaign, notes = counted(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
         last = _concluded(campaign, candidates, effects, progress)

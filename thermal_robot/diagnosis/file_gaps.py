@@ -21,13 +21,13 @@ from thermal_robot.arrays import Array
 from thermal_robot.correction.constant import constant
 from thermal_robot.correction.holding import PLACEMENTS, TICK, TICKS, WORTH, ZEROS, applied
 from thermal_robot.correction.model import CorrectedModel
-from thermal_robot.diagnosis.cross_validation import Model, Rows, Walk, share
+from thermal_robot.diagnosis.cross_validation import CrossValidation, Model, Rows, share
 from thermal_robot.effects import Effect, JointOffset
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.grouping import each, held_together
+from thermal_robot.inference.grouping import each, held_out_groups
 from thermal_robot.inference.problem import Linear
 from thermal_robot.prediction import FileGap
 
@@ -40,31 +40,31 @@ def file_gaps(fit: Fit, model: CorrectedModel) -> tuple[FileGap, ...]:
     if model.spread is None or not constant(model).responses[:, :-12].any():
         return ()
     e = fit.explanation
-    labels, _ = held_together(fit.campaign)
+    labels, _ = held_out_groups(fit.campaign)
     whole = Model.of(e, labels)
-    walk = Walk.over(whole, each(labels)) if labels.max(initial=0) else None
-    if walk is None or not walk.tests:
+    validation = CrossValidation.over(whole, each(labels)) if labels.max(initial=0) else None
+    if validation is None or not validation.tests:
         return ()
-    fitted = -whole.fits([~test for test in walk.tests], range(len(whole.spans)))[:, whole.flat : -1]
+    fitted = -whole.fits([~test for test in validation.tests], range(len(whole.spans)))[:, whole.flat : -1]
     moved = _Moved.of(fit, whole)
-    rows, before = moved.squares(walk, np.zeros((len(walk.tests), moved.width)))
+    rows, before = moved.squares(validation, np.zeros((len(validation.tests), moved.width)))
 
     def gap(holds: str, min_sigma: float | None, displacements: Array, alone: Sequence[float] = ()) -> FileGap:
-        _, after = moved.squares(walk, displacements)
+        _, after = moved.squares(validation, displacements)
         far, near = (float(np.sqrt(squares[0] / rows)) for squares in (before, after))
         return FileGap(holds, min_sigma, far, near, *share(before - after, before), tuple(alone))
 
     files = {least: applied(model, least) for least in (None, WORTH)}
     own = [gap(h, least, f.displacement(fitted)) for least, some in files.items() for h, f in some.items()]
-    return *own, *(gap(h, None, d[:-1], d[-1].tolist()) for h, d in _alone(fit, model, whole, walk).items())
+    return *own, *(gap(h, None, d[:-1], d[-1].tolist()) for h, d in _alone(fit, model, whole, validation).items())
 
 
-def _alone(fit: Fit, model: CorrectedModel, whole: Model, walk: Walk) -> dict[str, Array]:
+def _alone(fit: Fit, model: CorrectedModel, whole: Model, validation: CrossValidation) -> dict[str, Array]:
     """Displacements (F + 1, n + 6 S) of files fitted alone without each fold, and to all rows."""
     known, robot = constant(model), fit.campaign.robot
     ends = np.cumsum([0, *(len(values) for _, values in model.effects)])
     own = [k for k in range(len(model.effects)) if known.responses[ends[k] : ends[k + 1], :-12].any()]
-    rows = [*(~test for test in walk.tests), np.ones(len(whole.block), dtype=bool)]
+    rows = [*(~test for test in validation.tests), np.ones(len(whole.block), dtype=bool)]
     picked = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in own])
     # at the nominal robot: at the corrected one what frames take up would seem apart from them
     held = [(fit.effects[k][0], fit.effects[k][1]) for k in own]
@@ -100,18 +100,18 @@ class _Moved(Model):
         """Number of displacements, n + 6 S."""
         return len(self.linear.blocks[0].sizes)
 
-    def squares(self, walk: Walk, displacements: Array) -> tuple[int, Array]:
+    def squares(self, validation: CrossValidation, displacements: Array) -> tuple[int, Array]:
         """Return the number of rows held out and their squares (1 + F,), m²: of all, and without each fold's.
 
         Displacements (F, n + 6 S) are applied, and frames are fitted, without each fold.
         """
         each_fold, rows = [], 0
-        for test, own in zip(walk.tests, displacements, strict=True):
+        for test, own in zip(validation.tests, displacements, strict=True):
             products, flat = self.products(~test)[0], self.flat
             known = whitener(products[:flat, :flat])
             frames = known @ (known.T @ (products[:flat, -1] - products[:flat, flat:-1] @ own))
-            judged = self.judged(test)[self.kept[test]]
-            each_fold.append(float(((judged[:, :3] @ np.concatenate([-frames, -own, [1.0]])) ** 2).sum()))
-            rows += len(judged)
+            left = self.test_columns(test)[self.kept[test]]
+            each_fold.append(float(((left[:, :3] @ np.concatenate([-frames, -own, [1.0]])) ** 2).sum()))
+            rows += len(left)
         total = np.sum(each_fold)
         return rows, np.append(total, total - each_fold)

@@ -5,10 +5,8 @@ This module knows nothing of reports: whoever is registered in :mod:`thermal_rob
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,9 +26,8 @@ from thermal_robot.diagnosis.values import (
     jsonable,
 )
 from thermal_robot.effects.catalogue import of_effect
-from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_rpy
-from thermal_robot.renderer import registered_renderer
+from thermal_robot.renderer import RenderedPage, registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +81,7 @@ def frame_table(model: CorrectedModel) -> pd.DataFrame:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis:
+class Diagnosis(RenderedPage):
     """Result of a diagnosis: where the gap lies, which effects cause it, how far a correction shrinks it.
 
     Attributes
@@ -371,23 +368,8 @@ class Diagnosis:
     def _samples(self) -> list[dict[str, Any]]:
         return [] if self.fit is None or not self.usable else self.next_samples().to_list()
 
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file by an atomic replace.
-
-        Examples
-        --------
-        >>> tr.diagnose(tr.demo_campaign()).to_json("diagnosis.json")
-        """
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
-
     def __repr__(self) -> str:
         return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"
-
-    def __str__(self) -> str:
-        return registered_renderer().text(self)
-
-    def _repr_html_(self) -> str:
-        return registered_renderer().fragment(self)
 
 
 def _gap_as_json(gap: Gap) -> dict[str, Any]:

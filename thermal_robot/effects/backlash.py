@@ -68,9 +68,12 @@ class Backlash(Effect):
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Approach columns, unless at least one of them varies."""
+        """Approach columns, unless at least one of them varies; ``order``, from which they would follow."""
         columns = tuple(f"approach.{joint}" for joint in observations.robot.joint_names)
-        return () if any(observations.varies(column) for column in columns) else columns
+        if any(observations.varies(column) for column in columns):
+            return ()
+        follow = observations.clock is None and observations.campaign.moves == "direct"
+        return (*columns, "order") if follow else columns
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the recorded approach columns of the chain's joints, and the columns from which torques follow."""

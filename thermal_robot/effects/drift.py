@@ -37,8 +37,8 @@ class Drift(Fading):
     size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return ``time`` unless time or order varies."""
-        return () if observations.clock is not None and np.ptp(observations.clock) > 0 else ("time",)
+        """Return ``time`` and ``order``, of which either will do, unless one of them varies."""
+        return () if observations.clock is not None and np.ptp(observations.clock) > 0 else ("time", "order")
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return ``time``, or ``order`` in its place."""

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from thermal_robot.diagnosis.values import jsonable
-from thermal_robot.files import write_text
-from thermal_robot.renderer import registered_renderer
+from thermal_robot.renderer import RenderedPage, registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -158,7 +155,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(RenderedPage):
     """Result of a comparison: what campaigns of one robot share, and what changed between them.
 
     Attributes
@@ -189,6 +186,9 @@ class Comparison:
     >>> found.changes
     ()
     """
+
+    _kind: ClassVar[str] = "comparison_"
+    _figure: ClassVar[str] = "plot_differences"
 
     campaigns: tuple[str, ...]
     samples: tuple[int, ...]
@@ -264,16 +264,9 @@ class Comparison:
         )
         return dict(jsonable(plain))
 
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file by an atomic replace."""
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
+    def _given(self) -> dict[str, Any]:
+        return self.to_dict()
 
     def __repr__(self) -> str:
         changed = ", ".join(dict.fromkeys(c.effect for c in self.changes)) or "nothing"
         return f"Comparison({', '.join(self.campaigns)}: {changed} changed)"
-
-    def __str__(self) -> str:
-        return str(registered_renderer().comparison_text(self.to_dict()))
-
-    def _repr_html_(self) -> str:
-        return str(registered_renderer().comparison_fragment(self.to_dict()))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from thermal_robot.files import write_text
 from thermal_robot.fleet import settings
 from thermal_robot.percents import percent
+from thermal_robot.renderer import RenderedPage
 
 SCHEMA = "thermal-robot/wear/1"
 
@@ -161,7 +160,7 @@ class Worn:
 
 
 @dataclass(frozen=True, repr=False)
-class Wear:
+class Wear(RenderedPage):
     """Change of one robot over time.
 
     Attributes
@@ -183,6 +182,9 @@ class Wear:
     notes
         Remarks, one sentence each.
     """
+
+    _kind: ClassVar[str] = "wear_"
+    _figure: ClassVar[str] = "plot_wear"
 
     robot: str
     campaigns: tuple[Visit, ...]
@@ -210,10 +212,6 @@ class Wear:
         """JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
         plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
         return plain
-
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file by an atomic replace."""
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
     def __repr__(self) -> str:
         moving = ", ".join(f"{w.parameter} ({w.kind})" for w in self.alarms)

@@ -92,9 +92,9 @@ def _in_base(base: Array, position: Array, orientation: Array | None) -> Attaine
 
 def _checked(campaign: Campaign, predicted: tuple[Array, Array | None]) -> tuple[Array, Array | None]:
     """Return the validated predictions of the same rows."""
-    kind = "positions (N, 3) and orientations (N, 4) or None, as predict() returns them"
+    kind = "positions (N, 3) and orientations (N, 4) or None, as prediction() returns them"
     require("performance(), predicted", predicted, (tuple, list), kind)
-    position, orientation = (None if part is None else np.asarray(part, dtype=float) for part in predicted)
+    position, orientation = (None if part is None else np.asarray(part, dtype=float) for part in predicted[:2])
     wrong = position is None or position.shape != (campaign.samples, 3)
     if wrong or (orientation is not None and orientation.shape != (campaign.samples, 4)):
         found = " and ".join("None" if part is None else str(part.shape) for part in (position, orientation))
@@ -156,7 +156,7 @@ def performance(
     frames
         Base and tool; where absent, unknown ones are fitted to the nominal robot by least squares of all rows.
     predicted
-        What a corrected model predicts of the same rows, as :meth:`CorrectedModel.predict` returns it: (N, 3)
+        What a corrected model predicts of the same rows, as :meth:`CorrectedModel.prediction` returns it: (N, 3)
         positions, m, and (N, 4) orientations or ``None``, in the measurement frame. Rows that are NaN do not count.
 
     Returns

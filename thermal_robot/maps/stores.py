@@ -314,7 +314,12 @@ def workspace_map(
     elif known.get("fingerprint") != spec.fingerprint:
         other = [key for key, own in spec.to_dict().items() if known.get(key) != own]
         found = "other " + ", ".join(other) if other else "settings of another version"
-        raise CampaignError(str(path), "holds another map", found=found, expected="the same settings, or replace")
+        raise CampaignError(
+            str(path),
+            "holds another map",
+            found=found,
+            expected="the same settings, another path, or --replace (replace=True)",
+        )
     for k, rows in islice(enumerate(spec.chunks()), kept.done, None):
         progress("chunks", k, spec.parts)
         kept.add(columns(spec, rows))

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.special import erfc
 
 from thermal_robot.diagnosis.values import Estimate, jsonable
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import write_text
 from thermal_robot.motion import settings
 from thermal_robot.motion.result import MotionDiagnosis
-from thermal_robot.renderer import registered_renderer
+from thermal_robot.renderer import Rendered, registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +56,7 @@ class Compared:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotionComparison:
+class MotionComparison(Rendered):
     """What changed between two logs of one robot's motion.
 
     Attributes
@@ -80,6 +77,8 @@ class MotionComparison:
     >>> [(one.effect, one.joint, one.z) for one in found.changes]  # doctest: +SKIP
     [('coulomb', 'elbow', 6.1)]
     """
+
+    _kind: ClassVar[str] = "motion_comparison_"
 
     logs: tuple[str, str]
     parameters: tuple[Compared, ...]
@@ -116,13 +115,6 @@ class MotionComparison:
         plain = {"schema": SCHEMA, "robot": self.robot, "logs": self.logs, "weak": self.weak, "parameters": told}
         return dict(jsonable({**plain, "summary": self.summary}))
 
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
-
-    def __str__(self) -> str:
-        return str(registered_renderer().motion_comparison_text(self))
-
     def __repr__(self) -> str:
         changed = ", ".join(dict.fromkeys(one.effect for one in self.changes)) or "nothing"
         return f"MotionComparison({', '.join(self.logs)}: {changed} changed)"
@@ -148,14 +140,14 @@ def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequ
         raise CampaignError("compare()", "the logs have no joint in common", found=found, expected="one robot")
     own = (first.log.name or "first", second.log.name or "second")
     called = tuple(names) or (own if own[0] != own[1] else (f"{own[0]} (1)", f"{own[1]} (2)"))
-    told = [_told(one) for one in (first, second)]
+    told = [_rendered(one) for one in (first, second)]
     keys = dict.fromkeys(key for one in told for key in one)
     parameters = [_compared(key, [one.get(key) for one in told], (first, second)) for key in keys]
     parameters.sort(key=lambda one: -abs(one.z or 0.0))
     return MotionComparison((called[0], called[1]), tuple(parameters), first.log.robot.name, first.few or second.few)
 
 
-def _told(d: MotionDiagnosis) -> dict[tuple[str, str, str, str], Estimate]:
+def _rendered(d: MotionDiagnosis) -> dict[tuple[str, str, str, str], Estimate]:
     """Return what is shown, by effect, name (its joint in it), unit and joint."""
     return {
         (finding.name, one.name, one.unit, d.joint_of(one)): one

@@ -25,7 +25,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.document import Document, fitted_sections
 from thermal_robot.campaign.importers.run import IMPORTED, require_imported
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import NO_PARQUET, WITH_PARQUET, read_table, table_from_frame
+from thermal_robot.campaign.table import PARQUET, read_table, table_from_frame, without_library
 from thermal_robot.campaign.write import ROBOT_NAME
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, whole, write_text
@@ -144,7 +144,7 @@ def _lerobot(files: Sequence[Path], asked: Asked) -> Taken:
     try:
         tables = [pd.read_parquet(file) for file in sorted(files[0].glob("data/*/*.parquet"))]
     except ImportError as error:
-        raise CampaignError(str(files[0]), NO_PARQUET, expected=WITH_PARQUET) from error
+        raise without_library(str(files[0]), PARQUET[0]) from error
     if not tables:
         raise CampaignError(str(files[0]), "has no data/*/*.parquet", expected="a dataset")
     rows, columns = _stacked(tables), dict[str, Array]()

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import SCHEMA, estimate_table
 from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
-from thermal_robot.files import write_text
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS
 from thermal_robot.motion.log import MotionLog, Servo
 from thermal_robot.motion.physical import physical
-from thermal_robot.renderer import registered_renderer
+from thermal_robot.renderer import RenderedPage, registered_renderer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +38,7 @@ class JointGap:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotionDiagnosis:
+class MotionDiagnosis(RenderedPage):
     """Which effects make the joints not do what the model says, how sure, and how far the gap shrinks.
 
     The model is the joint that follows its command at once, or the position servo whose gain the log states.
@@ -83,6 +80,9 @@ class MotionDiagnosis:
     >>> found.verdict  # doctest: +SKIP
     ('lag', 'coulomb')
     """
+
+    _kind: ClassVar[str] = "motion_"
+    _figure: ClassVar[str] = "plot_motions"
 
     log: MotionLog
     joints: Mapping[str, JointGap]
@@ -204,6 +204,30 @@ class MotionDiagnosis:
         return table
 
     @property
+    def residuals(self) -> pd.DataFrame:
+        """Gap and remainder of every reading, rad (m of a prismatic joint).
+
+        Index ``joint``, ``motion`` (number of it, from 0) and ``time``, s; columns ``gap``, measured less what the
+        model says, and ``remainder``, measured less what it says with the effects at work.
+        """
+        import pandas as pd
+
+        told = {
+            name: pd.DataFrame(
+                {
+                    "motion": one["motion"],
+                    "time": one["time"],
+                    "gap": one["measured"] - one["nominal"],
+                    "remainder": one["measured"] - one["simulated"],
+                }
+            )
+            for name, one in self.curves.items()
+        }
+        if not told:
+            return pd.DataFrame(columns=["gap", "remainder"])
+        return pd.concat(told, names=["joint"]).set_index(["motion", "time"], append=True).droplevel(1)
+
+    @property
     def gaps(self) -> pd.DataFrame:
         """Rms of each joint's gap, rad: index joint; columns ``before``, ``after``, ``held_out``, ``noise``."""
         import pandas as pd
@@ -266,16 +290,6 @@ class MotionDiagnosis:
             "locations": [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations],
             "depends_on": [asdict(one) for one in left.depends_on],
         }
-
-    def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
-
-    def __str__(self) -> str:
-        return str(registered_renderer().motion_text(self))
-
-    def _repr_html_(self) -> str:
-        return str(registered_renderer().motion_fragment(self))
 
     def __repr__(self) -> str:
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"

@@ -12,12 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from thermal_robot.report.motion_page import motion_fragment, motion_html
+    from thermal_robot.report.motion_plots import plot_motions
     from thermal_robot.report.motion_words import motion_advice, motion_headline
-    from thermal_robot.report.page import comparison_fragment, comparison_html, fleet_html, fragment, html, wear_html
+    from thermal_robot.report.page import (
+        comparison_fragment,
+        comparison_html,
+        fleet_html,
+        fragment,
+        html,
+        wear_fragment,
+        wear_html,
+    )
     from thermal_robot.report.plain_text import calibration_text, text
     from thermal_robot.report.plots import (
         explain_figure,
         overview,
+        plot_differences,
         plot_how_far,
         plot_map,
         plot_remainder,
@@ -55,21 +65,25 @@ __all__ = [
     "motion_schema",
     "motion_text",
     "overview",
+    "plot_differences",
     "plot_how_far",
     "plot_map",
+    "plot_motions",
     "plot_remainder",
     "plot_wear",
     "plot_where",
     "plot_which",
     "schema",
     "text",
+    "wear_fragment",
     "wear_html",
 ]
 _HOMES = {
+    "motion_plots": ("plot_motions",),
     "motion_page": ("motion_fragment", "motion_html"),
     "text_motions": ("motion_comparison_headline", "motion_comparison_text", "motion_text"),
     "motion_words": ("motion_advice", "motion_headline"),
-    "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_html"),
+    "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_fragment", "wear_html"),
     "plain_text": ("calibration_text", "text"),
     "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
     "text_crash": ("crash_headline", "crash_text"),

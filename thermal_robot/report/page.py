@@ -70,7 +70,46 @@ def render(
     runs = f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
     told = {"title": title, "files": files, "signature": signature(generated)}
     code = {"runs": Markup(runs), "script": Markup(script)}
-    return _environment().get_template(template).render(**told, **code, **shown)
+    made = _environment().get_template(template).render(**told, **code, **shown)
+    return made if title else _with_styled_cells(made)
+
+
+_IN_A_CELL = "background: none; border: 0; vertical-align: top; line-height: 1.5"
+_PLAIN_CELL = f"{_IN_A_CELL}; text-align: left; white-space: normal"
+_STYLES = {
+    "table": "table-layout: auto; width: 100%; border: 0; border-collapse: collapse; margin: 0.8rem 0",
+    "tr": "background: none",
+    "th": f"{_PLAIN_CELL}; padding: 0.4rem 0.9rem 0.4rem 0",
+    "td": f"{_PLAIN_CELL}; padding: 0.4rem 0.9rem 0.4rem 0",
+    "th tr-n": "text-align: right",
+    "td tr-n": "text-align: right; white-space: nowrap",
+    "td tr-word": "white-space: nowrap",
+    "td tr-details": "padding: 0 0 0.7rem 1.2rem",
+    "table inside": "width: auto; margin: 0.2rem 0 0",
+    "td inside": "padding: 0 0.9rem 0 0",
+}
+"""Style of a part of a table by its tag, then by its class or by its being inside of a cell, which add to it.
+
+It stands in the tags themselves, as the style sheets of JupyterLab and VS Code win over that of a piece, and neither
+keeps that of a notebook that it does not trust.
+"""
+_PART = re.compile(r"<(/?)(table|tr|th|td)\b([^>]*)>")
+
+
+def _with_styled_cells(piece: str) -> str:
+    """Return a piece of HTML whose tables carry their style in their own tags."""
+    depth = 0
+
+    def styled(part: re.Match[str]) -> str:
+        nonlocal depth
+        closes, tag, given = part.groups()
+        depth += (tag == "table") * (-1 if closes else 1)
+        if closes:
+            return part[0]
+        own = [tag, *(f"{tag} {name}" for name in (*re.findall(r"[\w-]+", given), *["inside"] * (depth > 1)))]
+        return f'<{tag}{given} style="{"; ".join(_STYLES[name] for name in own if name in _STYLES)}">'
+
+    return _PART.sub(styled, piece)
 
 
 def signature(generated: str | None) -> str:
@@ -307,6 +346,11 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     kicker = "What moves, at once or steadily, and when it crosses a limit"
     shown = {"kicker": kicker, "headline": wear.summary, "said": said, "sections": _of_wear(wear)}
     return render("campaigns.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
+
+
+def wear_fragment(wear: Wear) -> str:
+    """HTML of a robot over time for a notebook: one ``<div>`` with its own style."""
+    return render("campaigns.html", {"headline": wear.summary, "sections": _of_wear(wear)})
 
 
 def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:

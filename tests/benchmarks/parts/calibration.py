@@ -94,7 +94,7 @@ def _table(effort, peers, rows, folder):
     campaign, fresh = campaigns(rows)
     source = written(folder, campaign, fresh)
     found = tr.calibrate(campaign)
-    away = found.model.predict(fresh)[0] - fresh.position
+    away = found.model.prediction(fresh)[0] - fresh.position
 
     def own():
         whole = [lambda: tr.calibrate(campaign), lambda: str(tr.calibrate(campaign))]

@@ -28,7 +28,7 @@ def test_it_is_what_a_fresh_diagnosis_says(updated, fresh, whole):
     e = fresh.fit.explanation
     assert updated.noise == pytest.approx(e.whitening.noise[0] * e.best.noise, rel=1e-6)
     assert updated.rms_after == pytest.approx(fresh.gap.rms_after, rel=1e-6)
-    assert np.abs(updated.model.predict(whole)[0] - fresh.model.predict(whole)[0]).max() < 1e-9
+    assert np.abs(updated.model.prediction(whole)[0] - fresh.model.prediction(whole)[0]).max() < 1e-9
     assert (updated.samples, updated.choice_stands, updated.reason) == (ALL, True, "")
     assert set(updated.outliers) == {row for row in fresh.outliers if row in whole.rows[OLD:]}
     # predictions are as sure
@@ -57,7 +57,7 @@ def test_the_diagnosis_stays_and_the_update_is_saved_and_printed(found, whole, u
     # the model is saved and loaded
     updated.model.save(tmp_path / "model.json")
     again = tr.CorrectedModel.load(tmp_path / "model.json")
-    assert np.allclose(again.predict(whole)[0], updated.model.predict(whole)[0], atol=1e-12)
+    assert np.allclose(again.prediction(whole)[0], updated.model.prediction(whole)[0], atol=1e-12)
     # it is plain values and prints whether the choice stands
     assert "the choice stands" in str(updated)
     fallen = replace(updated, fallen=("The new rows leave 3 times as much.",))
