@@ -52,12 +52,12 @@ def test_a_law_that_follows_noise_is_taken_out_again(rv_m2, law):
     kept = []
     for seed in range(12):
         known = fit(simulate(rv_m2, seed=seed, samples=75, noise=NOISE)[0], ())
-        downweighted = []
-        left, refused = pruned(forced(known, block(known.corrected, law)), downweighted.append)
+        stages = []
+        left, refused = pruned(forced(known, block(known.corrected, law)), stages.append)
         kept.append(law.name in names(left))
         assert refused == {}  # laws were nobody's candidates: nothing is said of them
         if not kept[-1]:
-            assert downweighted[0] == f"rows held out refuse {law.name}"
+            assert stages[0] == f"rows held out refuse {law.name}"
             assert left.effects == ()
     assert sum(kept) <= 1, kept
 
@@ -105,9 +105,9 @@ def test_the_worst_goes_first_and_what_is_at_work_stays(rv_m2):
         clear = [n for n, e in found.items() if e.clearly]
         poor = [n for n, e in found.items() if e.harms or (n == "discovered.1" and not e.helps)]
         judged = clear or [min(poor, key=lambda n: found[n].blocked.nats)]
-        downweighted = []
-        left, refused = pruned(beside, downweighted.append)
-        assert downweighted[0] == f"rows held out refuse {', '.join(judged)}"
+        stages = []
+        left, refused = pruned(beside, stages.append)
+        assert stages[0] == f"rows held out refuse {', '.join(judged)}"
         assert "thermal_elongation" in names(left)
         assert set(refused) <= {"geometric"}
 
@@ -142,8 +142,8 @@ def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
     for seed in range(12):
         data = simulate(rv_m2, ["joint_gain"], seed=seed, samples=75, ratio=(0.35, 0.35))[0]
         known = fit(data, choose(("joint_gain",), (), ()))
-        odds, downweighted = odds_in_place(known), []
-        left, refused = pruned(known, downweighted.append)
+        odds, stages = odds_in_place(known), []
+        left, refused = pruned(known, stages.append)
         if not known.effects:
             assert odds == {}
             continue
@@ -152,7 +152,7 @@ def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
         assert odds["joint_gain"] == pytest.approx(min(p / (1.0 - p), MANY), rel=1e-6)
         if p / (1.0 - p) < settings.NAMING_ODDS:
             assert left.effects == ()
-            if downweighted[0] == "in question: joint_gain":
+            if stages[0] == "in question: joint_gain":
                 assert refused["joint_gain"].probability == pytest.approx(p)
                 open_ += 1
         else:
@@ -207,9 +207,9 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     good = DensityGain("time", 0.2, 5.0, (1.0, 9.0))
     said = {name: HeldOutTest(good, good) for name in names(unseen)}
     monkeypatch.setattr(word, "held_out_tests", lambda own: {name: said[name] for name in names(own)})
-    downweighted = []
-    left, refused = pruned(unseen, downweighted.append)
-    assert downweighted[0] == "nothing determines geometric"
+    stages = []
+    left, refused = pruned(unseen, stages.append)
+    assert stages[0] == "nothing determines geometric"
     assert names(left) == ["thermal_elongation"]
     assert refused["geometric"].share is None
 
@@ -317,8 +317,8 @@ def concluded(campaign, names, refused=None):
     known = fit(campaign, choose(names, (), ()))
     chance = random_gap(known)
     assert chance.explains_size
-    downweighted = []
-    return selected_with_scatter(known, chance, refused or {}, downweighted.append), known
+    stages = []
+    return selected_with_scatter(known, chance, refused or {}, stages.append), known
 
 
 def test_scatter_explains_what_it_is_and_leaves_nothing(rv_m2):

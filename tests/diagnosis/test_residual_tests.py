@@ -79,9 +79,9 @@ def test_play_of_a_joint_is_told_with_its_place_and_side(rv_m2):
     assert said.depends_on[0].covariate == "approach.joint_3"
     assert any("times the stated noise" in reason for reason in said.reasons)
     # what is explained is not left, and a remark is made at each stage
-    explained, downweighted = known(rv_m2, ["backlash"], only=("backlash",), ratio=(5.0, 6.0), places=["joint_3"]), []
-    assert not analyse_residual(explained, downweighted.append).unexplained.flagged
-    assert len(downweighted) == 2
+    explained, stages = known(rv_m2, ["backlash"], only=("backlash",), ratio=(5.0, 6.0), places=["joint_3"]), []
+    assert not analyse_residual(explained, stages.append).unexplained.flagged
+    assert len(stages) == 2
     # noise subtracted, as it is stated; the frames take a little of an effect
     assert said.rms == pytest.approx(5.5 * np.sqrt(3.0) * NOISE, rel=0.2)
 

@@ -182,9 +182,9 @@ def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
     before = analyse_residual(known).unexplained
     assert before.flagged
-    downweighted = []
-    after = forward_selection(known, 2, downweighted.append)
-    assert downweighted[0] == "causes that nobody listed: scan 2"
+    stages = []
+    after = forward_selection(known, 2, stages.append)
+    assert stages[0] == "causes that nobody listed: scan 2"
     (own,) = [effect for effect, _ in after.effects if isinstance(effect, Discovered)]
     assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
     assert "discovered.2" in after.families
