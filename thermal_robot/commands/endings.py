@@ -80,4 +80,5 @@ def require_endings(options: argparse.Namespace) -> None:
         module = form.endings[ending]
         if module and find_spec(module) is None:
             extra = f'pip install "thermal-robot[{EXTRAS[module]}]", or another ending'
-            raise CampaignError(file, f"cannot be written: {ending} needs {module}, which is not installed", expected=extra)
+            problem = f"cannot be written: {ending} needs {module}, which is not installed"
+            raise CampaignError(file, problem, expected=extra)
