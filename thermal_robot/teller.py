@@ -22,6 +22,8 @@ class Teller(Protocol):
     comparison_text: Callable[[Any], str]
     comparison_fragment: Callable[[Any], str]
     fleet_text: Callable[[Any], str]
+    wear_headline: Callable[[Any], str]
+    wear_text: Callable[[Any], str]
     motion_headline: Callable[[Any], str]
     motion_advice: Callable[[Any], str]
     motion_text: Callable[[Any], str]

@@ -15,6 +15,7 @@ from thermal_robot.console import stages
 from thermal_robot.datasets import demo_campaign, demo_directory
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import require_free, write_one
+from thermal_robot.report.pdf import require_pdf
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis import Diagnosis
@@ -76,6 +77,7 @@ def diagnose(options: argparse.Namespace) -> None:
             raise CampaignError("diagnose", "is for logs of motion", column=column, expected="`correct` with a model")
     files = read_from(options.campaign, Path() if options.piped else None)
     require_free((options.json, options.model, options.report), files)
+    require_pdf(options.report)
     found = diagnosed(options)
     outputs = [
         (options.json, found.to_json),
@@ -99,6 +101,7 @@ def _diagnose_motion(options: argparse.Namespace) -> None:
         )
     files = files_of(options.campaign, Path() if options.piped else None)
     require_free((options.json, options.report, options.mjcf, options.urdf), files)
+    require_pdf(options.report)
     found = diagnosed(options)
     page = as_page(options.report, motion_html, found, files, lambda file: file.name)
     robot_files = motion_files(options, cast("MotionDiagnosis", found))
@@ -109,6 +112,7 @@ def demo(options: argparse.Namespace) -> None:
     """Run ``demo``: diagnose the demo's campaign, print and draw it."""
     from thermal_robot.report import html
 
+    require_pdf(options.report)
     options.campaign = demo_directory()
     intro = f"The demo's campaign is simulated; its answer lies in {options.campaign / 'truth.json'}."
     found = diagnosed(options)

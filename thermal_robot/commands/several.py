@@ -10,6 +10,7 @@ from thermal_robot.console import counted, stages
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import require_free
 from thermal_robot.report import comparison_html, fleet_html, fleet_text, wear_html
+from thermal_robot.report.pdf import require_pdf
 
 PAGE, SUMMARY = "fleet.html", "fleet.json"
 
@@ -30,6 +31,7 @@ def compare(options: argparse.Namespace) -> None:
         return deliver(options, [(options.json, told.to_json)], str(told), told.summary)
     files = [file for one in options.campaigns for file in ([Path(one)] if is_model(one) else read_from(one))]
     require_free((options.json, options.report), files)
+    require_pdf(options.report)
     with stages(options.loudness) as progress:
         found = compare(*options.campaigns, only=options.only, without=options.without, progress=progress)
     page = as_page(options.report, comparison_html, found.to_dict(), files)
@@ -42,6 +44,7 @@ def wear(options: argparse.Namespace) -> None:
 
     files = [file for one in options.campaigns for file in read_from(one)]
     require_free((options.json, options.report), files)
+    require_pdf(options.report)
     asked = {} if options.false_alarm is None else {"false_alarm": options.false_alarm}
     limits = dict(_limit(text) for text in options.limit)
     with stages(options.loudness) as progress:

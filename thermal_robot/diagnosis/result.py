@@ -6,7 +6,7 @@ This module knows nothing of reports: whoever is registered in :mod:`thermal_rob
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,6 +115,8 @@ class Diagnosis:
         Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
     says
         What its rows say, for a reader.
+    about
+        What stands on the first page of a report: serial numbers, operator, date.
 
     Examples
     --------
@@ -158,6 +160,7 @@ class Diagnosis:
     misfit: Misfit | None = None
     performance: Performance | None = None
     says: str = ""
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def usable(self) -> bool:

@@ -25,7 +25,13 @@ if TYPE_CHECKING:
         plot_where,
         plot_which,
     )
-    from thermal_robot.report.text_campaigns import comparison_headline, comparison_text, fleet_text
+    from thermal_robot.report.text_campaigns import (
+        comparison_headline,
+        comparison_text,
+        fleet_text,
+        wear_headline,
+        wear_text,
+    )
     from thermal_robot.report.text_motions import motion_comparison_headline, motion_comparison_text, motion_text
     from thermal_robot.report.words import advice, headline
 
@@ -60,7 +66,9 @@ __all__ = [
     "plot_which",
     "schema",
     "text",
+    "wear_headline",
     "wear_html",
+    "wear_text",
 ]
 _HOMES = {
     "motion_page": ("motion_fragment", "motion_html"),
@@ -68,7 +76,7 @@ _HOMES = {
     "motion_words": ("motion_advice", "motion_headline"),
     "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_html"),
     "plain_text": ("calibration_text", "text"),
-    "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
+    "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text", "wear_headline", "wear_text"),
     "words": ("advice", "headline"),
 }
 
