@@ -1,17 +1,26 @@
 """Every kind of page on a desk, on a telephone and on paper: nothing is cut, nothing complains, nothing is heavy."""
 
+import re
 import shutil
 import subprocess
+import sys
 import unicodedata
 from collections import Counter
+from html import unescape
 
 import pytest
+from motion.found import found
 from report import every_page
 from report.browser import PROGRAM, Browser
+from report.cases import CASES
 from report.every_page import ALIKE, EVERY, page
+from report.looking import texts
+from wear_cases import by_hand
 
-from thermal_robot import report
-from thermal_robot.report import html
+from thermal_robot import cli, report
+from thermal_robot.report import html, motion_plots, plots
+from thermal_robot.report.page import svg
+from thermal_robot.report.pdf import write_page
 
 HEAVIEST = 3e6  # Bytes
 SMALLEST = 7.0  # pixels of a letter of 8 points in a figure on a telephone
@@ -49,6 +58,16 @@ TEXTS = """(() => {
   return found;
 })()"""
 KINDS = [pytest.param(kind, marks=[pytest.mark.slow] * (kind in ALIKE)) for kind in EVERY]
+
+
+def views_of(figure):
+    """Left, top, width and height of each view of a figure, inches."""
+    return [
+        [float(side) / 72.0 for side in view.split()]
+        for view in re.findall(r'tr-part"[^>]*viewBox="([^"]+)"', str(svg(figure, "a figure")))
+    ]
+
+
 LONG = 60  # letters: what is longer may stand on two sheets
 
 needs_browser = pytest.mark.skipif(PROGRAM is None, reason="no chromium on the PATH")
@@ -89,6 +108,26 @@ def looked_at(browser, shown, tmp_path):
     return {where: found for where, found in wrong.items() if any(found)}
 
 
+def test_a_telephone_sees_every_text_of_a_figure_in_columns():
+    """Each text of it stands whole in one of the views that a telephone is shown."""
+    d = CASES["repeated"]()
+    for figure in (
+        plots.plot_where(d),
+        plots.plot_map(d),
+        plots.plot_wear(by_hand()),
+        motion_plots.plot_motions(found()),
+    ):
+        views, high = views_of(figure), figure.get_figheight()
+        assert len(views) > 1
+        for text, box in texts(figure):
+            left, bottom, right, top = (side / figure.dpi for side in box.extents)
+            shown = any(
+                x - 0.01 <= left and right <= x + w + 0.01 and y - 0.01 <= high - top and high - bottom <= y + h + 0.01
+                for x, y, w, h in views
+            )
+            assert shown, text
+
+
 def test_every_function_that_writes_a_page_is_looked_at():
     written = {name for name in report.__all__ if name.endswith("html")}
     assert {write.__name__ for write, _ in EVERY.values()} >= written
@@ -119,6 +158,24 @@ def test_what_is_cut_is_noticed(browser, tmp_path):
     shown = page("misfit")
     for wrong, where in spoilt.items():
         assert set(looked_at(browser, shown.replace("</header>", f"{wrong}</header>"), tmp_path)) == where
+
+
+@needs_reader
+@pytest.mark.parametrize("kind", ["wear", *(pytest.param(k, marks=pytest.mark.slow) for k in EVERY if k != "wear")])
+def test_a_pdf_holds_every_cell(kind, tmp_path):
+    pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
+    shown = page(kind)
+    write_page(tmp_path / "r.pdf", shown)
+    body = re.sub(r"(?s)<(svg|script|style).*?</\1>", "", shown[shown.index("<main") :])
+    told = [unescape(text) for text in re.findall(r">([^<>]+)<", body) if text.strip()]
+    assert missing(told, (tmp_path / "r.pdf").read_bytes()) == []
+
+
+def test_a_pdf_is_refused_before_anything_is_computed_where_its_extra_is_missing(monkeypatch, tmp_path, capsys):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    monkeypatch.setattr("thermal_robot.commands.campaigns.diagnosed", lambda _: pytest.fail("it is computed"))
+    assert cli.main(["demo", "--report", str(tmp_path / "r.PDF")]) == cli.BAD_INPUT
+    assert 'pip install "thermal-robot[pdf]"' in capsys.readouterr().err
 
 
 def test_the_first_page_says_whose_robot_it_is():

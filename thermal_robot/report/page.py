@@ -351,7 +351,7 @@ def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:
     label = "Control charts: each parameter in each campaign, with its limits, and how it moves"
     yield {"heading": "Over time", "drawn": (plots.plot_wear(wear), label)}
     label = "Every parameter: how it moves, how far, how sure that is"
-    yield _section("Parameters", text_campaigns.wear_table(wear), 2, label=label)
+    yield _section("Parameters", text_campaigns.wear_table(wear), 3, label=label)
     visits = [(v.name, v.date, words.about_in_line(v.about), str(v.rows)) for v in wear.campaigns]
     heads = ("campaign", "date", "about", "rows used")
     if not any(v.about for v in wear.campaigns):

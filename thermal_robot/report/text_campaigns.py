@@ -310,8 +310,8 @@ def fleet_text(summary: Plain) -> str:
 
 
 def wear_table(wear: Wear) -> list[Line]:
-    """Table of the parameters over time: kind and size of the change, rate, certainty, limit."""
-    heads = ("parameter", "it", "change", "a day", "moved", "by chance", "limit")
+    """Table of the parameters over time: kind of change, limit, size, rate, certainty."""
+    heads = ("parameter", "it", "limit", "change", "a day", "moved", "by chance")
     return [heads, *((w.parameter, _does(w), *_figures(w)) for w in wear.parameters)]
 
 
@@ -337,7 +337,7 @@ def _figures(worn: Worn) -> Line:
         limit, dates = worn.crossing.state, worn.crossing.dates
         if limit == "expected":
             limit = f"{dates[0]} ({dates[1]} to {dates[2] or 'never'})"
-    return change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}", limit
+    return limit, change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}"
 
 
 def wear_headline(wear: Wear) -> str:
