@@ -36,6 +36,8 @@ class Renderer(Protocol):
     wear_html: Callable[[Any], str]
     plot_wear: Callable[[Any], Any]
     fleet_text: Callable[[Any], str]
+    wear_headline: Callable[[Any], str]
+    wear_text: Callable[[Any], str]
     motion_headline: Callable[[Any], str]
     motion_advice: Callable[[Any], str]
     motion_text: Callable[[Any], str]

@@ -19,6 +19,7 @@ from thermal_robot.campaign import (
     write_predictions,
     write_table,
 )
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import load_robot
 
@@ -117,3 +118,18 @@ def test_the_noise_of_each_row_is_written_and_read_again(tmp_path: Path) -> None
     assert again.noise_position == pytest.approx(campaign.noise_position, rel=1e-12)
     np.testing.assert_allclose(campaign.to_frame()["noise"], sigmas / campaign.units.length_scale, rtol=1e-12)
     assert "position =" not in file.read_text()
+
+
+def test_what_a_campaign_says_of_itself_is_kept_as_text(tmp_path: Path) -> None:
+    file = write_campaign(full(), tmp_path / "copy")
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f'{text}\n[about]\nrobot_serial = 20185\ndate = 2026-11-26\noperator = "A. Novák"\n', "utf-8")
+    stated = {"robot_serial": "20185", "date": "2026-11-26", "operator": "A. Novák"}
+    campaign = read_campaign(file)
+    assert campaign.about == stated
+    assert Settings.from_dict(campaign.settings.to_dict()).about == stated
+    assert read_campaign(write_campaign(campaign, tmp_path / "again")).about == stated
+    assert "about" not in full().settings.to_dict()
+    file.write_text(f"{text}\n[about]\noperator = true\n", "utf-8")
+    with pytest.raises(CampaignError, match=r"about\.operator.*found true, expected text in quotes"):
+        read_campaign(file)

@@ -302,12 +302,12 @@ def test_json_holds_everything(tmp_path):
 
 
 SAID = [
-    "zero offset, elbow jumped by +0.0002 ± 2e-05 rad between run_1 (2026-02-01) and run_2 (2026-03-01)",
-    "lost motion, wrist moves by +1e-06 ± 1e-07 rad a day",
+    "zero offset, elbow jumped by +0.200 ± 0.020 mrad between run_1 (2026-02-01) and run_2 (2026-03-01)",
+    "lost motion, wrist moves by +1.00 ± 0.10 µrad a day",
     "at most 1 % of series",
     "chance of such an alarm without a change: at most 1e-06",
     "cannot be told from a change of zero offset, wrist",
-    "limit 0.0005 rad: about 2026-07-20 (95 %: 2026-06-30 to 2026-08-19)",
+    "limit 0.500 mrad: about 2026-07-20 (95 %: 2026-06-30 to 2026-08-19)",
     "not compared zero offset, pan: unknown frames hide its changes",
     "note         a <note> to know",
 ]
@@ -320,7 +320,7 @@ def test_the_text_says_what_moved_when_how_fast_and_what_cannot_be_compared():
     assert [words for words in SAID if words not in str(wear)] == []
     assert all(words in wear.summary for words in SAID[:2])
     undated = str(by_hand(dated=False))
-    for words in ("no dates, so no rates", "moves steadily, by +9e-05", "not foreseen, for lack of a rate"):
+    for words in ("no dates, so no rates", "moves steadily, by +90.0 ± 9.0 µrad", "not foreseen, for lack of a rate"):
         assert words in undated
     quiet = replace(wear, parameters=tuple(replace(w, alarm=False) for w in wear.parameters))
     assert "nothing moves that would not by chance in 1 % of such series" in quiet.summary

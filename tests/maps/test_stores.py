@@ -147,6 +147,16 @@ def test_joint_positions_are_drawn_as_points_in_space(made):
     assert len(plot_map(made, "probability").axes[0].collections[0].get_offsets()) == 450
 
 
+@pytest.mark.parametrize(("by", "largest"), [("required_warm", False), ("probability", True)])
+def test_the_better_value_is_the_brighter_in_a_plane_and_in_space(plane, made, by, largest):
+    """One meaning of the colours: brightness, by Rec. 709, falls from the best value to the worst in both."""
+    for found in (plane, made):
+        drawn = plot_map(found, by).axes[0].collections[0]
+        low, high = drawn.get_clim()
+        light = drawn.to_rgba(np.array([low, high]))[:, :3] @ [0.2126, 0.7152, 0.0722]
+        assert (light[1] > light[0]) == largest
+
+
 def test_what_is_no_map_no_column_or_no_place_is_refused(rv_m2, made, tmp_path):
     with pytest.raises(CampaignError, match="there is no map"):
         Map(tmp_path / "none.parquet")

@@ -18,6 +18,7 @@ from thermal_robot.blind.cases import Case, Kind, RobotChoice
 from thermal_robot.console import QUIET, counted, note
 from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import require_free, write_one, write_text
+from thermal_robot.report.pdf import write_page
 
 if TYPE_CHECKING:
     from thermal_robot.blind.real import RealCase
@@ -52,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--directory", metavar="DIR", help="the trial's folder, to continue it too (default: blind-N)")
     parser.add_argument("--workers", metavar="N", type=int, default=os.cpu_count() or 1, help="(default: %(default)s)")
     parser.add_argument("--json", metavar="F", help="write the score as JSON ('-' prints it instead of the text)")
-    parser.add_argument("--report", metavar="F.html", help="write a page with the score")
+    parser.add_argument("--report", metavar="F.html", help="write a page with the score, PDF by its ending")
     parser.add_argument("--markdown", action="store_true", help="print the tables of the README instead of the text")
     parser.set_defaults(run=run, writes=("json", "report"), forms={"json": "json", "report": "page"})
 
@@ -135,7 +136,8 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     if options.json:
         write_one(options.json, lambda path: write_text(path, written + "\n"))
     if options.report:
-        write_one(options.report, lambda path: write_text(path, html(found, time.strftime("%Y-%m-%d %H:%M"))))
+        page = html(found, time.strftime("%Y-%m-%d %H:%M"))
+        write_one(options.report, lambda path: write_page(path, page, options.report))
 
 
 def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) -> tuple[Case | RealCase, ...]:

@@ -21,7 +21,7 @@ from thermal_robot.campaign.checked import (
     checked_mapping,
     first_true,
 )
-from thermal_robot.campaign.settings import HOW_MOVED, STANDARD_TEMPERATURE, Settings, as_vector, given
+from thermal_robot.campaign.settings import ABOUT, HOW_MOVED, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, covariate_scale
@@ -66,6 +66,7 @@ _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("noise_position", "noise_orientation"), _sigma),
     **dict.fromkeys(("priors", "gears"), _SIZES),
     "reference_temperature": number(expected="a number"),
+    "about": ABOUT,
 }
 """What each part may be that is no array."""
 _WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simulated_orientation": 4}
@@ -144,6 +145,8 @@ class Campaign:
         rows of another kind. Their labels stand in ``labels``, the kind of each row in ``labels["kind"]``.
     facts
         What is known of the things that such rows share, by kind, SI.
+    about
+        Whose measurements they are, for reports: serial numbers, operator, date, whatever the user wants there.
 
     Raises
     ------
@@ -194,6 +197,7 @@ class Campaign:
     turned: tuple[str, ...] = ()
     readings: Mapping[str, Array] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         file = f"<{self.name}>"

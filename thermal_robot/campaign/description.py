@@ -72,6 +72,8 @@ def _facts(campaign: Any) -> Iterator[Sequence[str]]:
         yield "payload's centre", f"{_triple(campaign.payload_com / scale)} {length} in {robot.tool_frame}"
     if campaign.simulated_position is not None:
         yield "prediction", "from the simulator's columns sim.*, not from the URDF"
+    if campaign.about:
+        yield "about", ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in campaign.about.items())
     for name, sizes in (("gear ratios", campaign.gears), ("expected sizes", campaign.priors)):
         if sizes:
             yield name, ", ".join(f"{of} {size:g}" for of, size in sizes.items())

@@ -79,8 +79,9 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "gears": kinds.GEARS,
     "socket": {"distances": _pairs},
     "camera": kinds.CAMERAS,
+    "about": kinds.ABOUT,
 }
-"""What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
+"""What each key of each section of campaign.toml may be; priors, gears and about have keys of the user's own."""
 Kinds: TypeAlias = Mapping[str, "Mapping[str, Kind] | Kind"]
 """What each key of each section may be; of a section whose keys are the user's own, what the whole may be."""
 FILE_NAME = "campaign.toml"

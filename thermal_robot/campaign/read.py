@@ -466,6 +466,7 @@ def campaign_from_table(
     moves: str = MOVES[0],
     priors: Mapping[str, float] | None = None,
     gears: Mapping[str, float] | None = None,
+    about: Mapping[str, str] | None = None,
     name: str = "table",
     measured: bool = True,
 ) -> Campaign:
@@ -495,6 +496,8 @@ def campaign_from_table(
         approach where no column does; else ``"unknown"``.
     priors, gears
         Expected size by effect; transmission ratio by joint.
+    about
+        What stands on the first page of a report, by its name: serial numbers, operator, date.
     name
         Name of the campaign.
     measured
@@ -541,6 +544,7 @@ def campaign_from_table(
         section, key = place.split(".")
         stated.setdefault(section, {})[key] = given(FILE, *argument)
     stated["priors"] = given(FILE, "priors", {} if priors is None else priors, kinds.PRIORS)
+    stated["about"] = given(FILE, "about", {} if about is None else about, kinds.ABOUT)
     stated["gears"] = given(FILE, "gears", {} if gears is None else gears, kinds.GEARS)
     ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
     settings = Settings.stated(stated, urdf="", **ends)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from datetime import date
 from typing import Any, TypeAlias
 
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
@@ -49,6 +50,16 @@ SIGMA = number(
 _ABOVE = "a number above 0"
 PRIORS = mapping(number(above=0.0, expected=_ABOVE, problem="the expected size of an effect must be positive"))
 GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio must be positive"))
+_TEXT = text("text in quotes, a number or a date")
+
+
+def _said(value: Any, path: str) -> str:
+    """Take text, a number or a date as text."""
+    plain = isinstance(value, (int, float, date)) and not isinstance(value, bool)
+    return _TEXT(str(value) if plain else value, path)
+
+
+ABOUT = mapping(_said)
 _PIXELS = number(above=0.0, expected="a number of pixels above 0")
 CAMERAS = mapping(
     record(
@@ -92,7 +103,7 @@ class Settings:
         Ends of the chain; ``root_frame`` ``None`` for the URDF's root.
     gravity
         m/s², in the root frame; ``None`` for the robot's default.
-    moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned, facts
+    moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned, facts, about
         As in a :class:`~thermal_robot.Campaign`.
     kind
         What all rows measure, where the table has no column ``kind``; empty for position or pose.
@@ -120,10 +131,11 @@ class Settings:
     turned: tuple[str, ...] = ()
     kind: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
-        spare = {"turned", "kind", "facts"}  # left out where nothing is said
+        spare = {"turned", "kind", "facts", "about"}  # left out where nothing is said
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         own = {name: value for name, value in own.items() if value or name not in spare}
         own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
@@ -132,9 +144,8 @@ class Settings:
     def of_rows(self) -> dict[str, Any]:
         """Fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
         frames = ("base_known", "tool_known", "target", "payload_com")
-        return {
-            key: getattr(self, key) for key in (*frames, "moves", "reference_temperature", "gears", "units", "facts")
-        }
+        known = ("moves", "reference_temperature", "gears", "units", "facts", "about")
+        return {key: getattr(self, key) for key in (*frames, *known)}
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
@@ -159,6 +170,7 @@ class Settings:
             gears=sections.get("gears", {}),
             kind=sections["measurements"].get("kind", ""),
             facts=facts_of(sections, scale),
+            about=sections.get("about", {}),
         )
 
     @classmethod
@@ -193,16 +205,15 @@ _KEYS: dict[str, Kind] = {
     "turned": listed(text("the name of a quantity")),
     "kind": text(empty=True),
     "facts": lambda value, path: dict(value),
+    "about": ABOUT,
 }
 
 
 def settings_kind(value: Any, path: str) -> Settings:
     """Validate the settings in a file (:mod:`thermal_robot.schema`)."""
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
-    values = record(_KEYS)(
-        {"moves": "unknown", "turned": (), "kind": "", "facts": {}, **value} if isinstance(value, Mapping) else value,
-        path,
-    )
+    unsaid = {"moves": "unknown", "turned": (), "kind": "", "facts": {}, "about": {}}
+    values = record(_KEYS)({**unsaid, **value} if isinstance(value, Mapping) else value, path)
     sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
     return Settings(**{**values, **sigmas, "units": Units(**values["units"])})
 

@@ -268,6 +268,7 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "payload": {"com": [value / scale for value in settings.payload_com]},
         "priors": dict(settings.priors),
         "gears": dict(settings.gears),
+        "about": dict(settings.about),
         **facts_in(settings.facts, scale),
     }
     return {section: content for section, content in document.items() if content}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 
 from thermal_robot.campaign.table import TABLES
@@ -38,7 +38,7 @@ def _plain(what: str, *endings: str, folder: bool = False) -> Form:
 FORMS = {
     "json": _plain("JSON file", ".json"),
     "model": _plain("file of a model", ".json"),
-    "page": _plain("page", ".html", ".htm"),
+    "page": Form("page", {".html": "", ".htm": "", ".pdf": "weasyprint"}),
     "table": Form("table", TABLES),
     "csv": _plain("CSV table", ".csv"),
     "picture": _plain("picture", ".png", ".svg", ".pdf", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".eps"),
@@ -50,7 +50,7 @@ FORMS = {
 }
 """What an option writes; :mod:`~thermal_robot.commands.table` says which option writes what."""
 
-EXTRAS = {"pyarrow": "parquet", "openpyxl": "excel", "odf": "excel"}
+EXTRAS = {"pyarrow": "parquet", "openpyxl": "excel", "odf": "excel", "weasyprint": "pdf"}
 """The extra of this package that brings a module."""
 
 _TAKEN = {ending for form in FORMS.values() for ending in form.endings}
@@ -77,8 +77,18 @@ def require_endings(options: argparse.Namespace) -> None:
         if ending not in form.endings:
             known = ", ".join(form.endings) or "a name without the ending of a file"
             raise CampaignError(file, f"is no {form.what} by its ending", found=ending, expected=known)
-        module = form.endings[ending]
-        if module and find_spec(module) is None:
-            extra = f'pip install "thermal-robot[{EXTRAS[module]}]", or another ending'
-            problem = f"cannot be written: {ending} needs {module}, which is not installed"
-            raise CampaignError(file, problem, expected=extra)
+        if module := form.endings[ending]:
+            _require(module, file, ending)
+
+
+def _require(module: str, file: str, ending: str) -> None:
+    """Import what writing a file needs; refuse it where that is not installed, or lacks a library of the system."""
+    try:
+        import_module(module)
+    except ImportError as error:
+        problem = f"cannot be written: {ending} needs {module}, which is not installed"
+        extra = f'pip install "thermal-robot[{EXTRAS[module]}]", or another ending'
+        raise CampaignError(file, problem, expected=extra) from error
+    except OSError as error:
+        problem, found = f"cannot be written: {module} lacks a library of the system", str(error).splitlines()[0]
+        raise CampaignError(file, problem, found=found, expected="that library, or another ending") from error

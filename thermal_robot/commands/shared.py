@@ -14,6 +14,7 @@ from thermal_robot.campaign.document import read_declaration
 from thermal_robot.console import QUIET
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import checksum, write_text, written
+from thermal_robot.report.pdf import write_page
 
 Output = tuple[str | None, Callable[[Path], object]]
 """A file that was asked for, if it was, and what writes it."""
@@ -53,12 +54,12 @@ def as_page(
     files: Iterable[Path] = (),
     name: Callable[..., str] = str,
 ) -> Output:
-    """Output of a page, with the time and the SHA-256 of its input files in the footer."""
+    """Output of a page, PDF by its ending, with the time and the SHA-256 of its input files in the footer."""
 
     def write(path: Path) -> None:
         # a pipe was read once, and is no file
         made_from = {name(file): checksum(file) for file in dict.fromkeys(files) if file.is_file()}
-        write_text(path, render(found, time.strftime("%Y-%m-%d %H:%M"), made_from))
+        write_page(path, render(found, time.strftime("%Y-%m-%d %H:%M"), made_from), target)
 
     return target, write
 

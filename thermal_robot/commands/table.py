@@ -148,7 +148,7 @@ def _effects(name: str, text: str, **how: Any) -> Option:
 _NAMED = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
 _CAMPAIGN = _file("campaign", _NAMED)
 _MODEL = _file("model", "file that `diagnose --model` wrote, or - for standard input")
-_REPORT = _output("page", "F.html", "--report", "write a page with figures ('-' prints it)")
+_REPORT = _output("page", "F.html", "--report", "write a page with figures, PDF by its ending ('-' prints it)")
 _CHOICE = (_effects("--without", "leave effects out", default=[]), _effects("--only", "consider these only"))
 _ROBOT = "its file, or a robot that comes along, as in campaign.toml"
 _ROOT = _value("LINK", "--root", "where the chain starts; the root of the URDF where left out")
@@ -163,7 +163,15 @@ COMMANDS = {
         "diagnose a campaign that comes with the package, and draw it",
         "",
         "campaigns:demo",
-        [_output("page", "F.html", "--report", "page to draw (default: %(default)s)", default="demo.html")],
+        [
+            _output(
+                "page",
+                "F.html",
+                "--report",
+                "page to draw, PDF by its ending (default: %(default)s)",
+                default="demo.html",
+            )
+        ],
         fixed=_ALL,
     ),
     "plan": Command(

@@ -149,6 +149,7 @@ def answer(
     groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,
+        about=campaign.about,
         robot=campaign.robot.name,
         tool_frame=campaign.robot.tool_frame,
         samples=campaign.samples,

@@ -5,7 +5,7 @@ This module knows nothing of reports: whoever is registered in :mod:`thermal_rob
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -112,6 +112,8 @@ class Diagnosis(RenderedPage):
         Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
     says
         What its rows say, for a reader.
+    about
+        What stands on the first page of a report: serial numbers, operator, date.
 
     Examples
     --------
@@ -155,6 +157,7 @@ class Diagnosis(RenderedPage):
     misfit: Misfit | None = None
     performance: Performance | None = None
     says: str = ""
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def usable(self) -> bool:

@@ -254,7 +254,10 @@ class Comparison(RenderedPage):
             schema=SCHEMA,
             robot=self.robot,
             tool_frame=self.tool_frame,
-            campaigns=[{"name": name, "samples": count, "diagnosis": d.summary} for name, count, d in told],
+            campaigns=[
+                {"name": name, "samples": count, "diagnosis": d.summary, "about": dict(d.about)}
+                for name, count, d in told
+            ],
             verdict={"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
             effects=[asdict(effect) for effect in self.effects],
             changes=[asdict(change) for change in self.changes],

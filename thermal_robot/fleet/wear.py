@@ -137,7 +137,7 @@ def of_fits(
     worn = results(whole, series, found, moments[0] if moments else None, limits or {}, false_alarm)
     dates = [each.isoformat(timespec="minutes").removesuffix("T00:00") for each in moments] or [""] * len(fits)
     visits = tuple(
-        Visit(fit.campaign.name, date, float(time), int((~fit.explanation.outliers).sum()))
+        Visit(fit.campaign.name, date, float(time), int((~fit.explanation.outliers).sum()), fit.campaign.about)
         for fit, date, time in zip(fits, dates, times, strict=True)
     )
     factor = float(np.sqrt(scatter(series, next(iter(found)))))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from thermal_robot.fleet import settings
-from thermal_robot.percents import percent
 from thermal_robot.renderer import RenderedPage
 
 SCHEMA = "thermal-robot/wear/1"
@@ -28,12 +27,15 @@ class Visit:
         Days since the first campaign; its number, from 0, where no dates were given.
     rows
         Number of rows used.
+    about
+        What the campaign says of itself: serial numbers, operator.
     """
 
     name: str
     date: str
     time: float
     rows: int
+    about: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,11 @@ class Worn:
     crossing: Crossing | None = None
     confounded_with: tuple[str, ...] = ()
 
+    @property
+    def perhaps(self) -> bool:
+        """Whether it probably moves without an alarm."""
+        return self.comparable and not self.alarm and self.moved > settings.LIKELY
+
 
 @dataclass(frozen=True, repr=False)
 class Wear(RenderedPage):
@@ -203,10 +210,7 @@ class Wear(RenderedPage):
     @property
     def summary(self) -> str:
         """Result in one sentence: what moved, how and when."""
-        span = f"{len(self.campaigns)} campaigns of {self.robot}"
-        if not self.alarms:
-            return f"Over {span} nothing moves that would not by chance in {_share(self.false_alarm)} of such series."
-        return f"Over {span}: {'; '.join(_moves(self, worn) for worn in self.alarms)}."
+        return str(self._rendered("wear_headline"))
 
     def to_dict(self) -> dict[str, Any]:
         """JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
@@ -216,81 +220,3 @@ class Wear(RenderedPage):
     def __repr__(self) -> str:
         moving = ", ".join(f"{w.parameter} ({w.kind})" for w in self.alarms)
         return f"Wear({self.robot!r}, {len(self.campaigns)} campaigns: {moving or 'no alarm'})"
-
-    def __str__(self) -> str:
-        return "\n".join(_lines(self))
-
-
-def _lines(wear: Wear) -> Iterator[str]:
-    first, last = wear.campaigns[0], wear.campaigns[-1]
-    days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
-    yield wear.summary
-    yield ""
-    yield f"campaigns    {len(wear.campaigns)}{days}"
-    yield f"alarms       at most {_share(wear.false_alarm)} of series without a change ring"
-    yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {percent(wear.nothing)}"
-    for worn in wear.alarms:
-        yield ""
-        yield from _of_one(wear, worn)
-    quiet = [w for w in wear.parameters if w.comparable and not w.alarm]
-    if any(w.moved > settings.LIKELY for w in quiet):
-        yield ""
-    for w in quiet:
-        if w.moved > settings.LIKELY:
-            yield f"perhaps      {_moves(wear, w)}: {percent(w.moved, 0)}, but no alarm"
-    yield ""
-    stays = [w for w in quiet if w.moved <= settings.LIKELY]
-    if stays:
-        yield f"stays        {'; '.join(f'{w.parameter} (moved: {percent(w.moved)})' for w in stays)}"
-    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
-    hidden = [w for w in wear.parameters if not w.comparable]
-    for reason in dict.fromkeys(w.reason for w in hidden):
-        yield f"not compared {', '.join(w.parameter for w in hidden if w.reason == reason)}: {reason}"
-    yield from (f"note         {note}" for note in wear.notes)
-
-
-def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
-    yield f"ALARM        {_moves(wear, worn)}"
-    kinds = ", ".join(f"{kind} {percent(p, 0)}" for kind, p in worn.kinds.items() if p >= 0.005)
-    yield f"             chance of such an alarm without a change: at most {worn.chance:.1g}; {kinds}"
-    if worn.jump:
-        yield f"             95 %: {_between(wear, worn.jump.earliest, worn.jump.latest)}"
-    if worn.confounded_with:
-        yield f"             cannot be told from a change of {', '.join(worn.confounded_with)}"
-    if worn.crossing:
-        yield f"             {_reaches(worn.crossing, worn.unit)}"
-
-
-def _moves(wear: Wear, worn: Worn) -> str:
-    """Describe the change of one parameter."""
-    name = f"{worn.title}, {worn.parameter}"
-    if worn.jump is not None:
-        size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"
-        where = _between(wear, worn.jump.after, worn.jump.after + 1)
-        return f"{name} jumped by {size} {where} ({percent(worn.jump.probability, 0)})"
-    if worn.rate is not None:
-        return f"{name} moves by {worn.rate.value:+.3g} ± {worn.rate.std:.2g} {worn.unit} a day"
-    how = "moves steadily" if worn.kind == "trend" else "wanders"
-    return f"{name} {how}, by {worn.change:+.3g} ± {worn.change_std:.2g} {worn.unit} from first to last"
-
-
-def _between(wear: Wear, first: int, last: int) -> str:
-    visits = (wear.campaigns[first], wear.campaigns[last])
-    return "between " + " and ".join(f"{v.name} ({v.date})" if wear.dated else v.name for v in visits)
-
-
-def _reaches(crossing: Crossing, unit: str) -> str:
-    limit = f"limit {crossing.limit:.3g} {unit}"
-    said = {
-        "passed": "passed",
-        "never": "never, as it does not go there",
-        "unknown": "not foreseen, for lack of a rate",
-    }
-    if crossing.state in said:
-        return f"{limit}: {said[crossing.state]}"
-    expected, low, high = crossing.dates
-    return f"{limit}: about {expected} (95 %: {low} to {high or 'never'})"
-
-
-def _share(probability: float) -> str:
-    return f"{100.0 * probability:.2g} %"

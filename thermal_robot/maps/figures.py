@@ -72,8 +72,13 @@ def plot_map(found: Map, by: str = "required_warm") -> Figure:
     if found.notes["over"] == "positions" and len(varies) == 2:
         _plane(figure, found, places, values, varies, label, largest=larger_is_better(by))
     else:
-        _space(figure, places, values, label)
+        _space(figure, places, values, label, largest=larger_is_better(by))
     return figure
+
+
+def _colours(largest: bool) -> str:
+    """Colour map whose yellow end is the better one, in a plane and in space."""
+    return "viridis" if largest else "viridis_r"
 
 
 def _plane(
@@ -87,7 +92,7 @@ def _plane(
     )
     grid[row, column] = values
     own = figure.add_subplot()
-    drawn = own.contourf(first, second, grid, levels=_LEVELS, cmap="viridis_r" if not largest else "viridis")
+    drawn = own.contourf(first, second, grid, levels=_LEVELS, cmap=_colours(largest))
     own.contour(first, second, grid, levels=drawn.levels, colors="white", linewidths=0.4)
     best = values.argmax() if largest else values.argmin()
     own.plot(*places[best, axes], marker="*", markersize=13, color="#e69f00", markeredgecolor="black", linestyle="none")
@@ -100,11 +105,11 @@ def _plane(
     figure.colorbar(drawn, ax=own, label=label, shrink=0.9)
 
 
-def _space(figure: Figure, places: Array, values: Array, label: str) -> None:
+def _space(figure: Figure, places: Array, values: Array, label: str, *, largest: bool) -> None:
     """Draw the places as points, a limited number of them."""
     step = max(len(places) // 20_000, 1)
     own = figure.add_subplot(projection="3d")
-    drawn = own.scatter(*places[::step].T, c=values[::step], s=3.0, cmap="viridis", depthshade=False)
+    drawn = own.scatter(*places[::step].T, c=values[::step], s=3.0, cmap=_colours(largest), depthshade=False)
     for name, axis in zip("xyz", (own.xaxis, own.yaxis, own.zaxis), strict=True):
         axis.set_label_text(f"{name} (m)")
     own.set_box_aspect(np.maximum(np.ptp(places, axis=0), 1e-3))

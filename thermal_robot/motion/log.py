@@ -103,6 +103,8 @@ class MotionLog:
         What an output must move by to be shown, rad, by joint.
     notes
         What was odd about the log and was accepted, a sentence each.
+    about
+        Whose log it is, for reports: serial numbers, operator, date.
 
     Examples
     --------
@@ -123,6 +125,7 @@ class MotionLog:
     payload: tuple[float, Array] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def kinds(self) -> dict[str, str]:

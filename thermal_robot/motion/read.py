@@ -62,6 +62,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "payload": {"mass": NOT_NEGATIVE, "com": kinds.VECTOR},
     "channels": channels_kind,
     "tolerance": TOLERANCE,
+    "about": kinds.ABOUT,
 }
 """What each key of each section of motion.toml may be."""
 
@@ -77,6 +78,7 @@ class Declaration:
     servos: Mapping[str, Servo] = field(default_factory=dict)
     payload: tuple[float, Array] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]]) -> Declaration:
@@ -92,6 +94,7 @@ class Declaration:
             {joint: Servo(**said) for joint, said in sections.get("servo", {}).items()},
             (payload["mass"], com) if "mass" in payload else None,
             sections.get("tolerance", {}),
+            sections.get("about", {}),
         )
 
 
@@ -314,6 +317,7 @@ def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: 
         declaration.payload,
         declaration.tolerance,
         (*(warning for table in tables for warning in table.warnings), *notes),
+        declaration.about,
     )
     return refused(log, " and ".join(table.file for table in tables))
 

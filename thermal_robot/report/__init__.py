@@ -35,7 +35,13 @@ if TYPE_CHECKING:
         plot_where,
         plot_which,
     )
-    from thermal_robot.report.text_campaigns import comparison_headline, comparison_text, fleet_text
+    from thermal_robot.report.text_campaigns import (
+        comparison_headline,
+        comparison_text,
+        fleet_text,
+        wear_headline,
+        wear_text,
+    )
     from thermal_robot.report.text_crash import crash_headline, crash_text
     from thermal_robot.report.text_motions import motion_comparison_headline, motion_comparison_text, motion_text
     from thermal_robot.report.words import advice, headline
@@ -76,7 +82,9 @@ __all__ = [
     "schema",
     "text",
     "wear_fragment",
+    "wear_headline",
     "wear_html",
+    "wear_text",
 ]
 _HOMES = {
     "motion_plots": ("plot_motions",),
@@ -85,7 +93,7 @@ _HOMES = {
     "motion_words": ("motion_advice", "motion_headline"),
     "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_fragment", "wear_html"),
     "plain_text": ("calibration_text", "text"),
-    "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
+    "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text", "wear_headline", "wear_text"),
     "text_crash": ("crash_headline", "crash_text"),
     "words": ("advice", "headline"),
 }

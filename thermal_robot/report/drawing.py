@@ -23,6 +23,9 @@ INK, MUTED, FAINT, PAPER = "#22282e", "#6b7681", "#dde2e7", "#fffffe"
 BEFORE, AFTER, THIRD = "#e69f00", "#1f6fb5", "#00916a"
 SMALL, NORMAL, LARGE = 8.0, 9.0, 11.0
 RASTER_ABOVE = 2000
+NARROW, BROAD = 4.9, 9.2
+"""Widths of a figure, inches: of one panel, whose small letters are 8 pixels high where it fills a telephone; and of
+columns beside each other, which a telephone shows below each other."""
 _DRAWN = 6000
 
 

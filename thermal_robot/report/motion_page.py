@@ -43,7 +43,7 @@ def _shown(d: MotionDiagnosis) -> dict[str, Any]:
     heads, rows = words.gaps(d)
     return {
         "d": d,
-        "told": words,
+        "say": words,
         "drawn": plots,
         "numbers": _numbers(d),
         "gaps": {"label": "Rms gap of each joint", "heads": heads, "rows": rows},
@@ -78,12 +78,23 @@ def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
             told = status in ("found", "confounded")
             if displayed_status(one) != status or (told and one.name not in shown):
                 continue
-            yield {
-                "finding": one,
-                "status": heading,
-                "told": told,
-                "means": words.MEANS.get(one.name, "") if told else "",
-                "known": words.parameters(d, one.name) if told else [],
-                "moves": words.places(d, one.name) if told else "",
-                "needs": _needs(d, one) if status == "not_testable" else "",
-            }
+            yield _effect(d, one, heading, told)
+
+
+def _effect(d: MotionDiagnosis, one: Finding, heading: str, told: bool) -> dict[str, Any]:
+    """Return an effect as the table of every effect wants it."""
+    means, moves = words.MEANS.get(one.name, ""), words.places(d, one.name) if told else ""
+    rivals = f"These data cannot tell it from {', '.join(one.confounded_with)}." if one.confounded_with else ""
+    known = words.parameters(d, one.name) if told else []
+    return {
+        "name": one.name,
+        "quiet": not told,
+        "open": told and bool(known or means),
+        "needs": _needs(d, one) if one.status == "not_testable" else None,
+        "status": heading,
+        "probability": units.probability(one.probability),
+        "share": units.percent(one.shrinkage) if told else "",
+        "before": list(filter(None, (means, rivals))),
+        "known": known,
+        "after": [f"moves {moves}"] if moves else [],
+    }

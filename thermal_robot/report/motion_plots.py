@@ -11,8 +11,11 @@ from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
     BEFORE,
+    BROAD,
     INK,
     MUTED,
+    NARROW,
+    NORMAL,
     RASTER_ABOVE,
     SMALL,
     Drawing,
@@ -44,16 +47,22 @@ def plot_motions(diagnosis: MotionDiagnosis) -> Figure:
     Returns
     -------
     Figure
-        Two panels a joint, position above gap.
+        Two panels a joint, position above gap; two joints beside each other.
     """
     joints = list(diagnosis.joints)
-    figure = Drawing(9.2, 3.5 * max(len(joints), 1))
-    panels = figure.subplots(2 * max(len(joints), 1), 1, squeeze=False, height_ratios=(1.7, 1.0) * max(len(joints), 1))
+    columns = 2 if len(joints) > 1 else 1
+    lines = max(-(-len(joints) // columns), 1)
+    figure = Drawing(BROAD if columns > 1 else NARROW, 3.9 * lines)
+    panels = figure.subplots(2 * lines, columns, squeeze=False, height_ratios=(1.7, 1.0) * lines)
+    for k in range(columns * lines):
+        above, below = panels[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]
+        if k < len(joints):
+            _draw_motion(above, below, diagnosis, joints[k])
+        else:
+            above.axis("off")
+            below.axis("off")
     if not joints:
         note(panels[0, 0], "No joint was usable.")
-        panels[1, 0].axis("off")
-    for k, joint in enumerate(joints):
-        _draw_motion(panels[2 * k, 0], panels[2 * k + 1, 0], diagnosis, joint)
     return figure
 
 
@@ -76,14 +85,15 @@ def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> No
         below.plot(one["time"], best.factor * (one["measured"] - one[name]), color=colour, linewidth=1.1, label=said)
     for line in (*above.lines, *below.lines):
         line.set_rasterized(len(one) > RASTER_ABOVE)
-    title(above, f"{joint}, motion {_label(d, motion)}")
+    above.set_title(plain(f"{joint}, motion {_label(d, motion)}"), loc="left", fontsize=NORMAL, color=INK,
+                    fontweight="bold", pad=30)  # fmt: skip
     above.set_ylabel(f"{'torque' if torque else 'position'} ({wide})")
     below.set_ylabel(f"gap ({best.unit})")
     below.set_xlabel("time (s)")
     for axes in (above, below):
         tidy(axes)
         axes.margins(x=0.01)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.4, **_KEY)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, handlelength=1.4, labelspacing=0.2, **_KEY)
 
 
 def _window(one: pd.DataFrame) -> pd.DataFrame:
@@ -106,7 +116,7 @@ def _label(d: MotionDiagnosis, motion: int) -> str:
 def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
     """Draw the gap of each joint before and after against its velocity, its load and its position, with the middles."""
     joints = list(diagnosis.joints)
-    figure = Drawing(9.2, 0.5 + 2.35 * max(len(joints), 1))
+    figure = Drawing(BROAD, 0.8 + 2.35 * max(len(joints), 1))
     panels = figure.subplots(max(len(joints), 1), 3, squeeze=False, sharey="row")
     if not joints:
         for axes in panels[0]:
@@ -126,10 +136,11 @@ def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
         for axes, (along, what) in zip(line, follows, strict=True):
             _draw_against(axes, along, [best.factor * gap for gap in gaps])
             axes.set_xlabel(what)
-        line[0].set_ylabel(f"gap ({best.unit})")
-        title(line[0], joint)
+            axes.set_ylabel(f"gap ({best.unit})")
+            axes.tick_params(labelleft=True)
+            title(axes, joint)
     if joints:
-        panels[0, 2].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, markerscale=4.0, **_KEY)
+        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
     return figure
 
 
@@ -185,14 +196,14 @@ def plot_hysteresis(diagnosis: MotionDiagnosis) -> Figure:
     joints = list(diagnosis.joints)
     columns = min(3, max(len(joints), 1))
     lines = -(-max(len(joints), 1) // columns)
-    figure = Drawing(9.2 if columns > 1 else 5.6, 0.5 + 2.9 * lines)
+    figure = Drawing(BROAD if columns > 1 else NARROW, 0.8 + 2.9 * lines)
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
     for axes, joint in zip(panels, joints, strict=False):
         _draw_loop(axes, diagnosis, joint)
     for axes in panels[len(joints) :]:
         axes.axis("off")
     if joints:
-        panels[min(columns, len(joints)) - 1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.1), ncols=2, **_KEY)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
     return figure
 
 
@@ -234,7 +245,7 @@ def _draw_loop(axes: Axes, d: MotionDiagnosis, joint: str) -> None:
 def plot_shares(diagnosis: MotionDiagnosis) -> Figure:
     """Draw the gap of each joint before, and in motions held out, as bars, with the noise of its reading."""
     joints = list(diagnosis.joints)
-    figure = Drawing(7.6, 1.2 + 0.62 * max(len(joints), 1))
+    figure = Drawing(NARROW, 1.4 + 0.62 * max(len(joints), 1))
     axes = figure.subplots()
     if not joints:
         note(axes, "No joint was usable.")
@@ -251,6 +262,6 @@ def plot_shares(diagnosis: MotionDiagnosis) -> Figure:
     axes.set_yticks(range(len(joints)), [plain(joint) for joint in joints])
     axes.set_ylim(len(joints) - 0.4, -0.6)
     axes.set_xlabel(f"rms gap ({', '.join(dict.fromkeys(best.unit for best in scales))})")
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, **_KEY)
+    figure.legend(loc="outside upper left", ncols=2, **_KEY)
     tidy(axes, grid="x")
     return figure

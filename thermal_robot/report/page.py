@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
+from matplotlib.transforms import Bbox
 
 from thermal_robot.arrays import Array
-from thermal_robot.report import drawing, plots, tables, text_campaigns, units, words
+from thermal_robot.report import drawing, meanings, plots, tables, text_campaigns, units, words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +36,7 @@ def _environment() -> Environment:
     made = Environment(loader=PackageLoader(__package__), autoescape=True, trim_blocks=True, lstrip_blocks=True)
     made.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     made.filters["svg"] = svg
-    made.globals.update(plots=plots, tables=tables, units=units, words=words)
+    made.globals.update(meaning=meanings, plots=plots, tables=tables, units=units, words=words)
     macros = made.get_template("parts.html").module
     made.globals.update({name: macro for name, macro in vars(macros).items() if not name.startswith("_")})
     return made
@@ -130,7 +131,8 @@ def svg(figure: Figure, label: str) -> Markup:
     """Inline SVG (Scalable Vector Graphics) of a figure, reproducible.
 
     Its colours are those of the page, and its identifiers clash with no other figure's. ``label`` says what it shows,
-    for those who cannot see it.
+    for those who cannot see it. Where panels stand beside each other, views of the same drawing follow, a column each,
+    which a telephone shows below each other in its place.
     """
     stream = StringIO()
     figure.savefig(stream, format="svg", transparent=True, dpi=200, metadata={"Date": None})
@@ -145,10 +147,45 @@ def svg(figure: Figure, label: str) -> Markup:
     # Matplotlib draws identifiers at random: numbers take their places, with the content's hash before them
     numbers = {name: str(k) for k, name in enumerate(dict.fromkeys(re.findall(r'\bid="([^"]+)"', text)))}
     text = re.sub(r'(\bid="|href="#|url\(#)([^")]+)', lambda m: m[1] + "@" + numbers.get(m[2], m[2]), text)
-    text = text.replace("@", f"f{sha256(text.encode()).hexdigest()[:8]}-")
+    name = f"f{sha256(text.encode()).hexdigest()[:8]}-"
+    text = text.replace("@", name)
+    views = "".join(_view(box, name) for box in _columns(figure))
     width = f"max-width:{figure.get_figwidth() * _PIXELS:.0f}px"
-    shown = f'<svg role="img" aria-label="{escape(label)}" class="tr-figure" style="{width}"'
-    return Markup(text.replace("<svg", shown, 1).strip())
+    large = " tr-large" if figure.get_figwidth() > drawing.NARROW else ""
+    kind = "tr-figure tr-broad" if views else f"tr-figure{large}"
+    shown = f'<svg role="img" aria-label="{escape(label)}" class="{kind}" style="{width}"'
+    return Markup(text.replace("<svg", shown, 1).strip() + views)
+
+
+_EDGE = 0.04  # inches about what a view shows
+
+
+def _columns(figure: Figure) -> list[tuple[float, float, float, float]]:
+    """Left, top, width and height, points, of each column of panels and of what stands beyond; none of a single one."""
+    beside: dict[int, list[Any]] = {}
+    for axes in figure.axes:
+        place = axes.get_subplotspec()
+        if place is not None and (axes.axison or axes.texts):
+            beside.setdefault(place.colspan.start, []).append(axes)
+    if len(beside) < 2:
+        return []
+    parts = [[figure._suptitle]] if figure._suptitle else []  # type: ignore[attr-defined]
+    parts += [*(beside[k] for k in sorted(beside)), *([legend] for legend in figure.legends)]
+    return [_box(figure, part) for part in parts]
+
+
+def _box(figure: Figure, part: list[Any]) -> tuple[float, float, float, float]:
+    seen = Bbox.union([one.get_tightbbox() for one in part]).transformed(figure.dpi_scale_trans.inverted())
+    left, right = max(seen.x0 - _EDGE, 0.0), min(seen.x1 + _EDGE, figure.get_figwidth())
+    top, bottom = (figure.get_figheight() - y for y in (seen.y1 + _EDGE, seen.y0 - _EDGE))
+    return 72.0 * left, 72.0 * top, 72.0 * (right - left), 72.0 * (bottom - top)
+
+
+def _view(box: tuple[float, float, float, float], name: str) -> str:
+    left, top, width, height = (f"{side:.1f}" for side in box)
+    most = f"max-width:{box[2] / 72.0 * _PIXELS:.0f}px"
+    drawn = f'<use href="#{name}0"/>'  # the outermost group of all that is drawn
+    return f'<svg class="tr-figure tr-part" style="{most}" viewBox="{left} {top} {width} {height}">{drawn}</svg>'
 
 
 def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
@@ -261,6 +298,7 @@ def comparison_html(comparison: Plain, generated: str | None = None, files: Mapp
         "headline": text_campaigns.comparison_headline(comparison),
         "campaigns": map(text_campaigns.campaign_in_words, comparison["campaigns"]),
         "sections": _of_comparison(comparison),
+        "meanings_of": meanings.of_comparison(comparison),
     }
     return render("campaigns.html", shown, title="Comparison of campaigns", generated=generated, files=files)
 
@@ -278,12 +316,14 @@ def _of_comparison(comparison: Plain) -> Iterator[dict[str, Any]]:
     if told["effects"][1:]:
         said = "χ² of equal parameters in all campaigns, all other effects free."
         yield _section("Effects", told["effects"], 2, said=said)
-    if told["parameters"][1:]:
+    if each := list(text_campaigns.comparison_parameters(comparison)):
         drawn = plots.plot_differences(comparison), "Differences of parameters in standard deviations"
-        said = "Each by its own campaign, ± one standard deviation; the difference is of the two furthest apart."
-        yield _section("Parameters", told["parameters"], 2, said=said, drawn=drawn)
-    said = "Where both campaigns measured, unknown frames aligned. Beyond twice the stated deviation a model is wrong."
-    yield _section("Predictions", told["predictions"], 1, said=said)
+        said = "Each by its own campaign, ± one standard deviation."
+        heads = ("effect", "parameter", "difference", "between", "by chance")
+        yield {"heading": "Parameters", "said": said, "drawn": drawn, "each": (heads, each)}
+    said = "Where both campaigns measured, unknown frames aligned."
+    predictions = [(both, verdict, *figures) for both, *figures, verdict in told["predictions"]]
+    yield _section("Predictions", predictions, 2, said=said)
     if comparison["not_told"]:
         said = "Frames or other parameters take this up:"
         yield {"heading": "Not compared", "said": said, "lines": comparison["not_told"]}
@@ -291,13 +331,6 @@ def _of_comparison(comparison: Plain) -> Iterator[dict[str, Any]]:
 
 def _section(heading: str, table: list[tuple[str, ...]], words: int, **more: Any) -> dict[str, Any]:
     return {"heading": heading, "heads": table[0], "rows": table[1:], "words": words, **more}
-
-
-_EXPLAINED = {
-    "The same in all robots": "A mean that is not zero, of every robot that can tell it, whether the effect was "
-    "found there or not. Effects that do nearly the same may show one cause in two lines: the upper one counts.",
-    "Robots that stand out": "Each against its own group, with the probability that it is unlike the others.",
-}
 
 
 def fleet_html(summary: Plain, generated: str | None = None) -> str:
@@ -314,6 +347,7 @@ def fleet_html(summary: Plain, generated: str | None = None) -> str:
         "kicker": "What is wrong with which robot, and what several share",
         "headline": text_campaigns.fleet_headline(summary),
         "sections": _of_fleet(summary),
+        "meanings_of": meanings.of_fleet(summary),
     }
     return render("campaigns.html", shown, title="Fleet", generated=generated)
 
@@ -322,7 +356,7 @@ def _of_fleet(summary: Plain) -> Iterator[dict[str, Any]]:
     if any(effect["found"] for effect in summary["effects"]):
         yield {"drawn": (plots.plot_fleet(summary), "How many robots each effect was found in")}
     for heading, table in text_campaigns.fleet_tables(summary).items():
-        yield _section(heading, table, len(table[0]), said=_EXPLAINED.get(heading, ""))
+        yield _section(heading, table, len(table[0]))
     if reasons := text_campaigns.failures(summary):
         yield {"heading": "Without a diagnosis", "lines": reasons}
 
@@ -339,12 +373,10 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     files
         Names of the files that it was made from, with the SHA-256 of each, for the footer.
     """
-    said = (
-        f"Without any change, at most {units.percent(wear.false_alarm)} of such series ring at all, whatever the "
-        f"parameter and the day. Campaigns scatter {wear.scatter:.2f} times as much as their deviations say."
-    )
+    said = f"Campaigns scatter {wear.scatter:.2f} times as much as their deviations say."
     kicker = "What moves, at once or steadily, and when it crosses a limit"
-    shown = {"kicker": kicker, "headline": wear.summary, "said": said, "sections": _of_wear(wear)}
+    shown = {"kicker": kicker, "headline": _firm(wear.summary), "said": said, "sections": _of_wear(wear)}
+    shown["meanings_of"] = meanings.of_wear(wear, plots.CONTROL)
     return render("campaigns.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
 
 
@@ -353,18 +385,21 @@ def wear_fragment(wear: Wear) -> str:
     return render("campaigns.html", {"headline": wear.summary, "sections": _of_wear(wear)})
 
 
+def _firm(sentence: str) -> str:
+    """Keep values with their deviations and units, and dates, on one line."""
+    whole = re.sub(r" ± ", f"{words.NO_BREAK}±{words.NO_BREAK}", words.bound(sentence))
+    return re.sub(r"(?<=\d)-(?=\d)", "-\u2060", whole)
+
+
 def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:
-    label = "Each parameter in each campaign, with one standard deviation, and how it moves"
-    after = (
-        "Dots are the value that each campaign has by itself, all other parameters as they are over time, with one "
-        "standard deviation, about the mean of the line. The line is what is told. A jump lies in its band with 95 %."
-    )
-    yield {"heading": "Over time", "drawn": (plots.plot_wear(wear), label), "after": after}
-    after = "Moved: posterior probability. By chance: at most so many series without any change show a move as clear."
+    label = "Control charts: each parameter in each campaign, with its limits, and how it moves"
+    yield {"heading": "Over time", "drawn": (plots.plot_wear(wear), label)}
     label = "Every parameter: how it moves, how far, how sure that is"
-    yield _section("Parameters", text_campaigns.wear_table(wear), 2, after=after, label=label)
-    visits = [(visit.name, visit.date, str(visit.rows)) for visit in wear.campaigns]
-    heads = ("campaign", "date", "rows used")
-    yield _section("Campaigns", [heads, *visits], 2, label="Campaigns in the order of time")
+    yield _section("Parameters", text_campaigns.wear_table(wear), 3, label=label)
+    visits = [(v.name, v.date, words.about_in_line(v.about), str(v.rows)) for v in wear.campaigns]
+    heads = ("campaign", "date", "about", "rows used")
+    if not any(v.about for v in wear.campaigns):
+        heads, visits = (heads[0], heads[1], heads[3]), [(v[0], v[1], v[3]) for v in visits]
+    yield _section("Campaigns", [heads, *visits], len(heads) - 1, label="Campaigns in the order of time")
     if wear.notes:
         yield {"heading": "To know", "lines": wear.notes}

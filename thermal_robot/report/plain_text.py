@@ -35,6 +35,8 @@ def text(diagnosis: Diagnosis) -> str:
         table that does not fit the robot what is wrong with it, and nothing of the robot.
     """
     facts = [wrap(said, f"{name.lower():11}") for name, said in words.facts(diagnosis).items() if name != "Rows used"]
+    if diagnosis.about:
+        facts.append(wrap(words.about_in_line(diagnosis.about), f"{'about':11}"))
     warnings = ["WARNINGS", *(wrap(w, "  - ") for w in diagnosis.warnings)]
     if diagnosis.usable:
         first = [*words.turned(diagnosis), diagnosis.summary, *words.details(diagnosis)]

@@ -20,10 +20,12 @@ from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
     BEFORE,
+    BROAD,
     FAINT,
     INK,
     LARGE,
     MUTED,
+    NARROW,
     NORMAL,
     PAPER,
     RASTER_ABOVE,
@@ -37,7 +39,7 @@ from thermal_robot.report.drawing import (
     tidy,
     title,
 )
-from thermal_robot.report.words import bound, by_status, needs
+from thermal_robot.report.words import bound, by_status
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +53,7 @@ Look = dict[str, Any]
 """Options of Matplotlib."""
 _SAID: Look = {"fontsize": SMALL, "color": INK, "va": "center"}
 _KEY: Look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
-_BELOW_KEY = 0.77  # of a panel's height for the bars; the key stands above
+_BELOW_KEY = 0.68  # of a panel's height for the bars; the key stands above
 _ROOM = 1.08  # beside the outermost bins, as a factor
 
 
@@ -65,7 +67,7 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
         aside are not counted.
     """
     pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
-    figure = Drawing(7.6, 5.6 if pose else 3.5)
+    figure = Drawing(NARROW, 6.6 if pose else 3.6)
     panels = figure.subplots(2 if pose else 1, 1, squeeze=False)[:, 0]
     for axes, turned, what in zip(panels, (False, True), ("Position", "Orientation"), strict=False):
         _draw_how_far(axes, diagnosis, turned)
@@ -114,7 +116,7 @@ def _draw_distances(axes: Axes, before: Array, after: Array, held_out: Array, sa
     axes.set_ylim(0.0, axes.get_ylim()[1] / _BELOW_KEY)
     axes.locator_params(axis="y", integer=True, nbins=5)
     box: Look = {"frameon": True, "facecolor": PAPER, "edgecolor": "none", "framealpha": 0.9}
-    axes.legend(loc="upper left", ncols=2, handlelength=1.6, **_KEY | box)
+    axes.legend(loc="upper left", handlelength=1.6, labelspacing=0.25, **_KEY | box)
     tidy(axes)
 
 
@@ -143,18 +145,17 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
     Returns
     -------
     Figure
-        Filled: found; hatched: cannot be told apart from another; pale: in question, then not found. What is not
-        testable says why.
+        Filled: found; hatched: cannot be told apart from another; pale: in question, then not found.
     """
-    figure = Drawing(7.6, 1.3 + 0.27 * max(len(diagnosis.effects), 3))
+    figure = Drawing(NARROW, 1.5 + 0.27 * max(len(diagnosis.effects), 3))
     axes = figure.subplots()
     _draw_which(axes, diagnosis)
-    title(axes, "What each effect explains, and how probable it is")
+    title(axes, "Share and probability of each effect")
     return figure
 
 
-def _draw_which(axes: Axes, diagnosis: Diagnosis, brief: bool = False) -> None:
-    """Draw the candidates into a panel, ``brief`` where there is no room to say what an effect would need."""
+def _draw_which(axes: Axes, diagnosis: Diagnosis) -> None:
+    """Draw the candidates into a panel."""
     ordered = by_status(diagnosis)
     if not ordered:
         note(axes, "No effect was tried.")
@@ -163,8 +164,7 @@ def _draw_which(axes: Axes, diagnosis: Diagnosis, brief: bool = False) -> None:
     beside: Look = {**_SAID, "transform": axes.get_yaxis_transform()}
     for line, (finding, ink) in enumerate(zip(ordered, inks, strict=True)):
         if finding.status == "not_testable":
-            said = "not testable" if brief else f"not testable: needs {needs(finding, diagnosis.joint_names)}"
-            axes.text(1.0, line, plain(said), **_SAID | {"color": MUTED}, style="italic")
+            axes.text(1.0, line, "not testable", **_SAID | {"color": MUTED}, style="italic")
         else:
             _draw_share(axes, line, finding)
             axes.text(1.02, line, units.probability(finding.probability), **beside | {"color": ink})
@@ -175,7 +175,7 @@ def _draw_which(axes: Axes, diagnosis: Diagnosis, brief: bool = False) -> None:
     axes.set_ylim(len(ordered) - 0.4, -1.3)
     axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * min(high, _FURTHEST) + 2.0)
     axes.axvline(0.0, color=MUTED, linewidth=0.8)
-    axes.set_xlabel("share of the gap's mean square on rows held out, 95 % interval (%)")
+    axes.set_xlabel("share of the gap's mean square\non rows held out, 95 % interval (%)")
     tidy(axes, grid="x")
     axes.tick_params(axis="y", length=0)
     for label, ink in zip(axes.get_yticklabels(), inks, strict=True):
@@ -205,11 +205,11 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
     names = [len(name) for _, shares, _ in (*chain, *other) for name in shares]
     # panels as high as their bars, so that a bar is equally thick everywhere; below each other where names are long
     if max(names, default=0) > _LONG_NAME:
-        figure = Drawing(7.6, 1.9 + 0.24 * (left + right))
+        figure = Drawing(NARROW, 1.9 + 0.24 * (left + right))
         panels = figure.subplots(2, 1, height_ratios=(left, right))
     else:
         lines, rest = max(left, right), max(abs(left - right), 0.01)
-        figure = Drawing(9.2, 1.2 + 0.24 * lines)
+        figure = Drawing(BROAD, 1.2 + 0.24 * lines)
         grid = figure.add_gridspec(2, 2, height_ratios=(lines - rest, rest))
         places = [grid[:, k] if n == lines else grid[0, k] for k, n in enumerate((left, right))]
         panels = np.array([figure.add_subplot(place) for place in places])
@@ -283,7 +283,7 @@ def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
 _ARROWS = 250
 _LONGEST = 0.18  # of the workspace's extent, for an arrow of the gap's 95th percentile
 _FILLED = 0.84  # of a panel's height; the key stands above
-_SHAPES = (0.85, 1.6)  # width to height of a panel
+_SHAPES = (0.85, 1.35)  # width to height of a panel
 
 
 def plot_map(diagnosis: Diagnosis) -> Figure:
@@ -296,7 +296,7 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
     """
     planes = _planes(diagnosis)
     shapes = [_shape(diagnosis, plane) for plane in planes.values()]
-    figure = Drawing(9.2, min(0.9 + 8.0 / sum(shapes), 5.2))
+    figure = Drawing(BROAD, min(0.9 + 8.0 / sum(shapes), 5.2))
     for axes, (heading, plane) in zip(figure.subplots(1, 2, width_ratios=shapes), planes.items(), strict=True):
         _draw_map(axes, diagnosis, plane)
         title(axes, heading)
@@ -421,7 +421,7 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
     """
     rows, noise = diagnosis.rows, diagnosis.gap.noise_floor / np.sqrt(3.0)
     columns = [("row in the file", rows.rows.astype(float)), *_followed(diagnosis)]
-    figure = Drawing(7.6 if len(columns) == 1 else 9.2, 4.6)
+    figure = Drawing(NARROW if len(columns) == 1 else BROAD, 4.6)
     panels = figure.subplots(3, len(columns), squeeze=False, sharey=True, sharex="col")
     # rows that were set aside do not decide how far the axes go
     largest = max(np.abs(rows.remainder[~rows.outliers, :3]).max(initial=0.0), 2.4 * noise, 1e-12)
@@ -433,13 +433,14 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
             band = 2.0 * noise * best.factor
             axes.axhspan(-band, band, color=FAINT, linewidth=0, zorder=0, label="±2 σ of the noise")
             tidy(axes, grid="")
-        panels[k][0].set_ylabel(f"{axis} ({best.unit})")
+            axes.set_ylabel(f"{axis} ({best.unit})")
+            axes.tick_params(labelleft=True)
     for (name, _), axes in zip(columns, panels[2], strict=True):
         axes.set_xlabel(plain(name))
     title(panels[0][0], "Remainder, row by row")
     for axes in panels[0][1:]:
         title(axes, f"Against {diagnosis.unexplained.depends_on[0].covariate}")
-    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=4, **_KEY)
+    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
     return figure
 
 
@@ -513,12 +514,12 @@ def explain_figure(explained: Explained) -> Figure:
     count = max(len(places), 1)
     across = count if count <= _ACROSS else (2 if count == 4 else _ACROSS)
     down = -(-count // across)
-    figure = Drawing((5.4, 7.6, 9.6)[across - 1], 0.95 + 2.55 * down)
+    figure = Drawing((NARROW, 7.6, 9.6)[across - 1], 0.95 + 2.55 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for axes in panels[len(places) :]:
         axes.axis("off")
     error = "error less its mean" if any(place.centred for place in places) else "error"
-    for k, (place, axes) in enumerate(zip(places, panels, strict=False)):
+    for place, axes in zip(places, panels, strict=False):
         low, high = _limits(places, place.unit)
         unit = place.unit.split(" ")[0]
         scale = units.scale(unit, max(abs(low), abs(high)))
@@ -526,10 +527,7 @@ def explain_figure(explained: Explained) -> Figure:
         axes.set_ylim(low * scale.factor, high * scale.factor)
         heading = plain(f"{place.words}: {units.percent(place.share, 0)}")
         axes.set_title(heading, loc="left", fontsize=NORMAL, color=INK, fontweight="bold", pad=6)
-        if k % across == 0 or place.unit != places[k - 1].unit:
-            axes.set_ylabel(f"{error} ({scale.unit}{place.unit.removeprefix(unit)})")
-        else:
-            axes.tick_params(labelleft=False)
+        axes.set_ylabel(f"{error} ({scale.unit}{place.unit.removeprefix(unit)})")
     more = f"; {explained.left_out} smaller places are not shown" if explained.left_out else ""
     figure.suptitle(plain(f"What {explained.effect} explains{more}"), x=0.01, ha="left", fontsize=11.0, color=INK)
     if places:
@@ -595,7 +593,7 @@ def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
     (how_far, which), (where, map_) = figure.subplots(2, 2)
     _draw_how_far(how_far, diagnosis)
     title(how_far, "How far")
-    _draw_which(which, diagnosis, brief=True)
+    _draw_which(which, diagnosis)
     title(which, "Which")
     _draw_where(where, diagnosis)
     title(where, "Where")
@@ -618,20 +616,20 @@ def plot_differences(comparison: Mapping[str, Any]) -> Figure:
     known = [p for effect in comparison["effects"] for p in effect["parameters"] if p["std"]]
     told = sorted(((p["name"], p["difference"] / p["std"]) for p in known), key=lambda one: -abs(one[1]))
     told = told[:_MOST_DIFFERENCES]
-    figure = Drawing(7.6, 1.2 + 0.26 * max(len(told), 1))
+    figure = Drawing(NARROW, 1.2 + 0.26 * max(len(told), 1))
     axes = figure.subplots()
     colours = [AFTER if abs(size) > 3.0 else BEFORE for _, size in told]
     axes.barh(range(len(told)), [size for _, size in told], color=colours, height=0.62)
     axes.axvline(0.0, color=INK, linewidth=0.8)
-    axes.set_xlabel("difference in standard deviations; dark beyond three")
-    _name_bars(axes, [name for name, _ in told], "Parameters that differ most between two campaigns")
+    axes.set_xlabel("difference in standard deviations\n(dark beyond three)")
+    _name_bars(axes, [name for name, _ in told], "Parameters that differ most")
     return figure
 
 
 def plot_fleet(summary: Mapping[str, Any]) -> Figure:
     """Draw the number of robots in which each effect was found, of those in which it is testable."""
     counts = [effect for effect in summary["effects"] if effect["found"]][:_LEADING]
-    figure = Drawing(7.6, 1.2 + 0.3 * len(counts))
+    figure = Drawing(NARROW, 1.2 + 0.3 * len(counts))
     axes = figure.subplots()
     places = range(len(counts))
     axes.barh(places, [c["testable"] for c in counts], color="none", edgecolor=BEFORE, height=0.62)
@@ -652,20 +650,23 @@ def _name_bars(axes: Axes, names: Sequence[str], heading: str) -> None:
 
 
 _COLUMNS, _MOST = 2, 12
+CONTROL = 3.0
+"""Standard deviations between the centre of a control chart and its limits, as Shewhart has them."""
+_FARTHEST = 4.0  # times what is drawn: of a given limit farther away it is said where it lies
 
 
 def plot_wear(wear: Wear) -> Figure:
-    """Draw the parameters over time, alarms first: each campaign's value with its standard deviation.
+    """Draw a control chart of each parameter, alarms first: values with their standard deviations, and limits.
 
     Returns
     -------
     Figure
-        A line as its kind has it, orange where it rings; a grey band where a jump lies with 95 %; the limit dashed
-        where it is near.
+        Grey: where campaigns of a parameter that stays where it began lie; values beyond are orange. A line as its
+        kind has it, orange where it rings; an upright band where a jump lies with 95 %; given limits dashed.
     """
     shown = [worn for worn in wear.parameters if worn.comparable][:_MOST]
     lines = max(ceil(len(shown) / _COLUMNS), 1)
-    figure = Drawing(8.6, 0.5 + 2.0 * lines)
+    figure = Drawing(BROAD, 0.6 + 2.2 * lines)
     panels = figure.subplots(lines, _COLUMNS, squeeze=False, sharex=True).ravel()
     for axes, worn in zip(panels, shown, strict=False):
         _draw_worn(axes, wear, worn)
@@ -680,29 +681,57 @@ def plot_wear(wear: Wear) -> Figure:
 
 
 def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
-    """Draw one parameter over time about its median."""
+    """Draw the control chart of one parameter."""
     seen = [k for k, value in enumerate(worn.values) if value is not None]
     times = np.array([visit.time for visit in wear.campaigns]) + (0.0 if wear.dated else 1.0)
     values, stds = (np.array([each[k] for k in seen], dtype=float) for each in (worn.values, worn.stds))
-    fitted, along, jump = np.array(worn.fitted), times, worn.jump
-    middle = float(np.mean(fitted))
-    scale = units.scale(worn.unit, float(np.max(np.abs(values - middle) + stds)))
-    if jump is not None:  # it stands upright between the campaigns beside it
-        if worn.alarm:
-            axes.axvspan(times[jump.earliest], times[jump.latest], color=FAINT, linewidth=0)
-        beside = slice(jump.after, jump.after + 2)
-        along = np.insert(times, jump.after + 1, [times[beside].mean()] * 2)
-        fitted = np.insert(fitted, jump.after + 1, fitted[beside])
+    scale = units.scale(worn.unit, float(np.max(np.abs(values) + stds)))
+    jump = worn.jump
+    if jump is not None and worn.alarm:
+        axes.axvspan(times[jump.earliest], times[jump.latest], color=BEFORE, alpha=0.15, linewidth=0)
+    centre, half = scale.factor * worn.fitted[0], scale.factor * CONTROL * wear.scatter * stds
+    axes.fill_between(times[seen], centre - half, centre + half, color=FAINT, linewidth=0)
+    axes.axhline(centre, color=MUTED, linewidth=0.8)
+    along, fitted = _as_told(times, worn)
     look: Look = {"color": BEFORE, "linewidth": 2.0} if worn.alarm else {"color": MUTED, "linewidth": 1.2}
-    axes.plot(along, scale.factor * (fitted - middle), **look)
-    dots: Look = {"fmt": "o", "markersize": 3.5, "color": AFTER, "ecolor": AFTER, "elinewidth": 1.0}
-    axes.errorbar(times[seen], scale.factor * (values - middle), scale.factor * stds, **dots)
-    low, high = axes.get_ylim()
-    for limit in () if worn.crossing is None else (worn.crossing.limit, -worn.crossing.limit):
-        if low < (place := scale.factor * (limit - middle)) < high:
-            axes.axhline(place, color=INK, linestyle="--", linewidth=0.9)
+    axes.plot(along, scale.factor * fitted, **look)
+    beyond = np.abs(scale.factor * values - centre) > half
+    for which, colour in ((~beyond, AFTER), (beyond, BEFORE)):
+        dots: Look = {"fmt": "o", "markersize": 4.0, "color": colour, "ecolor": colour, "elinewidth": 1.0}
+        dots |= {"markeredgecolor": INK, "markeredgewidth": 0.5, "zorder": 3.0}
+        at = np.array(seen)[which]
+        axes.errorbar(times[at], scale.factor * values[which], scale.factor * stds[which], **dots)
+    far = _draw_limits(axes, worn, scale)
     tidy(axes)
     axes.set_ylabel(scale.unit or "1", fontsize=SMALL)
     said = f"ALARM: {worn.kind}" if worn.alarm else f"moved: {units.probability(worn.moved)}"
     weight: Look = {"color": INK, "fontweight": "bold"} if worn.alarm else {"color": MUTED, "fontweight": "normal"}
-    axes.set_title(plain(f"{worn.parameter}\n{said}"), loc="left", fontsize=SMALL, **weight)
+    axes.set_title(plain(f"{worn.parameter}\n{said}{far}"), loc="left", fontsize=SMALL, **weight)
+
+
+def _as_told(times: Array, worn: Worn) -> tuple[Array, Array]:
+    """Return times and values of the line; a jump stands upright between the campaigns beside it."""
+    fitted, jump = np.array(worn.fitted), worn.jump
+    if jump is None:
+        return times, fitted
+    beside = slice(jump.after, jump.after + 2)
+    upright = np.insert(times, jump.after + 1, [times[beside].mean()] * 2)
+    return upright, np.insert(fitted, jump.after + 1, fitted[beside])
+
+
+def _draw_limits(axes: Axes, worn: Worn, scale: units.Scale) -> str:
+    """Draw the limit of the absolute value on the side of the values; say where it is if it lies far away."""
+    if worn.crossing is None:
+        return ""
+    low, high = axes.get_ylim()
+    side = 1.0 if worn.fitted[-1] >= 0.0 else -1.0
+    place = side * scale.factor * worn.crossing.limit
+    if min(abs(place - low), abs(place - high)) > _FARTHEST * (high - low):
+        return f"; limit {units.quantity(side * worn.crossing.limit, worn.unit)}, far away"
+    axes.axhline(place, color=INK, linestyle="--", linewidth=1.0)
+    room = 0.06 * (max(high, place) - min(low, place))
+    axes.set_ylim(min(low, place - room), max(high, place + room))
+    over, across = (4, "bottom") if side < 0.0 else (-3, "top")
+    axes.annotate("limit", (1.0, place), (-2, over), xycoords=axes.get_yaxis_transform(), textcoords="offset points",
+                  ha="right", **_SAID | {"va": across})  # fmt: skip
+    return ""

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.report import units
+from thermal_robot.report import units, words
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.diagnosis.values import Finding
 
 Table = dict[str, Any]
 """``label``, ``heads``, ``rows`` of cells, and how many of the first columns hold ``words``, not numbers."""
@@ -37,6 +38,29 @@ def numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str, list[str]]]:
         ("after", "Gap after, rms", after, [turned[1], f"noise floor {floor}"]),
         ("held", "Shrinkage on rows held out", units.percent(held.shrinkage), [bounds, " → ".join(pair)]),
     ]
+
+
+def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Every effect with its status, probability, share, and what else is known of it, found ones first."""
+    return [_effect(diagnosis, finding) for finding in words.by_status(diagnosis)]
+
+
+def _effect(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
+    before, known, after = words.described(finding, diagnosis)
+    bounds = f" ({units.interval(finding.shrinkage_ci95)} %)" if finding.shrinkage_ci95 is not None else ""
+    untestable = finding.status == "not_testable"
+    return {
+        "name": finding.name,
+        "quiet": finding.status in ("not_found", "not_testable"),
+        "open": bool(before or known or after),
+        "needs": f"needs {words.needs(finding, diagnosis.joint_names)}" if untestable else None,
+        "status": words.STATUS[words.displayed_status(finding)],
+        "probability": units.probability(finding.probability),
+        "share": f"{units.percent(finding.shrinkage)}{bounds}",
+        "before": [line for line, _ in before],
+        "known": known,
+        "after": [line for line, _ in after],
+    }
 
 
 def extremes(diagnosis: Diagnosis) -> Table:

@@ -7,10 +7,10 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import units
-from thermal_robot.report.words import WIDTH, capitalised, listed
+from thermal_robot.report.words import WIDTH, about_in_line, capitalised, listed
 
 if TYPE_CHECKING:
-    from thermal_robot.fleet.wear_result import Wear, Worn
+    from thermal_robot.fleet.wear_result import Crossing, Wear, Worn
 
 Plain = Mapping[str, Any]
 Line = tuple[str, ...]
@@ -49,7 +49,8 @@ def comparison_headline(comparison: Plain) -> str:
 def campaign_in_words(campaign: Plain) -> str:
     """Campaign with its diagnosis, or a model file, in words."""
     samples = f"{campaign['samples']} samples. " if campaign["samples"] else ""
-    return f"{campaign['name']}: {samples}{campaign['diagnosis']}"
+    about = f" ({about_in_line(campaign['about'])})" if campaign.get("about") else ""
+    return f"{campaign['name']}{about}: {samples}{campaign['diagnosis']}"
 
 
 def changes(comparison: Plain) -> list[str]:
@@ -112,6 +113,13 @@ def _effects(comparison: Plain) -> Iterator[Line]:
 
 
 def _parameters(comparison: Plain) -> Iterator[Line]:
+    for (effect, name, difference, _, chance), each in comparison_parameters(comparison):
+        yield effect, name, *(value for _, value in each), difference, chance
+
+
+def comparison_parameters(comparison: Plain) -> Iterator[tuple[Line, list[Line]]]:
+    """Yield each parameter: effect, name, largest difference, between which campaigns, chance; then each value."""
+    names = [c["name"] for c in comparison["campaigns"]]
     for effect in comparison["effects"]:
         for p in effect["parameters"]:
             values = [abs(v) for v in p["values"] if v is not None]
@@ -119,13 +127,9 @@ def _parameters(comparison: Plain) -> Iterator[Line]:
                 continue
             scale = units.scale(p["unit"], max(*values, *(s for s in p["stds"] if s is not None)))
             each = [_with_deviation(v, s, scale) for v, s in zip(p["values"], p["stds"], strict=True)]
-            yield (
-                effect["name"],
-                p["name"],
-                *each,
-                _with_deviation(p["difference"], p["std"], scale),
-                _chance(p["p_value"]),
-            )
+            difference = _with_deviation(p["difference"], p["std"], scale)
+            cells = effect["name"], p["name"], difference, listed(p["between"]), _chance(p["p_value"])
+            yield cells, list(zip(names, each, strict=True))
 
 
 def _with_deviation(value: float | None, std: float | None, scale: units.Scale) -> str:
@@ -306,9 +310,9 @@ def fleet_text(summary: Plain) -> str:
 
 
 def wear_table(wear: Wear) -> list[Line]:
-    """Table of the parameters over time: kind and size of the change, rate, certainty, limit."""
-    heads = ("parameter", "it", "change", "a day", "moved", "by chance", "limit")
-    return [heads, *((f"{w.title}: {w.parameter}", _does(w), *_figures(w)) for w in wear.parameters)]
+    """Table of the parameters over time: kind of change, limit, size, rate, certainty."""
+    heads = ("parameter", "it", "limit", "change", "a day", "moved", "by chance")
+    return [heads, *((w.parameter, _does(w), *_figures(w)) for w in wear.parameters)]
 
 
 def _does(worn: Worn) -> str:
@@ -333,4 +337,95 @@ def _figures(worn: Worn) -> Line:
         limit, dates = worn.crossing.state, worn.crossing.dates
         if limit == "expected":
             limit = f"{dates[0]} ({dates[1]} to {dates[2] or 'never'})"
-    return change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}", limit
+    return limit, change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}"
+
+
+def wear_headline(wear: Wear) -> str:
+    """Return what moved over time, how and when, in one sentence."""
+    span = f"{len(wear.campaigns)} campaigns of {wear.robot}"
+    if not wear.alarms:
+        return f"Over {span} nothing moves that would not by chance in {_rarely(wear.false_alarm)} of such series."
+    return f"Over {span}: {'; '.join(_moves(wear, worn) for worn in wear.alarms)}."
+
+
+def wear_text(wear: Wear) -> str:
+    """Plain text of one robot over time: alarms with their kinds, what stays, what cannot be compared."""
+    return "\n".join(_wear_lines(wear))
+
+
+def _wear_lines(wear: Wear) -> Iterator[str]:
+    first, last = wear.campaigns[0], wear.campaigns[-1]
+    days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
+    yield wear.summary
+    yield ""
+    yield f"campaigns    {len(wear.campaigns)}{days}"
+    yield f"alarms       at most {_rarely(wear.false_alarm)} of series without a change ring"
+    nothing = units.probability(wear.nothing)
+    yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {nothing}"
+    for worn in wear.alarms:
+        yield ""
+        yield from _of_one(wear, worn)
+    if doubtful := [w for w in wear.parameters if w.perhaps]:
+        yield ""
+    for w in doubtful:
+        yield f"perhaps      {_moves(wear, w)}: {units.percent(w.moved, 0)}, but no alarm"
+    yield ""
+    stays = [w for w in wear.parameters if w.comparable and not w.alarm and not w.perhaps]
+    if stays:
+        yield f"stays        {'; '.join(f'{w.parameter} (moved: {units.percent(w.moved)})' for w in stays)}"
+    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
+    hidden = [w for w in wear.parameters if not w.comparable]
+    for reason in dict.fromkeys(w.reason for w in hidden):
+        yield f"not compared {', '.join(w.parameter for w in hidden if w.reason == reason)}: {reason}"
+    yield from (f"note         {note}" for note in wear.notes)
+
+
+def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
+    yield f"ALARM        {_moves(wear, worn)}"
+    kinds = ", ".join(f"{kind} {units.percent(p, 0)}" for kind, p in worn.kinds.items() if p >= 0.005)
+    yield f"             chance of such an alarm without a change: at most {worn.chance:.1g}; {kinds}"
+    if worn.jump:
+        yield f"             95 %: {_between(wear, worn.jump.earliest, worn.jump.latest)}"
+    if worn.confounded_with:
+        yield f"             cannot be told from a change of {', '.join(worn.confounded_with)}"
+    if worn.crossing:
+        yield f"             {_reaches(worn.crossing, worn.unit)}"
+
+
+def _moves(wear: Wear, worn: Worn) -> str:
+    """Describe the change of one parameter."""
+    name = worn.parameter
+    if worn.jump is not None:
+        size = _signed(worn.jump.size, worn.jump.std, worn.unit)
+        where = _between(wear, worn.jump.after, worn.jump.after + 1)
+        return f"{name} jumped by {size} {where} ({units.percent(worn.jump.probability, 0)})"
+    if worn.rate is not None:
+        return f"{name} moves by {_signed(worn.rate.value, worn.rate.std, worn.unit)} a day"
+    how = "moves steadily" if worn.kind == "trend" else "wanders"
+    return f"{name} {how}, by {_signed(worn.change, worn.change_std, worn.unit)} from first to last"
+
+
+def _signed(value: float, std: float, unit: str) -> str:
+    return f"{'+' if value > 0.0 else ''}{units.measured(value, std, unit)}"
+
+
+def _between(wear: Wear, first: int, last: int) -> str:
+    visits = (wear.campaigns[first], wear.campaigns[last])
+    return "between " + " and ".join(f"{v.name} ({v.date})" if wear.dated else v.name for v in visits)
+
+
+def _reaches(crossing: Crossing, unit: str) -> str:
+    limit = f"limit {units.quantity(crossing.limit, unit)}"
+    said = {
+        "passed": "passed",
+        "never": "never, as it does not go there",
+        "unknown": "not foreseen, for lack of a rate",
+    }
+    if crossing.state in said:
+        return f"{limit}: {said[crossing.state]}"
+    expected, low, high = crossing.dates
+    return f"{limit}: about {expected} (95 %: {low} to {high or 'never'})"
+
+
+def _rarely(probability: float) -> str:
+    return f"{100.0 * probability:.2g} %"

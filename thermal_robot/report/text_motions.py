@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from thermal_robot.report import motion_words as words
 from thermal_robot.report import units
 from thermal_robot.report.plain_text import bar, wrap
-from thermal_robot.report.words import STATUS, displayed_status, listed, one_sigma
+from thermal_robot.report.words import STATUS, about_in_line, displayed_status, listed, one_sigma
 from thermal_robot.report.words import needs as needed
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ def motion_text(diagnosis: MotionDiagnosis) -> str:
     """
     d = diagnosis
     facts = [wrap(said, f"{name.lower():11}") for name, said in words.facts(d).items()]
+    if d.log.about:
+        facts.append(wrap(about_in_line(d.log.about), f"{'about':11}"))
     blocks = [
         ["HOW FAR", *(_how_far(d) if d.usable else ())],
         ["WHICH", *(_which(d) if d.usable else ())],

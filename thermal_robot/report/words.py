@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -349,6 +349,16 @@ def facts(diagnosis: Diagnosis) -> dict[str, str]:
     elif diagnosis.misfit and diagnosis.misfit.fault and diagnosis.misfit.fault.rows:
         told["Struck"] = _rows(diagnosis.misfit.fault.rows)
     return {heading: said for heading, said in told.items() if said}
+
+
+def about(stated: Mapping[str, str]) -> dict[str, str]:
+    """Return whose measurements they are, by the names that the user gave: serial numbers, operator, date."""
+    return {capitalised(name.replace("_", " ")): said for name, said in stated.items()}
+
+
+def about_in_line(stated: Mapping[str, str]) -> str:
+    """Return the same in one line."""
+    return ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in stated.items())
 
 
 def rows_used(diagnosis: Diagnosis) -> str:

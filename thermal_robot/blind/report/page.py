@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from math import sqrt
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from matplotlib.patches import Rectangle
@@ -17,9 +18,12 @@ from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
     BEFORE,
+    BROAD,
     FAINT,
     INK,
+    LARGE,
     MUTED,
+    NARROW,
     PAPER,
     SMALL,
     THIRD,
@@ -42,6 +46,8 @@ _HEADINGS = {
     "hard": "Named first, where one small effect is at work and rows are few",
     "removed": "Named first, where the effect at work is not in the library",
 }
+_LEAST_WIDE, _LETTERS = 3.6, 10.0  # inches of a small matrix, which a telephone shows whole; bold letters in an inch
+_FEWEST = 4  # columns that a matrix has room for
 _DARK = 0.55  # share of a row above which its number is written in the colour of the paper
 _LEAST = 1e-4  # of the gap: what is less is drawn at the edge
 _GROUPS = {
@@ -60,7 +66,8 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
     if table is None:
         return _empty(_HEADINGS.get(which, which), "No case of this kind.")
     rows, columns = table["rows"], table["columns"]
-    figure = Drawing(2.3 + 0.37 * len(columns), 1.9 + 0.3 * len(rows))
+    wide = max(2.3 + 0.37 * len(columns), _LEAST_WIDE)
+    figure = Drawing(wide, 2.3 + 0.3 * len(rows))
     axes = figure.subplots()
     for line, (name, counts) in enumerate(zip(rows, table["counts"], strict=True)):
         total, answer = sum(counts), "unexplained" if name == "unlisted" or which == "removed" else name
@@ -72,7 +79,7 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
                 axes.text(column, line, str(number), ha="center", va="center", fontsize=SMALL, color=colour)
         axes.text(len(columns) - 0.2, line, str(total), va="center", fontsize=SMALL, color=MUTED)
     axes.text(len(columns) - 0.2, -0.9, "cases", va="center", fontsize=SMALL, color=MUTED)
-    axes.set_xlim(-0.5, len(columns) - 0.5)
+    axes.set_xlim(-0.5, max(len(columns), _FEWEST) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xticks(range(len(columns)), [plain(text.effect(c)) for c in columns], rotation=50, ha="right")
     axes.set_yticks(range(len(rows)), [plain(text.effect(r)) for r in rows])
@@ -84,7 +91,8 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
         tick.set_rotation_mode("anchor")
     for spine in axes.spines.values():
         spine.set_visible(False)
-    title(axes, _HEADINGS.get(which, which))
+    heading = fill(_HEADINGS.get(which, which), round(_LETTERS * wide))
+    figure.suptitle(heading, x=0.01, ha="left", fontsize=LARGE, color=INK, fontweight="bold")
     return figure
 
 
@@ -105,7 +113,7 @@ def calibration_figure(score: Plain) -> Figure:
     steps = score["calibration"]["all"]["bins"]
     if not any(b["present"]["trials"] for b in steps):
         return _empty("Probabilities", "No probability was given.")
-    figure = Drawing(5.6, 6.0)
+    figure = Drawing(NARROW, 6.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0))
     _frequencies(upper, steps)
     upper.text(0.02, 0.97, _error(score["calibration"]), transform=upper.transAxes, va="top", fontsize=SMALL, color=INK)
@@ -162,7 +170,7 @@ def shrinkage_figure(score: Plain) -> Figure:
     pairs = score["shrinkage"]["pairs"]
     if not pairs:
         return _empty("How far the gap shrinks", "No case has fresh samples.")
-    figure = Drawing(5.4, 5.0)
+    figure = Drawing(NARROW, 4.8)
     axes = figure.subplots()
     most = max(1.0, *(1.0 - p[side] for p in pairs for side in ("claimed", "real")))
     limits = (100.0 * _LEAST / 1.5, 150.0 * most)
@@ -194,7 +202,7 @@ def _remains(value: float, _: int) -> str:
 
 
 def _empty(heading: str, why: str) -> Drawing:
-    figure = Drawing(5.4, 1.6)
+    figure = Drawing(NARROW, 1.6)
     axes: Axes = figure.subplots()
     title(axes, heading)
     note(axes, why)
@@ -211,7 +219,7 @@ def power_figure(score: Plain) -> Figure:
     the upper quartile of the other quantity.
     """
     detection = score["detection"]
-    figure = Drawing(9.6, 4.0)
+    figure = Drawing(BROAD, 4.0)
     size, rows = figure.subplots(1, 2, sharey=True)
     curve = detection["curve"] or {"over_ratio": (), "over_samples": ()}
     _panel(size, detection["ratio"], curve["over_ratio"], lambda n: f"with {n:.0f} rows")
@@ -221,6 +229,8 @@ def power_figure(score: Plain) -> Figure:
     rows.set_xlabel("rows of the campaign")
     if size.lines:
         size.text(-0.015, 106.0, "cases", transform=size.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
+    rows.set_ylabel("found, 95 % bars (%)")
+    rows.tick_params(labelleft=True)
     title(size, "Found, by size")
     title(rows, "Found, by number of rows")
     return figure
@@ -266,7 +276,10 @@ def html(score: Plain, generated: str) -> str:
     ``generated`` is when it was made, in the words that shall stand in the footer; may be empty.
     """
     groups = [_groups(f"{of}, {more}", score[name], ask) for name, of, more, ask in text.GROUPED if score[name]]
-    shown = {"score": score, "text": text, "figures": sys.modules[__name__], "groups": groups}
+    real = [(c["id"], c["asked"], c["answer"], "right" if c["right"] else "wrong") for c in score["real"]]
+    misses = [(c["id"], text.kind(c["kind"]), c["robot"], *text.miss(c)) for c in score["misses"]]
+    shown = {"score": score, "text": text, "figures": sys.modules[__name__]}
+    shown |= {"groups": groups, "real": real, "misses": misses}
     return render("blind.html", shown, title="Blind trial", generated=generated)
 
 

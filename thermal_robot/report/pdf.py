@@ -1,0 +1,35 @@
+"""Pages of this room as files: HTML, or PDF by WeasyPrint, the same text and figures on numbered sheets of A4."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from thermal_robot.files import write_bytes, write_text
+
+_COLOUR = re.compile(r"var\(--tr-\w+,(#\w+)\)")  # of a figure: WeasyPrint takes the colour itself
+_SCRIPT = re.compile(r"<script[^>]*>.*?</script>", re.DOTALL)  # paper runs none
+_ON_PAPER = ".tr-arm { display: none; }"  # what a script would draw
+
+
+def is_pdf(target: str | Path | None) -> bool:
+    """Whether a file is to be a PDF by its ending."""
+    return Path(target or "").suffix.lower() == ".pdf"
+
+
+def write_page(path: str | Path, page: str, target: str | Path | None = None) -> None:
+    """Write a page that :func:`~thermal_robot.report.page.render` made, as PDF where the ``target`` is one by its name.
+
+    Raises
+    ------
+    ImportError, OSError
+        Where WeasyPrint is missing, or Pango, which it needs of the system.
+    """
+    target = path if target is None else target
+    if not is_pdf(target):
+        return write_text(path, page)
+    import weasyprint
+
+    drawn = _COLOUR.sub(r"\1", _SCRIPT.sub("", page))
+    paper = weasyprint.CSS(string=_ON_PAPER)
+    return write_bytes(path, weasyprint.HTML(string=drawn).write_pdf(stylesheets=[paper]))
