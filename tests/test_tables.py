@@ -12,7 +12,7 @@ from html.parser import HTMLParser
 import pytest
 
 from thermal_robot import console, renderer
-from thermal_robot.console import NORMAL, QUIET, VERBOSE, add_loudness, counted, heard, note, stages
+from thermal_robot.console import NORMAL, QUIET, VERBOSE, add_loudness, counted, note, stages, warnings_as_notes
 from thermal_robot.errors import Note
 from thermal_robot.percents import percent
 from thermal_robot.tables import aligned, html_table
@@ -206,7 +206,7 @@ def test_warnings_and_logs_become_notes_or_nothing(capsys, loudness, told):
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.simplefilter("always", UserWarning)
         shown = warnings.showwarning
-        with heard(loudness):
+        with warnings_as_notes(loudness):
             for _ in range(3):
                 warnings.warn("an effect is left out", Note, stacklevel=1)
             warnings.warn("glyph missing", UserWarning, stacklevel=1)

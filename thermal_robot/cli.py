@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.commands.endings import require_endings
 from thermal_robot.commands.table import COMMANDS
-from thermal_robot.console import NORMAL, VERBOSE, add_loudness, heard
+from thermal_robot.console import NORMAL, VERBOSE, add_loudness, warnings_as_notes
 from thermal_robot.errors import OwnEffectError, ThermalRobotError, ours
 from thermal_robot.streams import piped
 
@@ -67,8 +67,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         options.prepare(options)
+<<<<<<< ours
         require_endings(options)
         with heard(options.loudness), piped(options):
+=======
+        with warnings_as_notes(options.loudness), piped(options):
+>>>>>>> theirs
             options.run(options)
         sys.stdout.flush()  # a disk may be full only now
     except OwnEffectError as error:

@@ -41,7 +41,7 @@ def note(text: str, loudness: str) -> None:
 
 
 @contextmanager
-def heard(loudness: str) -> Iterator[None]:
+def warnings_as_notes(loudness: str) -> Iterator[None]:
     """Print warnings as notes: the program's own, each once; those of libraries only if asked for."""
     told = set()
 
