@@ -131,8 +131,6 @@ STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 a second; here a thousand times more slowly."""
 STIFFEST = 2.0
 """Time steps: shortest time constant that MuJoCo lets a constraint have."""
-VISIBLE = 2.0
-"""Times the noise: an effect that moves an output by less, root mean square, is not told."""
 WAVES = 3
 """Rounds at most in which joints take each other's accelerations."""
 MOST = 0.5
