@@ -67,12 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         options.prepare(options)
-<<<<<<< ours
         require_endings(options)
-        with heard(options.loudness), piped(options):
-=======
         with warnings_as_notes(options.loudness), piped(options):
->>>>>>> theirs
             options.run(options)
         sys.stdout.flush()  # a disk may be full only now
     except OwnEffectError as error:

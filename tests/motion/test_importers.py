@@ -67,6 +67,27 @@ def lerobot(folder, frame, names):
     return folder / "set"
 
 
+def test_records_of_bam(tmp_path, capsys):
+    frame, files = sampled(), []
+    for label, rows in frame.groupby("motion"):
+        entries = [
+            {"timestamp": t, "position": q, "goal_position": u, "torque_enable": k != 5, "input_volts": 12.0}
+            for k, (t, q, u) in enumerate(zip(rows.time, rows["q.joint_1"], rows["cmd.joint_1"], strict=True))
+        ]
+        files.append(tmp_path / f"{label}.json")
+        files[-1].write_text(json.dumps({"trajectory": "sine", "kp": 8, "entries": entries}))
+    found, out = imported(capsys, tmp_path, "bam", *files, *ROBOT)
+    assert "kp is a register" in out
+    assert [(motion.name, motion.kind) for motion in found.motions] == [("m0", "sine"), ("m1", "sine")]
+    for motion, (_, rows) in zip(found.motions, frame.groupby("motion"), strict=True):
+        j = found.joints.index("joint_1")
+        np.testing.assert_allclose(motion.position.of(j)[1], rows["q.joint_1"], atol=1e-6)
+        assert len(motion.command.of(j)[0]) == len(rows) - 1
+        assert motion.volts.of(j)[1].max() == 12.0
+    files[0].write_text("{}")
+    assert "m0.json: cannot be read" in refusal(capsys, tmp_path / "again", "bam", *files, *ROBOT)
+
+
 @pytest.mark.parametrize(
     "names", [[f"{joint}.pos" for joint in JOINTS], {"motors": [f"main_{joint}" for joint in JOINTS]}]
 )

@@ -19,8 +19,7 @@ from thermal_robot.kinematics.model import held_at
 class Loads:
     """Joint torques and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
 
-    The first of the k is that of the model; then that of 1 kg of payload; then, where asked for, of each link that of
-    its whole mass and of 1 kg·m along each of its axes.
+    The first of the k is that of the model, the second that of 1 kg of payload.
     """
 
     torque: Array
@@ -36,12 +35,10 @@ class Loads:
 class Dynamics:
     """Rigid-body dynamics of some joints of a URDF, the others held at zero.
 
-    ``payload`` (3,) m is the centre of mass of a payload in the tool frame; with ``masses`` those of links count, too.
+    ``payload`` (3,) m is the centre of mass of a payload in the tool frame.
     """
 
-    def __init__(
-        self, urdf: str, joints: Sequence[str], tool_frame: str, gravity: Array, payload: Array, masses: bool
-    ) -> None:
+    def __init__(self, urdf: str, joints: Sequence[str], tool_frame: str, gravity: Array, payload: Array) -> None:
         model = pin.buildModelFromXML(urdf)
         others = [j for j, name in enumerate(model.names) if j and name not in joints]
         model = held_at(model, others, pin.neutral(model))
@@ -50,21 +47,12 @@ class Dynamics:
         ids = [model.getJointId(name) for name in joints]
         self.at = [model.joints[j].idx_v for j in ids]
         self._q = [(model.joints[j].idx_q, model.joints[j].nq) for j in ids]
-        self.frame = model.getFrameId(tool_frame, pin.FrameType.BODY)
-        frame = model.frames[self.frame]
+        frame = model.frames[model.getFrameId(tool_frame, pin.FrameType.BODY)]
         com = frame.placement.act(payload)
-        self.bodies = [model.names[j] for j in range(1, model.njoints) if model.inertias[j].mass > 0.0]
+        bodies = {model.names[j]: model.inertias[j] for j in range(1, model.njoints) if model.inertias[j].mass > 0.0}
+        self.bodies: dict[str, Array] = {name: one.toDynamicParameters() for name, one in bodies.items()}
         models = [model, model.copy()]
         models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
-        for name in self.bodies if masses else ():
-            j = model.getJointId(name)
-            heavier = model.copy()
-            heavier.inertias[j] += model.inertias[j]
-            models.append(heavier)
-            for axis in np.eye(3):  # two opposite masses a metre apart each way: a first moment alone
-                moved = model.copy()
-                moved.inertias[j] = _with_moment(model.inertias[j], axis)
-                models.append(moved)
         self._pools = [pin.ModelPool(one, threads()) for one in models]
 
     def configurations(self, q: Array) -> Array:
@@ -110,22 +98,19 @@ class Dynamics:
         pin.rneaInParallel(threads(), self._pools[k], self.configurations(q), speed, rate, found)
         return found[self.at].T.copy()
 
-    def heights(self, q: Array, up: Array) -> tuple[Array, Array]:
-        """Height of the tool (n,), m, along ``up``, and its derivative (n, J) by each joint, m/rad."""
-        model, data = self.model, self.data
-        height, slope = np.empty(len(q)), np.empty(q.shape)
-        for i, whole in enumerate(self.configurations(q).T):
-            jacobian: Any = pin.computeFrameJacobian(model, data, whole, self.frame, pin.LOCAL_WORLD_ALIGNED)
-            height[i] = up @ data.oMf[self.frame].translation
-            slope[i] = up @ jacobian[:3, self.at]
-        return height, slope
+    def inertial(self, q: Array, v: Array, a: Array) -> Array:
+        """Regressor (n, J, bodies, 10) of joint torques by the inertial parameters of bodies, in Pinocchio's order.
 
-
-def _with_moment(inertia: pin.Inertia, moment: Array) -> pin.Inertia:
-    """Return an inertia with a first moment more, kg·m, its mass and its second moment about the origin as before."""
-    numbers = inertia.toDynamicParameters()
-    numbers[1:4] += moment
-    return pin.Inertia.FromDynamicParameters(numbers)
+        Mass, first moment, and second moment about the joint's frame: xx, xy, yy, xz, yz, zz. All torques are linear in
+        them.
+        """
+        speed, rate = (np.zeros((len(q), self.model.nv)) for _ in range(2))
+        speed[:, self.at], rate[:, self.at] = v, a
+        found = np.empty((len(q), len(self.at), self.model.njoints - 1, 10))
+        for out, one, *motion in zip(found, self.configurations(q).T, speed, rate, strict=True):
+            whole: Any = pin.computeJointTorqueRegressor(self.model, self.data, one, *motion)
+            out[:] = whole[self.at].reshape(out.shape)
+        return found[:, :, [self.model.getJointId(name) - 1 for name in self.bodies]]
 
 
 def _between(way: Array, at: Array, values: Array) -> Array:

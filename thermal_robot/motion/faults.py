@@ -225,6 +225,8 @@ def _gains(log: MotionLog) -> _Checked:
     for j in np.flatnonzero(np.abs(middle) > np.maximum(np.log(OTHER_GAIN), CLEAR * error)):
         joint, size, sigma = log.joints[j], float(np.exp(middle[j])), float(np.exp(middle[j]) * error[j])
         word, factor[j] = _remedy(size, float(scale[j]))
+        if not word and size < 1.0:
+            continue  # a soft servo under load: less than the command is no sign of a unit that nobody knows
         lost |= set() if word else {joint}
         done = f"taken for {word}" if word else "the joint is left out"
         told = f"q.{joint} moves {size:.4g} ± {sigma:.2g} times as far as cmd.{joint}: another unit, {done}"

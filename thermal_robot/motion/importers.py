@@ -7,7 +7,8 @@ and ``state_motor.csv``: timestamp in µs, in s of a simulation, and lists in qu
 and DISABLE (isaac-sim2real/sage, README, "Data Format"). MuJoCo: arrays named as the fields of mjData, time, qpos,
 qvel, ctrl and qfrc_actuator, one row a step, in an .npz or as columns ``qpos_0`` …; names come from the MJCF. ROS 2:
 JointState, and JointTrajectoryControllerState (reference), JointTrajectory, Float64MultiArray (the joints in the order
-of the chain) or JointState of another topic as the command.
+of the chain) or JointState of another topic as the command. BAM: a JSON file a motion of a servo on a pendulum, with
+``entries`` of position, speed, goal_position, torque_enable, input_volts, temp and timestamp (Rhoban/bam).
 """
 
 from __future__ import annotations
@@ -205,6 +206,26 @@ def _mujoco(files: Sequence[Path], asked: Asked) -> Taken:
     return Taken({"log.csv": _stacked(frames)}, "rad", tuple(notes))
 
 
+_BAM = {"goal_position": "cmd", "position": "q", "speed": "qd", "input_volts": "volts", "temp": "temperature"}
+
+
+def _bam(files: Sequence[Path], asked: Asked) -> Taken:
+    frames, joint = [], asked.robot.joint_names[0]
+    for file in files:
+        try:
+            held = json.loads(file.read_text(encoding="utf-8"))
+            entries = {name: np.array([one[name] for one in held["entries"]], float) for name in held["entries"][0]}
+            entries["goal_position"][entries.get("torque_enable", np.ones(1)) < 0.5] = np.nan
+            columns = {f"{kind}.{joint}": entries[name] for name, kind in _BAM.items() if name in entries}
+            frames.append(_frame(file.stem, entries["timestamp"], columns))
+            frames[-1]["kind"] = held.get("trajectory", "")
+        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+            expected = "entries with position, goal_position and timestamp"
+            raise CampaignError(str(file), "cannot be read", found=str(error), expected=expected) from error
+    note = "kp is a register of the firmware, and no stiffness: state it in N·m/rad under [servo.<joint>]"
+    return Taken({"log.csv": _stacked(frames)}, "rad", (note,))
+
+
 _COMMANDS = {
     "control_msgs/msg/JointTrajectoryControllerState": "a controller's state",
     "trajectory_msgs/msg/JointTrajectory": "trajectories",
@@ -277,6 +298,7 @@ MOTION_FORMATS = {
     "lerobot": MotionFormat("a dataset of LeRobot: action and observation.state of each episode", "FOLDER", _lerobot),
     "sage": MotionFormat("SAGE's control.csv and state_motor.csv", "FOLDERS of motions", _sage),
     "mujoco": MotionFormat("what MuJoCo simulated: time, qpos, qvel, ctrl", "F.npz or F.csv, one a motion", _mujoco),
+    "bam": MotionFormat("BAM's records of a servo on a pendulum", "F.json, one a motion", _bam),
     "motionbag": MotionFormat("joint states and their commands in ROS 2 bags", "BAGS, one a motion", _rosbag),
 }
 """Formats of logs of motion by name, in the order of the help."""

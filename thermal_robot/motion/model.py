@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
+from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
@@ -82,10 +83,10 @@ class JointModel(ABC):
         found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
         return found[0] if found else None
 
-    def dynamics_of(self, log: MotionLog, masses: bool) -> Dynamics:
+    def dynamics_of(self, log: MotionLog) -> Dynamics:
         """Rigid-body dynamics of the log's joints."""
         payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
-        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload, masses)
+        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
 
     def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
@@ -159,7 +160,7 @@ class ServoModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        self.dynamics = self.dynamics_of(log, masses=False)
+        self.dynamics = self.dynamics_of(log)
         self.servos = [log.servos.get(name, Servo()) for name in log.joints]
         self.coupled = all(servo.kp for servo in self.servos)
         self._grids()
@@ -169,9 +170,7 @@ class ServoModel(JointModel):
         self.moving = False
         self.touching, self.pressing = 0.0, np.zeros_like(self.about)
         self.contact = np.zeros_like(self.about)
-        gravity = np.asarray(log.robot.model.gravity.linear)  # in the frame of the URDF's root, as Pinocchio's
-        self.up = -gravity / max(float(np.linalg.norm(gravity)), 1e-12)
-        self.lowest = float(self.dynamics.heights(self.commanded, self.up)[0].min())
+        self.lowest = float(self._heights(self.commanded)[0].min())
         self.parameters = self._parameters()
 
     def _grids(self) -> None:
@@ -254,9 +253,20 @@ class ServoModel(JointModel):
             values[at["torque_limit"]] = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
         if (p := self.index("contact")) is not None:
             measured = np.concatenate([m.position.values for m in self.log.motions])
-            height, _ = self.dynamics.heights(measured[np.isfinite(measured).all(axis=1)], self.up)
+            height, _ = self._heights(measured[np.isfinite(measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
         return values
+
+    def _heights(self, q: Array) -> tuple[Array, Array]:
+        """Height of the tool (n,), m, against gravity, and its derivative (n, J) by each joint, others held at zero."""
+        robot, names = self.log.robot, self.log.joints
+        own = [j for j, name in enumerate(names) if name in robot.joint_names]
+        at = [robot.joint_names.index(names[j]) for j in own]
+        whole, slope = np.zeros((len(q), robot.n)), np.zeros(q.shape)
+        whole[:, at] = q[:, own]
+        up = -robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-12)
+        slope[:, own] = (up @ frame_jacobians(robot, whole)[:, :3])[:, at]
+        return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
         """(S, 14) numbers of the kernel and (S, 3) weights of the loads, for sets (S, P) of all parameters."""
@@ -383,7 +393,7 @@ class ServoModel(JointModel):
 
         The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
         """
-        height, slope = self.dynamics.heights(self.about, self.up)
+        height, slope = self._heights(self.about)
         compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
         self.touching = float(values[self.index("contact")])

@@ -25,14 +25,16 @@ def moves(model: JointModel, values: Array) -> Mapping[tuple[str, str], float]:
     Mapping
         By effect and joint, in the unit of the gap; of what all joints share in each joint.
     """
+    parameters = model.parameters
 
     def of_joint(joint: int) -> dict[tuple[str, str], float]:
-        own = [p for p, x in enumerate(model.parameters) if x.joint in (joint, SHARED) and values[p]]
-        sets = np.tile(values, (1 + len(own), 1))
-        sets[1 + np.arange(len(own)), own] = 0.0
-        left = model.residuals(joint, sets)
+        own = [
+            one.effect if one.joint in (joint, SHARED) and x else "" for one, x in zip(parameters, values, strict=True)
+        ]
+        effects = [name for name in dict.fromkeys(own) if name]
+        without = [np.where(np.array(own) == name, 0.0, values) for name in effects]
+        left = model.residuals(joint, np.stack([values, *without]))
         sizes = np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1))
-        name = model.log.joints[joint]
-        return {(model.parameters[p].effect, name): float(size) for p, size in zip(own, sizes, strict=True)}
+        return {(name, model.log.joints[joint]): float(x) for name, x in zip(effects, sizes, strict=True)}
 
     return {key: size for one in model.each(of_joint) for key, size in one.items()}

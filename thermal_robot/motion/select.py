@@ -92,6 +92,7 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], st
     values = everything(model, allowed, start, progress)
     deflation = None
     known: Mask | None = None
+    fitted: list[tuple[float, Choice]] = []
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
         choice = _weighed(model, values, allowed, sizes, deflation, known)
@@ -102,7 +103,14 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], st
         values = fit(model, np.where(known, values, 0.0), known, sizes)
         model.refreshed(values)
         values = fit(model, values, known, sizes)
-    return _pruned(model, choice, allowed, values)
+        choice = _weighed(model, values, allowed, sizes, deflation, known, final=True)
+        left = held_out_loss(choice.point, known, sizes).sum(axis=1) * choice.point.noise**2
+        counts = [len(one.residual) for one in choice.point.rows]
+        fitted.append((float(counts @ np.log(np.maximum(left, 1e-300))), choice))
+    # a search that left the neighbourhood of its point may have chosen worse than the round before
+    choice = min(fitted, key=lambda one: one[0])[1]
+    model.refreshed(choice.point.values)
+    return _pruned(model, choice, allowed, choice.point.values)
 
 
 def _weighed(

@@ -63,8 +63,6 @@ STIFFNESS = 1.0 / 0.07
 """N·m/rad: of a servo whose gain nobody states, from a hobby servo's logs (0.07 rad/(N·m))."""
 TORQUE_LIMIT = 3.0
 """N·m: of a servo of which nobody states it, that of a hobby servo's data sheet."""
-FASTEST = 5.0
-"""rad/s: of a joint of which the URDF states no velocity."""
 STEP = 4e-3
 """s: longest time step, a tenth of the shortest lag that is found."""
 DIFFERENCE = 0.05
@@ -117,10 +115,11 @@ STRUCTURE, LEVELS = 0.1, 10
 """Share of what remains that a curve must explain in motions held out to be told; and levels of such a curve."""
 MOST_PAYLOAD = 100.0
 """kg: where no joint feels a payload."""
-SMOOTHED = 0.1
-"""s: window of the local cubics that differentiate positions: short beside accelerations, long beside counts."""
+SMOOTHED, KEPT = 0.2, 20
+"""s: window of the local cubics that differentiate positions, and rows kept of each: they pass 6 Hz, what an arm
+accelerates with, and not its lowest resonances, 8 to 30 Hz, which no rigid body has."""
 PRANDTL = 4e-3
-"""rad over which a joint's friction builds up when it turns back: what public logs of arms show."""
+"""rad over which a joint's friction builds up, from end to end, when it turns back: what public logs of arms show."""
 LINK = 0.3
 """m: length of a link, of which a tenth is how far its centre of mass may be off."""
 AGREE = 0.1
@@ -130,8 +129,6 @@ STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 a second; here a thousand times more slowly."""
 STIFFEST = 2.0
 """Time steps: shortest time constant that MuJoCo lets a constraint have."""
-VISIBLE = 2.0
-"""Times the noise: an effect that moves an output by less, root mean square, is not told."""
 WAVES = 3
 """Rounds at most in which joints take each other's accelerations."""
 MOST = 0.5

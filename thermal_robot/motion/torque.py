@@ -14,14 +14,17 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
-from thermal_robot.motion.following import at
-from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.following import at, usual_step
+from thermal_robot.motion.log import Channel, MotionLog, Servo
 from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
+
+_SECOND = tuple(f"second moment of {{}}, {axes}" for axes in ("xx", "xy", "yy", "xz", "yz", "zz"))
+_INERTIAL = ("mass of {}", *(f"moment of {{}} along {axis}" for axis in "xyz"), *_SECOND)
 
 
 class TorqueModel(JointModel):
@@ -31,27 +34,21 @@ class TorqueModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        dynamics = self.dynamics_of(log, masses=True)
-        parts = [_derivatives(m.position.time, m.position.values) for m in log.motions]
-        self._q, self._v, self._a = (np.concatenate([one[k] for one in parts]) for k in range(3))
+        dynamics = self.dynamics_of(log)
+        parts = [_sampled(motion.position, motion.torque) for motion in log.motions if motion.torque]
+        self._time, self._q, self._v, self._a, *others = (np.concatenate(one) for one in zip(*parts, strict=True))
+        self._sign, self._slow, self._measured, self._scatter = others
         self._loads = dynamics.along(self._q, self._v, self._a, whole=True)
-        self._bodies = dynamics.bodies
-        self._masses = [dynamics.model.inertias[dynamics.model.getJointId(name)].mass for name in dynamics.bodies]
-        lengths = [len(m.position.time) for m in log.motions]
-        self._motion = np.repeat(np.arange(len(log.motions)), lengths)
-        self._time = np.concatenate([m.position.time - m.position.time[0] for m in log.motions])
-        self._measured = np.concatenate([at(m.torque, m.position.time) for m in log.motions if m.torque])
+        self._inertial, self._bodies = dynamics.inertial(self._q, self._v, self._a), dynamics.bodies
+        self._motion = np.repeat(np.arange(len(parts)), [len(one[0]) for one in parts])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
         self.parameters = self._parameters()
 
-    def _limit(self, joint: int) -> float:
-        servo = self.log.servos.get(self.log.joints[joint], Servo())
-        return servo.limit or settings.TORQUE_LIMIT
-
     def _parameters(self) -> tuple[Parameter, ...]:
         found = []
-        for j in self.joints:
-            limit, fastest = self._limit(j), max(float(np.abs(self._v[:, j]).max()), 1e-6)
+        for j, name in enumerate(self.log.joints):
+            limit = self.log.servos.get(name, Servo()).limit or settings.TORQUE_LIMIT
+            fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for name, label, unit, size, spread, positive in (
                 ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),
                 ("coulomb", "half width", "N·m", 0.02 * limit, 1.0, True),
@@ -66,22 +63,12 @@ class TorqueModel(JointModel):
             found.append(
                 Parameter("payload", SHARED, "mass", "kg", self.rated(self._loads.torque[1]), 1.0, False, "payload")
             )
-            for k, name in enumerate(self._bodies):
-                found.append(Parameter("masses", SHARED, f"mass of {name}", "", 0.1, 1.0, False, f"mass {4 * k}"))
-                moment = 0.1 * self._masses[k] * settings.LINK
-                found += [
-                    Parameter(
-                        "masses",
-                        SHARED,
-                        f"moment of {name} along {axis}",
-                        "kg·m",
-                        moment,
-                        1.0,
-                        False,
-                        f"mass {4 * k + i}",
-                    )
-                    for i, axis in enumerate("xyz", 1)
-                ]
+            for k, (name, numbers) in enumerate(self._bodies.items()):
+                for i, what in enumerate(_INERTIAL):
+                    size, unit = (0.1, "") if not i else (0.1 * numbers[0] * settings.LINK, "kg·m")
+                    size, unit = (size * settings.LINK, "kg·m²") if i > 3 else (size, unit)
+                    label = what.format(name)
+                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {10 * k + i}"))
         return tuple(found)
 
     @cached_property
@@ -89,18 +76,18 @@ class TorqueModel(JointModel):
         """Of each joint the torque (N,) that one unit of each number brings, before the torque constant."""
         found = []
         for j in self.joints:
-            rows, load = self._used[j], self._loads.torque[:, :, j]
-            sign = _prandtl(self._q[:, j], self._motion)
-            slow = np.exp(-((self._v[:, j] / STRIBECK_VELOCITY) ** 2))
+            rows, load, sign = self._used[j], self._loads.torque[:, :, j], self._sign[:, j]
+            bodies = self._inertial[:, j].copy()
+            bodies[:, :, 0] = np.einsum("nbi,bi->nb", bodies, np.array(list(self._bodies.values())))
             own = {
                 "offset": np.ones(len(self._q)),
                 "coulomb": sign,
-                "stribeck": sign * slow,
+                "stribeck": self._slow[:, j],
                 "viscous": self._v[:, j],
                 "armature": self._a[:, j],
                 "load_friction": sign * np.abs(load[0]),
                 "payload": load[1],
-                **{f"mass {k}": load[2 + k] for k in range(4 * len(self._bodies))},
+                **{f"mass {k}": one for k, one in enumerate(bodies.reshape(len(sign), -1).T)},
                 "nominal": load[0],
             }
             found.append({name: values[rows] for name, values in own.items()})
@@ -154,10 +141,8 @@ class TorqueModel(JointModel):
         return self.cluster_of(self._motion[self._used[joint]])
 
     def noise(self, joint: int) -> float:
-        """One sigma of a joint's torque, N·m: the scatter of neighbouring readings about a straight line."""
-        values = self._measured[self._used[joint], joint]
-        bend = values[2:] - 2.0 * values[1:-1] + values[:-2]
-        return max(float(np.median(np.abs(bend))) / (0.6745 * np.sqrt(6.0)), settings.LEAST_NOISE) if len(bend) else 1.0
+        """One sigma of a joint's smoothed torque, N·m."""
+        return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
 
     def quantities(self, joint: int) -> dict[str, Array]:
         """(N,) what a joint's residual may follow: position, velocity, load and time."""
@@ -181,21 +166,33 @@ class TorqueModel(JointModel):
         }  # fmt: skip
 
 
-def _derivatives(time: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (N, J) by local cubics over a tenth of a second (Savitzky and Golay)."""
-    step = float(np.median(np.diff(time)))
+def _sampled(position: Channel, torque: Channel) -> tuple[Array, ...]:
+    """Time (n,), then (n, J) q, q̇, q̈, stop, stop where slow, and torque, all by local cubics (Savitzky and Golay).
+
+    On an even clock; what the model does in a step passes the filter as what was measured does (Gautier's parallel
+    filtering), so that vibrations of the arm, which no rigid body has, are in neither. Then ends are cut and rows are
+    left out. Last one sigma (1, J) of the torque, by the scatter of neighbouring readings about a straight line.
+    """
+    step = usual_step(position)
+    grid = np.arange(position.time[0], position.time[-1], step)
     width = max(2 * round(settings.SMOOTHED / step / 2) + 1, 5)
-    if len(q) <= width:
-        return q, np.gradient(q, time, axis=0), np.zeros_like(q)
-    return tuple(savgol_filter(q, width, 3, deriv=k, delta=step, axis=0) for k in range(3))
+    kept = slice(width // 2, len(grid) - width // 2, max(width // settings.KEPT, 1))
+    q, measured = at(position, grid), at(torque, grid)
+
+    def smooth(values: Array, order: int = 0) -> Array:
+        return np.asarray(savgol_filter(values, width, 3, deriv=order, delta=step, axis=0))
+
+    speed, sign = smooth(q, 1), _prandtl(q)
+    slow = sign * np.exp(-((speed / STRIBECK_VELOCITY) ** 2))
+    bend = np.abs(measured[2:] - 2.0 * measured[1:-1] + measured[:-2])
+    noise = np.median(bend, axis=0) / (0.6745 * np.sqrt(6.0)) * np.linalg.norm(savgol_coeffs(width, 3))
+    smoothed = smooth(q), speed, smooth(q, 2), smooth(sign), smooth(slow), smooth(measured)
+    return (grid - grid[0])[kept], *(one[kept] for one in smoothed), noise[None]
 
 
-def _prandtl(q: Array, motion: NDArray[np.int64]) -> Array:
-    """(N,) the state in −1…1 of an elastoplastic element that the joint drags: its sign once it slid over its reach."""
-    move = np.diff(q, prepend=q[:1]) / settings.PRANDTL
-    move[np.flatnonzero(np.diff(motion, prepend=-1))] = 0.0
-    found, state = np.empty(len(q)), 0.0
-    for n, step in enumerate(move.tolist()):
-        state = min(max(state + step, -1.0), 1.0)
-        found[n] = state
+def _prandtl(q: Array) -> Array:
+    """(N, J) state in −1…1 of elastoplastic elements that joints drag: their signs once they slid over their reach."""
+    found, state = np.zeros_like(q), np.zeros(q.shape[1])
+    for n, move in enumerate(2.0 / settings.PRANDTL * np.diff(q, axis=0), 1):
+        found[n] = state = np.clip(state + move, -1.0, 1.0)
     return found
