@@ -56,7 +56,7 @@ _TEXT = text("text in quotes, a number or a date")
 def _said(value: Any, path: str) -> str:
     """Take text, a number or a date as text."""
     plain = isinstance(value, (int, float, date)) and not isinstance(value, bool)
-    return _TEXT(str(value) if plain else value, path)
+    return str(_TEXT(str(value) if plain else value, path))
 
 
 ABOUT = mapping(_said)

@@ -329,7 +329,7 @@ def _of_comparison(comparison: Plain) -> Iterator[dict[str, Any]]:
         yield {"heading": "Not compared", "said": said, "lines": comparison["not_told"]}
 
 
-def _section(heading: str, table: list[tuple[str, ...]], words: int, **more: Any) -> dict[str, Any]:
+def _section(heading: str, table: Sequence[Sequence[str]], words: int, **more: Any) -> dict[str, Any]:
     return {"heading": heading, "heads": table[0], "rows": table[1:], "words": words, **more}
 
 
@@ -396,10 +396,10 @@ def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:
     yield {"heading": "Over time", "drawn": (plots.plot_wear(wear), label)}
     label = "Every parameter: how it moves, how far, how sure that is"
     yield _section("Parameters", text_campaigns.wear_table(wear), 3, label=label)
-    visits = [(v.name, v.date, words.about_in_line(v.about), str(v.rows)) for v in wear.campaigns]
-    heads = ("campaign", "date", "about", "rows used")
+    visits = [["campaign", "date", "about", "rows used"]]
+    visits += [[v.name, v.date, words.about_in_line(v.about), str(v.rows)] for v in wear.campaigns]
     if not any(v.about for v in wear.campaigns):
-        heads, visits = (heads[0], heads[1], heads[3]), [(v[0], v[1], v[3]) for v in visits]
-    yield _section("Campaigns", [heads, *visits], len(heads) - 1, label="Campaigns in the order of time")
+        visits = [[name, date, rows] for name, date, _, rows in visits]
+    yield _section("Campaigns", visits, len(visits[0]) - 1, label="Campaigns in the order of time")
     if wear.notes:
         yield {"heading": "To know", "lines": wear.notes}
