@@ -14,7 +14,8 @@ from thermal_robot.robot import ENDS, load_robot
 def plan(options: argparse.Namespace) -> None:
     """Run ``plan``: plan a campaign, write it, and print the expected precision."""
     from thermal_robot.effects import KINEMATIC
-    from thermal_robot.planning import CRASH_ROWS, ROWS, plan, text, write_plan
+    from thermal_robot.planning import plan, text, write_plan
+    from thermal_robot.planning.plan import CRASH_ROWS, ROWS
 
     found = plan(
         load_robot(options.robot, options.tool, root_frame=options.root),

@@ -12,6 +12,7 @@ from thermal_robot.commands.shared import Output
 from thermal_robot.console import note
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.correction.holding import FORMATS, WORTH, expectation
+from thermal_robot.correction.zero_files import Motors
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import write_text
 
@@ -60,7 +61,7 @@ def robot_files(options: argparse.Namespace, model: CorrectedModel) -> tuple[lis
         note(robot.beyond, options.loudness)
     own = Path(options.from_mjcf) if options.from_mjcf else None
     units = model.settings.units
-    motors: to.Motors = "dynamixel" if options.dynamixel else "feetech"
+    motors: Motors = "dynamixel" if options.dynamixel else "feetech"
     made: dict[str, Callable[[], str]] = {
         "urdf": lambda: to.calibrated_urdf(robot),
         "mjcf": lambda: to.calibrated_mjcf(robot, own),

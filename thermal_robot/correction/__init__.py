@@ -11,13 +11,12 @@ from thermal_robot.correction.robot_files import (
     joint_parameters,
     ur_kinematics,
 )
-from thermal_robot.correction.zero_files import Motors, lerobot_calibration, pal_calibration
+from thermal_robot.correction.zero_files import lerobot_calibration, pal_calibration
 
 __all__ = [
     "Calibrated",
     "Commands",
     "CorrectedModel",
-    "Motors",
     "calibrated",
     "calibrated_mjcf",
     "calibrated_urdf",
