@@ -1,10 +1,11 @@
 """An ending that is not the format's is refused before anything is read or computed."""
 
+import sys
+
 import pandas as pd
 import pytest
 from commanded import refused
 
-from thermal_robot.commands import endings
 from thermal_robot.commands.endings import EXTRAS, FORMS
 from thermal_robot.commands.table import COMMANDS
 
@@ -41,9 +42,11 @@ def test_every_file_that_is_written_has_a_form():
 
 
 def test_an_ending_whose_library_is_missing_is_refused_with_its_extra(run, monkeypatch):
-    monkeypatch.setattr(endings, "find_spec", lambda name: None)
+    for module in EXTRAS:
+        monkeypatch.setitem(sys.modules, module, None)
     asked = ("predict", NOWHERE, NOWHERE, "-o")
     refused(run(*asked, "p.xlsx"), "openpyxl, which is not installed", 'pip install "thermal-robot[excel]"')
+    refused(run("demo", "--report", "d.pdf"), "weasyprint, which is not installed", '"thermal-robot[pdf]"')
     refused(run(*asked, "p.csv"), NOWHERE)
 
 
