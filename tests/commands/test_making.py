@@ -62,11 +62,25 @@ def test_what_is_left_out_is_what_the_function_leaves_out():
     COMMANDS["plan"].add_arguments(parser)
     told = vars(parser.parse_args(["robot.urdf"]))
     meant = {name: p.default for name, p in inspect.signature(plan).parameters.items()}
-    for option in ("rows", "repeats", "orientation", "seed"):
+    assert told["rows"] is None  # the planner's own, or those after a crash
+    for option in ("repeats", "orientation", "seed"):
         assert told[option] == meant[option], option
     assert 1e-3 * told["noise"] == pytest.approx(meant["noise"])
     assert told["warming"] == meant["rise"]
     assert (told["loads"], told["target"]) == (list(meant["loads"]), list(meant["target"]))
+
+
+def test_after_a_crash_forty_poses_are_planned_for_zeros_and_placements(run, tmp_path):
+    out = tmp_path / "after.csv"
+    words = ("plan", "builtin:rv_m2", "--tool", "tool0", "--after-crash", "-o", out)
+    status, said, _ = run(*words)
+    assert status == 0
+    assert {line.split()[0] for line in said.splitlines()[3:] if line.strip()} >= {"joint_offset", "geometric"}
+    assert "backlash" not in said
+    planned = out.read_text().splitlines()
+    assert len(planned) == 41
+    assert "temperature" not in planned[0]
+    assert run(*words[:5], "--rows", "12", "-o", tmp_path / "few.csv")[1].startswith("12 rows")
 
 
 TABLE = "turn,lift,slide,roll,x,y,z\n0.1,0.2,0.03,0.4,1,2,3\n-0.1,0.3,0.06,3.5,4,5,6\n0.5,-0.4,0.09,-0.4,7,8,9\n"

@@ -29,7 +29,7 @@ EVERY = {
     "blind": (blind_html, lambda: score([*trial(), *trial_of_several()])),
 }
 """By the page's kind what writes it, and what it is of."""
-ALIKE = ("nothing", "confounded", "contained", "law", "unexplained")
+ALIKE = ("found", "nothing", "confounded", "contained", "law", "unexplained")
 """Kinds whose parts others have, too."""
 
 

@@ -151,7 +151,11 @@ def test_nothing_is_cut_of_a_page_with_the_arm(browser, demo, tmp_path):
 def test_what_is_cut_is_noticed(browser, tmp_path):
     """A line that is too long for its box, a box that is too broad, a column beyond the sheet, an error."""
     spoilt = {
-        '<p style="width: 5rem; overflow: hidden; white-space: nowrap">a line that is far too long</p>': {1400, 400},
+        '<p style="width: 5rem; overflow: hidden; white-space: nowrap">a line that is far too long</p>': {
+            1400,
+            400,
+            "A4",
+        },
         '<div style="width: 3000px">broad<b style="float: right">gone_from_paper</b></div>': {1400, 400, "A4"},
         '<img src="http://127.0.0.1:9/none.png" alt="">': {1400, 400},
     }
@@ -178,6 +182,7 @@ def test_a_pdf_is_refused_before_anything_is_computed_where_its_extra_is_missing
     assert 'pip install "thermal-robot[pdf]"' in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("no_drawing")
 def test_the_first_page_says_whose_robot_it_is():
     shown = page("found")
     head = shown[shown.index("<header>") : shown.index("</header>")]
