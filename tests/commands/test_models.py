@@ -154,9 +154,12 @@ def test_poses_that_cannot_be_used_are_refused(run, folder, diagnosed, tmp_path)
     assert not out.exists()
 
 
+ENDINGS = {"dh": "csv", "offsets": "csv", "joints": "json"}
+
+
 def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
     every = [name for name in OUTPUTS if name not in ("ur_kinematics", "pal", "lerobot")]  # which are of other robots
-    files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in every}
+    files = {name: tmp_path / f"{name}.{ENDINGS.get(name, 'xml')}" for name in every}
     options = [word for name, file in files.items() for word in (f"--{name}", file)]
     status, said, noted = run("correct", diagnosed.model, *options, "--temperature", "26")
     assert (status, noted) == (0, "")

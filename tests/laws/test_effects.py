@@ -235,12 +235,16 @@ def test_a_diagnosis_says_what_would_make_an_effect_testable(rv_m2):
         "base_compliance": ("tilt.x", "tilt.y", "masses in the URDF"),
         "thermal_bending": tuple(bent),
         "thermal_elongation": ("temperature",),
-        "drift": ("time",),
+        "drift": ("time", "order"),
     }
-    for covariates in ({}, {k: np.zeros(60) for k in data.covariates}):
+    either = {
+        **expected,
+        "backlash": (*expected["backlash"], "order"),
+    }  # where no direction is recorded, an order tells it
+    for covariates, needs in (({}, either), ({k: np.zeros(60) for k in data.covariates}, expected)):
         found = diagnose(replace(data, covariates=covariates))
         untestable = {f.name: f.needs for f in found.effects if f.status == "not_testable"}
-        assert {k: untestable.get(k) for k in expected} == expected
+        assert {k: untestable.get(k) for k in needs} == needs
         for finding in found.effects:
             said = (finding.probability, finding.shrinkage, finding.parameters)
             assert (said == (None, None, ())) if finding.name in untestable else (finding.needs == ())

@@ -83,7 +83,7 @@ def test_the_command_prints_and_writes(folder, asked, capsys):
 def test_bad_input_is_said_in_one_line(folder, capsys):
     for arguments, said in (
         (["diagnose", str(folder), "--model", "m.json"], "no model"),
-        (["diagnose", str(folder), "--json", str(folder / "log.csv")], "would be overwritten"),
+        (["diagnose", str(folder), "--json", str(folder / "log.csv")], "is no JSON file by its ending"),
         (["compare", str(folder), str(folder), "--report", "c.html"], "no page"),
     ):
         assert cli.main(arguments) == 2

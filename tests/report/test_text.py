@@ -410,7 +410,13 @@ def test_changes_effects_and_parameters_are_told_with_their_chance():
     for p, chance in ((None, "–"), (1e-9, "below 0.001 %"), (0.0213, "2.1 %"), (1.0, "100 %")):
         assert f"χ² 31.4 on 1, {chance} by chance" in changes(comparison([change(p_value=p)]))[0]
     row = {"name": "own", "status": "contradicts", "reason": "april alone needs it", "degrees": 0, "p_value": 1.0}
-    each = {"name": "zero", "unit": "rad", "values": [-1.165e-3, None], "stds": [3.8e-5, None]}
+    each = {
+        "name": "zero",
+        "unit": "rad",
+        "values": [-1.165e-3, None],
+        "stds": [3.8e-5, None],
+        "between": ["april", "may"],
+    }
     silent = {**each, "values": [None, None]}
     told = {"parameters": [{**each, "difference": None, "std": None, "p_value": None}, silent]}
     absent = {"name": "other", "status": "absent", "parameters": []}

@@ -182,7 +182,9 @@ def _deviations(model: CorrectedModel) -> Array:
     count = sum(len(values) for _, values in model.effects)
     if model.spread is None or len(model.spread.covariance) < count:
         return np.full(count, np.nan)
-    return np.asarray(np.sqrt(model.spread.covariance.diagonal()[len(model.spread.covariance) - count :]))
+    return np.asarray(
+        np.sqrt(np.maximum(model.spread.covariance.diagonal()[len(model.spread.covariance) - count :], 0.0))
+    )
 
 
 def determined(

@@ -22,7 +22,7 @@ from scipy.special import softmax
 from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
-from thermal_robot.diagnosis import settings as chosen
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import mismatch
 from thermal_robot.diagnosis.diagnose import solvable
@@ -109,7 +109,7 @@ class Crash:
     @property
     def named(self) -> tuple[Moved, ...]:
         """Those that are more probable than not."""
-        return tuple(one for one in self.moved if one.probability > chosen.LIKELY)
+        return tuple(one for one in self.moved if one.probability > settings.LIKELY)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI, ready for JSON."""
@@ -172,7 +172,7 @@ def _weighed(fit: Fit) -> Crash:
     e, seen = fit.explanation, fit.corrected
     kinds = (JointOffset(), Geometric())
     ordinary = [
-        replace(block(seen, kind).held, largest_scale=most) for kind, most in zip(kinds, chosen.ORDINARY, strict=True)
+        replace(block(seen, kind).held, largest_scale=most) for kind, most in zip(kinds, settings.ORDINARY, strict=True)
     ]
     single = [one for kind in kinds for one in gate.alone(kind, seen)]
     linear = Linear(e.linear.gap, e.linear.frames, (*ordinary, *(block(seen, one).held for one in single)))
@@ -181,8 +181,8 @@ def _weighed(fit: Fit) -> Crash:
     told = [b for b in range(first, len(linear.blocks)) if problem.ranks[b]]
     bare, unlikely = evidence(problem, tuple(range(first)), 0.0, None), -float(np.log(len(single)))
     # from where a crash lies: at ordinary scales the background would take it up
-    start = replace(bare, scales={**dict.fromkeys(range(first), chosen.CALM), **dict.fromkeys(told, chosen.STRUCK)})
-    sets = list(chain.from_iterable(combinations(told, size) for size in range(chosen.MOST_MOVED + 1)))
+    start = replace(bare, scales={**dict.fromkeys(range(first), settings.CALM), **dict.fromkeys(told, settings.STRUCK)})
+    sets = list(chain.from_iterable(combinations(told, size) for size in range(settings.MOST_MOVED + 1)))
     weighed = [evidence(problem, (*range(first), *own), unlikely * len(own), start if own else None) for own in sets]
     probabilities = softmax([each.log_evidence for each in weighed])
     found = []

@@ -94,7 +94,7 @@ def wear(
     >>> found
     Wear('rv_m2', 5 campaigns: zero offset, joint_3 (jump))
     >>> print(found.summary)
-    Over 5 campaigns of rv_m2: joint zero offsets, zero offset, joint_3 jumped by ... between ... (2026-03-01) and ...
+    Over 5 campaigns of rv_m2: zero offset, joint_3 jumped by +0.30... ± 0.00... mrad between ... (2026-03-01) and ...
     """
     if not isinstance(false_alarm, (int, float)) or not 0.0 < false_alarm < 1.0:
         raise _wrong("is no rate of false alarms", "false_alarm", repr(false_alarm), "a probability, such as 0.01")
