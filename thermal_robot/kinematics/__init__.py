@@ -1,5 +1,6 @@
 """Batch kinematics: poses, Jacobians, placement sensitivities, gravity torques; the one room with Pinocchio."""
 
+from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model
 from thermal_robot.kinematics.frames import (
     Displacement,
     chain_frames,
@@ -22,10 +23,12 @@ from thermal_robot.kinematics.lie import (
 from thermal_robot.kinematics.links import elongation_jacobian, growing, link_poses
 
 __all__ = [
+    "AugmentedModel",
     "ChainFrames",
     "Displacement",
     "Reached",
     "align",
+    "augmented_model",
     "chain_frames",
     "elongation_jacobian",
     "exp3",
