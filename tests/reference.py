@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from augmented import augmented_model
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.kinematics import ChainFrames, Displacement
+from thermal_robot.kinematics import ChainFrames, Displacement, augmented_model
 from thermal_robot.kinematics.links import to_pinocchio
 
 if TYPE_CHECKING:

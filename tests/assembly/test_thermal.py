@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from augmented import augmented_model
 from scipy import stats
 from scipy.integrate import solve_ivp
 
@@ -98,7 +97,7 @@ def test_displacement_is_linear_in_elongations_however_large(arm, configurations
     grown = np.random.default_rng(0).normal(0.0, 0.1, (30, len(segment_names(arm))))
     linear = displacement(arm, q, grown)
     np.testing.assert_allclose(displacement(arm, q, grown, exact=True), linear, rtol=0.0, atol=1e-13)
-    augmented = augmented_model(arm)
+    augmented = kin.augmented_model(arm)
     moved = augmented.tool_poses(q, grown)[:, :3, 3] - augmented.tool_poses(q)[:, :3, 3]
     np.testing.assert_allclose(moved, linear, rtol=0.0, atol=1e-10)
 
@@ -148,6 +147,7 @@ def test_the_papers_u_and_what_it_could_have_missed():
     # At n = 100 a shift of σ/3 is seen with 91 %, one of σ/10 with 17 %: "accepted" means no more than this.
     np.testing.assert_allclose(found.power(SIGMA / 3), 0.915, atol=0.001)
     np.testing.assert_allclose(found.power(SIGMA / 10), 0.170, atol=0.001)
+    np.testing.assert_array_equal(found.required_n(SIGMA / 10, 0.9), 1051)
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.n = 5
 
@@ -170,6 +170,14 @@ def test_it_rejects_as_often_as_it_says(alpha):
     assert np.mean(~wrong.accepted) == pytest.approx(float(wrong.power(shift)), abs=0.01)
     assert float(wrong.power(0.0)) == pytest.approx(alpha, rel=1e-12)
     np.testing.assert_array_equal(np.asarray(wrong.p_value) >= alpha, wrong.accepted)
+
+
+@pytest.mark.parametrize("power", [0.06, 0.5, 0.9, 0.999])
+def test_required_size_is_the_smallest(power):
+    shifts = np.array([1e-4, 0.003, 0.008, 0.014, 0.1])
+    for shift, size in zip(shifts, mean_shift_test(0.0, 0.0, 0.014, n=100).required_n(shifts, power), strict=True):
+        assert mean_shift_test(0.0, 0.0, 0.014, n=int(size)).power(shift) >= power
+        assert size == 1 or mean_shift_test(0.0, 0.0, 0.014, n=int(size) - 1).power(shift) < power
 
 
 def test_a_step_and_a_ramp_are_followed_exactly(rv_m2):
@@ -426,6 +434,12 @@ def warmed(times, ambient, tau):
         (lambda r: mean_shift_test(1.0, 0.0, 0.0, n=9), EstimationError, "σ > 0"),
         (lambda r: mean_shift_test(1.0, 0.0, 1.0, n=0), EstimationError, "n ≥ 1"),
         (lambda r: mean_shift_test(1.0, 0.0, 1.0, n=9, alpha=1.0), EstimationError, "α < 1"),
+        (lambda r: mean_shift_test(1.0, 0.0, 1.0, n=9).required_n(0.0), EstimationError, "a shift of zero"),
+        (
+            lambda r: mean_shift_test(1.0, 0.0, 1.0, n=9).required_n(1.0, 0.01),
+            EstimationError,
+            "power must lie between",
+        ),
         (warmed([1.0, 0.0], 20.0, 900.0), RobotError, "do not decrease"),
         (warmed([], 20.0, 900.0), RobotError, "at least one number"),
         (warmed([0.0, 1.0], 20.0, 0.0), RobotError, "positive time constant"),

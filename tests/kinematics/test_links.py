@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import yourdfpy
-from augmented import augmented_model
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
@@ -112,8 +111,19 @@ def paper_jacobian(q):
     return np.stack([np.sin(q1)[:, None] * horizontal, np.cos(q1)[:, None] * horizontal, vertical], axis=1)
 
 
+def test_rv_m2_has_the_five_virtual_joints_of_the_paper(rv_m2):
+    augmented = kin.augmented_model(rv_m2)
+    assert augmented.segments == ("column_top", "joint_2", "joint_3", "joint_4", "tool_point")
+    # its virtual joint comes before a movable one, so that it is not turned by it
+    virtual = [f"elongation of {name}" for name in augmented.segments]
+    own = [f"joint_{k}" for k in range(1, 6)]
+    expected = [own[0], *virtual[:2], own[1], virtual[2], own[2], virtual[3], *own[3:], virtual[4]]
+    assert list(augmented.model.names)[1:] == expected
+    assert augmented.model.nq == augmented.model.nv == 10
+
+
 def test_pinocchios_jacobian_is_equations_9_to_11(rv_m2, configurations):
-    q, augmented = configurations(rv_m2, POSES), augmented_model(rv_m2)
+    q, augmented = configurations(rv_m2, POSES), kin.augmented_model(rv_m2)
     theirs = augmented.jacobians(q)[:, :, augmented.elongations]
     np.testing.assert_allclose(theirs[:, :3], paper_jacobian(q), rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(theirs[:, 3:], 0.0, atol=1e-15)
@@ -121,7 +131,7 @@ def test_pinocchios_jacobian_is_equations_9_to_11(rv_m2, configurations):
 
 
 def test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment(arm, configurations):
-    q, augmented = configurations(arm, POSES), augmented_model(arm)
+    q, augmented = configurations(arm, POSES), kin.augmented_model(arm)
     jacobians = augmented.jacobians(q)
     sensitivities = kin.placement_sensitivities(arm, q)
     along = [sensitivities[:, :, s, :3] @ arm.segments[s].direction for s in kin.growing(arm)]
@@ -134,14 +144,36 @@ def test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment(arm
     )
 
 
+def test_the_augmented_model_knows_the_robots_limits_and_gravity(arm):
+    augmented = kin.augmented_model(arm)
+    # of a joint beside the chain the limits are those between which it takes the first that follows it
+    some = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+    bounds = np.where(some, [arm.lower, arm.upper], 0.0)
+    ends = augmented.configurations(bounds)[:, augmented.joints[some]]
+    model = augmented.model
+    limits = np.array([model.lowerPositionLimit, model.upperPositionLimit])[:, augmented.joints]
+    np.testing.assert_allclose(limits[:, some], np.sort(ends, axis=0), rtol=1e-15)
+    assert np.isinf(limits[:, ~some]).any(axis=0).all()
+    np.testing.assert_array_equal(model.gravity.linear, arm.gravity)
+
+
 def test_elongated_it_is_the_elongated_robot(arm, configurations):
-    q, augmented = configurations(arm, 50), augmented_model(arm)
+    q, augmented = configurations(arm, 50), kin.augmented_model(arm)
     grown = np.random.default_rng(7).normal(0.0, 0.1, (50, len(augmented.segments)))
     twists = np.zeros((50, len(arm.segments), 6))
     for column, s in enumerate(kin.growing(arm)):
         twists[:, s, :3] = grown[:, column, None] * arm.segments[s].direction
     expected = kin.tool_poses(arm, q, kin.Displacement(segment=twists))
     np.testing.assert_allclose(augmented.tool_poses(q, grown), expected, rtol=0.0, atol=1e-10)
+
+
+def test_shapes_that_do_not_fit_are_said(rv_m2):
+    augmented = kin.augmented_model(rv_m2)
+    with pytest.raises(RobotError, match=r"\(3, 4\) do not fit: expected \(N, 5\)"):
+        augmented.tool_poses(np.zeros((3, 4)))
+    with pytest.raises(RobotError, match=r"elongations of shape \(4,\) do not fit: expected \(5,\)"):
+        augmented.tool_poses(np.zeros((3, 5)), np.zeros(4))
+    assert augmented.tool_poses(np.empty((0, 5))).shape == (0, 4, 4)
 
 
 def test_an_elongation_has_a_position_or_a_twist(rv_m2):

@@ -266,6 +266,31 @@ class MeanShift:
         """Probability of rejecting the hypothesis when the true mean is off μ0 by ``shift`` (unit of σ)."""
         return _power(np.asarray(shift, dtype=float) / self.sigma, self.n, self.critical)
 
+    def required_n(self, shift: ArrayLike, power: float = 0.9) -> NDArray[np.int64]:
+        """Smallest sample that rejects, with probability ``power``, a mean that is off μ0 by ``shift`` (unit of σ).
+
+        Raises
+        ------
+        EstimationError
+            If the shift is zero, or the power not between α and 1.
+        """
+        relative = np.abs(np.asarray(shift, dtype=float) / self.sigma)
+        if not self.alpha < power < 1.0:
+            raise EstimationError(f"the power must lie between alpha = {self.alpha} and 1, got {power}")
+        if not np.all(relative > 0.0):
+            raise EstimationError("no sample is large enough to see a shift of zero")
+        from scipy.special import ndtri
+
+        # The formula leaves out rejection on the far side, so that it may ask for too many: halve down from it.
+        high = np.maximum(np.ceil(((self.critical + ndtri(power)) / relative) ** 2), 1.0)
+        low = np.zeros_like(high)
+        while np.any(high - low > 1.0):
+            middle = np.ceil((low + high) / 2.0)
+            enough = _power(relative, middle, self.critical) >= power
+            low, high = np.where(enough, low, np.minimum(middle, high - 1.0)), np.where(enough, middle, high)
+        sizes: NDArray[np.int64] = high.astype(np.int64)
+        return sizes
+
 
 def mean_shift_test(
     sample: ArrayLike, mu0: ArrayLike, sigma: ArrayLike | None = None, *, n: int | None = None, alpha: float = 0.05

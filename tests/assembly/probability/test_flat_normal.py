@@ -243,6 +243,14 @@ def test_zonotope_in_space_has_the_moments_of_its_draws_and_a_density_of_area_on
         np.testing.assert_allclose(np.cov(draws.T), law.covariance, atol=limit)
 
 
+def test_one_coordinate_of_a_box_probability_is_the_flat_normal():
+    law = flat_normal_nd(COVARIANCE, UniformSpread.segment([0.8, 0.0]), [0.3, 0.1])
+    line = FlatNormal(1.0, 0.8, 0.3)
+    for bound in (-3.0, 0.0, 0.7):
+        value = law.box_probability([-np.inf, -np.inf], [bound, np.inf])
+        assert value == pytest.approx(float(line.cdf(bound)), rel=1e-12)
+
+
 def test_what_has_no_density_is_refused():
     segment = UniformSpread.segment([1.0, 0.0])
     for matrix in (np.ones((2, 2)), np.zeros((2, 2)), np.eye(3), np.array([[1.0, 0.3], [0.2, 1.0]])):
@@ -255,5 +263,10 @@ def test_what_has_no_density_is_refused():
             1e-8 * np.eye(2), 1.0, thermal=UniformSpread.zonotope(np.eye(2)[:, [0, 1, 0, 1]], -1.0, 1.0)
         )
     law = flat_normal_nd(np.eye(2), segment)
-    with pytest.raises(ValueError, match=r"shape \(\.\.\., 2\)"):
-        law.pdf(np.zeros(3))
+    for ask, words in (
+        (lambda: law.pdf(np.zeros(3)), r"shape \(\.\.\., 2\)"),
+        (lambda: law.box_probability([0.0, 0.0], [-1.0, 1.0]), "above its upper"),
+        (lambda: flat_normal_nd(np.eye(3), UniformSpread.box([1.0] * 3)).box_probability(0.0, 1.0), "for the plane"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            ask()

@@ -59,6 +59,7 @@ def test_zonotope_is_the_hull_of_all_corners(dimension, count, kind):
         assert ConvexHull(body.vertices).volume == pytest.approx(hull.volume, rel=1e-11)
         assert len(ConvexHull(body.vertices).vertices) == len(body.vertices), "every vertex must be needed"
         assert body.farthest_distance == pytest.approx(np.max(np.linalg.norm(corners, axis=1)), rel=1e-14)
+        np.testing.assert_allclose(columns @ body.farthest_corner, body.farthest, rtol=1e-13, atol=1e-13)
         np.testing.assert_allclose(body.corners @ columns.T, body.vertices, rtol=1e-13, atol=1e-13)
         assert np.all((body.corners == low) | (body.corners == high))
         directions = rng.normal(size=(20, dimension))

@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 from scipy.special import comb, logsumexp, ndtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.joining import link_nodes
+from thermal_robot.assembly.probability.joining import joining_probability, link_nodes
 from thermal_robot.assembly.probability.kernels import density, log_density, log_tail, tail
 from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
 from thermal_robot.errors import EstimationError
@@ -427,6 +427,32 @@ class FlatNormalND:
         generator = np.random.default_rng(random_state)
         normal = generator.standard_normal((size, self.offset.size)) @ np.linalg.cholesky(self.normal_covariance).T
         return self.offset + normal + self.spread.rvs(size, generator)
+
+    def box_probability(self, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Array:
+        """Probability of ``lower <= X <= upper`` in the plane; infinite bounds make it the distribution function.
+
+        Parameters
+        ----------
+        lower, upper
+            Shape ``(..., 2)``.
+
+        Raises
+        ------
+        ValueError
+            In space, or for bounds in the wrong order.
+        """
+        if self.offset.size != 2:
+            raise ValueError("box probabilities are for the plane")
+        low, high = np.broadcast_arrays(np.asarray(lower, dtype=float), np.asarray(upper, dtype=float))
+        if not np.all(low <= high):
+            raise ValueError("a lower bound lies above its upper bound")
+        reach = 50.0 * np.sqrt(np.diag(self.covariance))
+        low = np.where(np.isneginf(low), np.minimum(self.mean - reach, high - reach), low)
+        high = np.where(np.isposinf(high), np.maximum(self.mean + reach, low + reach), high)
+        middle = 0.5 * (low + high)
+        return joining_probability(
+            self.normal_covariance, high - low, self.offset - middle, shape="rectangle", thermal=self.spread
+        )
 
     def _log_piece(self, points: Array, piece: Parallelotope) -> Array:
         factor = np.linalg.cholesky(self.normal_covariance)

@@ -270,6 +270,11 @@ class Zonotope:
         return np.asarray(self.vertices[np.argmax(np.linalg.norm(self.vertices, axis=1))])
 
     @property
+    def farthest_corner(self) -> Array:
+        """Elongations that lead to `farthest`, shape ``(k,)``."""
+        return np.asarray(self.corners[np.argmax(np.linalg.norm(self.vertices, axis=1))])
+
+    @property
     def farthest_distance(self) -> float:
         """Largest displacement of the tool point."""
         return float(np.linalg.norm(self.farthest))
