@@ -120,8 +120,7 @@ def test_fit_of_a_peaked_sample_is_the_normal_limit():
     sample = np.random.default_rng(0).standard_t(4, size=500)
     r, loc, scale = flat_normal.fit(sample)
     assert r == 0.0
-    # the search for the best ratio ends at 2e-7 with the oldest SciPy
-    assert (loc, scale) == pytest.approx((sample.mean(), sample.std()), rel=1e-6)
+    assert (loc, scale) == pytest.approx((sample.mean(), sample.std()), rel=1e-12)
     assert flat_normal.fit(sample, method="MM")[0] == 0.0
 
 

@@ -293,14 +293,15 @@ def fit_maximum_likelihood(
         None if scale is None else float(np.log(scale / width)),
         None if ratio is None else float(np.arctan(ratio)),
     )
-    candidates = _between_limits(scaled, held)
+    candidates: list[tuple[float, Estimate]] = []
     for limit in (0.0, np.inf):
         if ratio is None or ratio == limit:
             place, size = _limit(scaled, limit, held[0], held[1])
             candidates.append((-log_likelihood(scaled, limit, place, size) / scaled.size, (limit, place, size)))
+    candidates += _between_limits(scaled, held)
     if not candidates:
         candidates.append((0.0, _estimate(_completed(held, np.array([])))))
-    # A limit wins a tie: the simpler law.
+    # A limit wins a tie, the simpler law: by its closed form, for which it stands first, where the search ends on it.
     best = min(candidates, key=lambda item: (round(item[0], 11), item[1][0] not in (0.0, np.inf)))[1]
     return best[0], centre + width * best[1], width * best[2]
 
