@@ -8,8 +8,11 @@ from helpers import NOISE, tool_with
 from simulate import simulate
 
 from thermal_robot.effects import JointRipple, choose
+from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
+from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.generate import alike, waves
+from thermal_robot.inference.generate import alike, as_ripple, waves
 
 SAMPLES = 200
 
@@ -52,3 +55,23 @@ def test_ripples_are_alike_whatever_the_order_in_which_waves_were_found():
     assert not alike(one, other.having("joint_3", 5.0, 10.0))
     assert not alike(one, JointRipple().having("joint_1", 12.0, 10.0).having("joint_2", 27.0, 20.0))
     assert alike(JointRipple(), JointRipple())
+
+
+def test_a_law_that_is_a_wave_of_its_own_joint_is_ripple(rv_m2):
+    found = fit(rippling(rv_m2, JointRipple(), (), 2), choose(only=("joint_offset", "joint_ripple")))
+    wave = Discovered(place="joint_2", quantity="joint_2", shape="harmonic", marks=(26.6,), tried=300.0)
+    ripple = as_ripple(wave, found)
+    law, own = (equations_of(block(found.nominal, effect).columns) for effect in (wave, ripple))
+    assert np.abs(without(own, orthonormal(law))).max() < 1e-9 * np.abs(own).max()  # it does what the law does
+    assert ripple.share == pytest.approx(wave.share)
+
+
+@pytest.mark.parametrize(
+    "other", [{"quantity": "joint_1"}, {"kind": "link"}, {"shape": "smooth", "marks": ()}, {"marks": (1.5,)}]
+)
+def test_other_laws_are_no_ripple(rv_m2, other):
+    candidates = choose(only=("joint_offset", "joint_ripple"))
+    found = fit(rippling(rv_m2, JointRipple(), (), 2), candidates)
+    wave = Discovered(place="joint_2", quantity="joint_2", shape="harmonic", marks=(26.6,))
+    assert as_ripple(replace(wave, **other), found) is None
+    assert as_ripple(wave, fit(found.campaign, choose(only="joint_offset"))) is None

@@ -21,7 +21,16 @@ from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Discrepancy, explain, log_odds
 from thermal_robot.inference.fit import Fit, less, refit
-from thermal_robot.inference.generate import Discovery, alike, candidates, discovered, events, ripple_of, waves
+from thermal_robot.inference.generate import (
+    Discovery,
+    alike,
+    as_ripple,
+    candidates,
+    discovered,
+    events,
+    ripple_of,
+    waves,
+)
 from thermal_robot.inference.grouping import blocks
 from thermal_robot.inference.problem import generalised
 from thermal_robot.inference.scatter import RandomGap, random_gap
@@ -31,18 +40,22 @@ from thermal_robot.inference.weights import Noise
 def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: add unlisted terms in competition with all known effects; ``None`` if none is selected.
 
-    Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. One
-    change point or law is added at a time, as ``discovered.<number>``.
+    Terms are generated from the residual: change points, waves of the joints, laws of any quantity at any place. A law
+    that is a wave of a joint's own position competes as ripple. One other law is added at a time, as
+    ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")
     held = [effect for effect, _ in fit.effects]
-    laws = candidates(fit, number, events(fit))
+    scanned = candidates(fit, number, events(fit))
+    waved = {law: as_ripple(law, fit) for law in scanned}
+    laws = tuple(law for law in scanned if waved[law] is None)
+    ripples = tuple(dict.fromkeys(ripple for ripple in (_ripple(fit), *waved.values()) if ripple is not None))
     offered: dict[str, tuple[Effect, ...]] = {f"{PREFIX}{number}": laws} if laws else {}
-    bases, wave = [held], _ripple(fit)
-    if wave is not None:
+    bases = [held]
+    if ripples:
         others = [effect for effect in held if not isinstance(effect, JointRipple)]
-        offered[wave.name] = (wave,)
-        bases = [[*others, wave], others]
+        offered[JointRipple.name] = ripples
+        bases = [*([*others, ripple] for ripple in ripples), others]
     if not offered:
         return None
     before = [effect for effect in bases[0] if effect.name.startswith(PREFIX)]

@@ -482,6 +482,21 @@ def _orders(q: Array, slides: bool) -> Array:
     return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
 
 
+def as_ripple(law: Discovered, fit: Fit) -> JointRipple | None:
+    """Ripple of a fit with one wave more: that of a law that is a harmonic of its joint's own position.
+
+    ``None`` for other laws, where ripple is no candidate, and for orders that are no ripple's.
+    """
+    is_wave = (law.kind, law.shape, law.follows, law.of) == ("joint", "harmonic", law.place, "")
+    if not is_wave or JointRipple.name not in fit.variants:
+        return None
+    robot, order = fit.campaign.robot, law.marks[0]
+    j = robot.joint_names.index(law.place)
+    grid = _orders(fit.campaign.q[:, j], robot.joint_types[j] == "prismatic")
+    within = len(grid) > 1 and grid[0] <= order <= 2.0 * grid[-1] - grid[-2]  # a peak at the end stands between two
+    return ripple_of(fit).having(law.place, order, law.tried) if within else None
+
+
 def _unit_vectors(target: Target, moves: Array) -> tuple[Array, Array]:
     """Return the unit vectors (N, m) along a joint's displacement (N, m), weighted, and its lengths (N,)."""
     own = moves * target.root
