@@ -85,24 +85,17 @@ def fit(
             continue
         point = Point.at(model, values, now)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        before = np.array(
-            [(one.residual[u] ** 2).sum() / n**2 for one, u, n in zip(point.rows, used, point.noise, strict=True)]
-        )
-        sets = _ahead(model, values, own, matrix, vector, sizes)
-        best, gained = values.copy(), 0.0
-        costs = _costs(model, sets, used, point.noise)
+        sets = np.vstack([values, _ahead(model, values, own, matrix, vector, sizes)])
+        costs = _costs(model, sets, used, point.noise, sizes)
+        best = values.copy()
         if shared:
-            k = int(np.argmin(costs.sum(axis=0)))
-            gained = float(before.sum() - costs[:, k].sum())
-            best = sets[k] if gained > 0.0 else values
+            best, least = sets[np.argmin(costs.sum(axis=0))], costs.sum(axis=0).min()
         else:
             for j, cost in enumerate(costs):
-                k = int(np.argmin(cost))
-                if cost[k] < before[j]:
-                    best[joint_of == j] = sets[k][joint_of == j]
-                    gained += before[j] - cost[k]
-        values = best
-        quiet = quiet + 1 if gained < settings.SETTLED * before.sum() else 0
+                best[joint_of == j] = sets[np.argmin(cost)][joint_of == j]
+            least = costs.min(axis=1).sum()
+        values, before = best, costs[:, 0].sum()
+        quiet = quiet + 1 if before - least < settings.SETTLED * before else 0
         if quiet > common.any():
             break
     return values
@@ -117,13 +110,18 @@ def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Ar
         whole = inside + np.diag(damping * np.diag(inside) + sizes[own] ** -2.0)
         root = np.linalg.cholesky(whole)
         pull = np.linalg.solve(root, vector[own] + damping * np.diag(inside) * values[own])
-        one[own] = lsq_linear(root.T, pull, bounds=(lower, np.inf)).x
+        one[own] = lsq_linear(root.T, pull, bounds=(lower, np.inf), method="bvls").x
     return found
 
 
-def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:
-    """(J, S) sums of squares of every joint over its noise, of the readings in use, for sets (S, P) of parameters."""
-    return np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
+def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array, sizes: Array) -> Array:
+    """(J, S) log posterior, times −2, of sets (S, P) of parameters: squares of readings in use over their noise.
+
+    And of each parameter over its prior size, with its joint; with the last where joints share it.
+    """
+    found = np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
+    np.add.at(found, [one.joint for one in model.parameters], ((sets / sizes) ** 2).T)
+    return found
 
 
 def ratios(point: Point) -> Array:

@@ -160,6 +160,23 @@ def _pruned(model: JointModel, choice: Choice, allowed: Mask, values: Array) -> 
         choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, kept, final=True)
         if (_kept(model, choice) == kept).all():
             break
+    return _needed(model, choice, allowed)
+
+
+def _needed(model: JointModel, choice: Choice, allowed: Mask) -> Choice:
+    """Likelihood-ratio test of the weakest effect at the exact fit without it, counting what motions are worth.
+
+    No odds exceed that ratio; but a linear problem misses what other effects can do together in its place.
+    """
+    worth = [len(one.residual) / choice.deflation[one.columns].mean() for one in choice.point.rows]
+    while choice.active.any():
+        less = choice.active.copy()
+        less[min(choice.best.blocks, key=choice.odds)] = False
+        values = fit(model, choice.point.values, less, choice.sizes)
+        if worth @ np.log(Point.at(model, values, less).noise / choice.point.noise) >= np.log(settings.ODDS):
+            break
+        allowed = allowed & (less | ~choice.active)
+        choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, less, final=True)
     return choice
 
 
