@@ -227,9 +227,12 @@ def _finding(model: JointModel, choice: Choice, name: str, share: Mapping[int, A
 def _needs(name: str) -> tuple[str, ...]:
     if name in TORQUE_TITLES or name == "masses":
         return ("tau",)
-    return {"kp": ("servo.kp",), "payload": ("masses in the URDF",), "contact": ("masses in the URDF",)}.get(
-        name, ("cmd",)
-    )
+    return {
+        "kp": ("servo.kp",),
+        "droop": ("a servo whose kp is not stated",),
+        "payload": ("masses in the URDF",),
+        "contact": ("masses in the URDF",),
+    }.get(name, ("cmd",))
 
 
 def _unexplained(model: JointModel, choice: Choice, noise: list[float]) -> Unexplained:
