@@ -523,9 +523,9 @@ def _why(expected: Expected) -> str:
 
 TABLE = ".csv"
 COMMENTS = (
-    "Planned, not yet measured: go direct from row to row in this order, and fill in measurements.csv: time in s, "
-    "temperature in °C as recorded, and the target's place.",
-    "plan.csv holds the temperatures that were planned; a column that will not be recorded is taken out.",
+    "Planned, not yet measured: go direct from row to row in this order, and fill in measurements.csv: the target's "
+    "place, and, where it has such a column, time in s and temperature in °C as recorded.",
+    "plan.csv stays as it was planned; a column that will not be recorded is taken out of measurements.csv.",
 )
 
 

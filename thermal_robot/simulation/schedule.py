@@ -13,6 +13,8 @@ ROWS = 60
 """Rows of a campaign of which nobody says how long it is: an hour's work, as :data:`SECONDS_A_ROW` has it."""
 SECONDS_A_ROW = 60.0
 """s: an arm moves, settles and is measured in less; slower, so that the arm warms while it is measured."""
+SECONDS_COLD = 15.0
+"""s: what an arm takes to move, settle and be measured, where it need not warm."""
 COLD, RISE = 20.0, 6.0
 """°C at the start, the temperature to which lengths refer; and K by which an arm at work warms in an hour or two."""
 WARMING, CONSTANT = 0.6, 0.2
@@ -31,13 +33,14 @@ Rows = NDArray[np.int64]
 def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str, Array]:
     """Time (N,), s, temperature, °C, and, with loads, payload, kg, of each row.
 
-    The arm warms by nearly ``rise``, K, then cools; payloads, none first, come round in blocks.
+    The arm warms by nearly ``rise``, K, then cools; without, rows follow each other faster. Payloads, none first, come
+    round in blocks.
     """
     share = np.arange(rows) / max(rows - 1, 1)
     warm = -np.expm1(-np.minimum(share, WARMING) / CONSTANT)
     left = np.exp(-np.maximum(share - WARMING, 0.0) / CONSTANT)
     found: dict[str, Array] = {
-        "time": SECONDS_A_ROW * np.arange(rows, dtype=np.float64),
+        "time": (SECONDS_A_ROW if rise else SECONDS_COLD) * np.arange(rows, dtype=np.float64),
         "temperature": np.asarray(COLD + rise * warm * left),
     }
     if loads:
