@@ -29,6 +29,14 @@ def demo(diagnosed_once):
 
 
 @pytest.fixture(scope="session")
+def zeros(diagnosed_once):
+    """Two zeros, which a file holds, and lost motion, which none does."""
+    worn = {"joint_offset": {"joint_2": 2e-3, "joint_4": -1e-3}, "backlash": {"joint_3": 4e-4}}
+    tool = (0.1, 0.0, 0.08)
+    return diagnosed_once(tr.simulate("builtin:rv_m2", worn, tool_frame="tool0", rows=80, noise=2e-5, tool=tool))
+
+
+@pytest.fixture(scope="session")
 def written():
     """Write the page or fragment of a kind, once for all tests."""
     return lru_cache(lambda write, kind: write(CASES[kind]()))

@@ -134,11 +134,12 @@ def declared(whole, part):
     return found | (declared(whole, part["items"]) if isinstance(part.get("items"), dict) else set())
 
 
-def test_a_real_diagnosis_is_valid_and_writes_all_that_is_declared(validator, drifted):
+def test_a_real_diagnosis_is_valid_and_writes_all_that_is_declared(validator, drifted, zeros):
     real = json.loads(json.dumps(drifted.to_dict(), allow_nan=False))
     validator.validate(real)
     assert real["next"]["samples"]
     by_hand = keys(json.loads(json.dumps(case("repeated").to_dict())))
     remainder = keys(json.loads(json.dumps(case("unexplained").to_dict())))
     law = keys(json.loads(json.dumps(case("law").to_dict())))
-    assert declared(schema(), schema()) - keys(real) - by_hand - remainder - law == set()
+    deployed = keys(json.loads(json.dumps(zeros.to_dict())))
+    assert declared(schema(), schema()) - keys(real) - by_hand - remainder - law - deployed == set()

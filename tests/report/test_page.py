@@ -252,7 +252,7 @@ def test_a_law_is_drawn_where_its_fit_is_at_hand(monkeypatch):
     monkeypatch.setattr(Diagnosis, "explain", lambda self, name: drawn.append(name) or Drawing(1.0, 1.0))
     monkeypatch.setattr(Diagnosis, "arm", lambda *_: None)
     monkeypatch.setattr(tables, "frames", lambda _: {"label": "", "heads": (), "rows": ()})
-    shown = html(case("law", fit=object(), model=SimpleNamespace(spread=None)))
+    shown = html(case("law", fit=object(), model=SimpleNamespace(spread=None, files=())))
     assert drawn == ["discovered.1"]
     assert shown.count('role="img"') == 6
     assert html(case("law")).count('role="img"') == 5

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thermal_robot.correction.holding import FORMATS
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.values import (
     Estimate,
     Finding,
     Gap,
     Misfit,
+    RobotFile,
     Rows,
     Sensitivity,
     Unexplained,
@@ -282,6 +284,23 @@ class Diagnosis(RenderedPage):
         return covariance(self._fitted(), self.model.spread.covariance)
 
     @property
+    def files(self) -> tuple[RobotFile, ...]:
+        """Expected gap with each kind of robot file alone: :class:`~thermal_robot.diagnosis.values.RobotFile`.
+
+        Empty where no file holds any of the model, or nothing can be held out.
+        """
+        of_kind: dict[str, tuple[str, ...]] = {}
+        for name, told in FORMATS.items():
+            of_kind[told.holds] = (*of_kind.get(told.holds, ()), name)
+        return tuple(
+            RobotFile(
+                of_kind[gap.holds], gap.holds, gap.min_sigma, bool(gap.alone), gap.rms_before, gap.rms_after,
+                gap.shrinkage, gap.shrinkage_ci95,
+            )
+            for gap in (self.model.files if self.fit is not None else ())
+        )  # fmt: skip
+
+    @property
     def narrowed(self) -> bool:
         """Whether the user restricted the candidate effects."""
         return bool(self.left_out)
@@ -364,6 +383,8 @@ class Diagnosis(RenderedPage):
             },
             "next": {"separates": self.separates, "advice": self.advice, "samples": self._samples()},
         }
+        if self.files:
+            plain["files"] = [asdict(told) for told in self.files]
         if self.performance is not None:
             plain["performance"] = self.performance.to_dict()
         return dict(jsonable(plain))

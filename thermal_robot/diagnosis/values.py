@@ -47,6 +47,36 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class RobotFile:
+    """Expected gap, m, with one kind of robot file alone: rows held out, base and tool registered anew.
+
+    Attributes
+    ----------
+    files
+        Files of this kind, as the options of ``thermal-robot correct`` name them: ``urdf``, ``offsets``, ….
+    holds
+        What they hold: ``placements``, ``zeros`` or ``ticks``.
+    min_sigma
+        Standard deviations from zero below which parameters are left out; ``None`` for a file with all.
+    alone
+        Whether it is fitted anew, to be used without the rest of the model.
+    rms_before, rms_after
+        With the nominal robot and with the file.
+    shrinkage, shrinkage_ci95
+        Share of the gap's mean square that the file removes, and the 95 % interval for other rows of the same kind.
+    """
+
+    files: tuple[str, ...]
+    holds: str
+    min_sigma: float | None
+    alone: bool
+    rms_before: float
+    rms_after: float
+    shrinkage: float
+    shrinkage_ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Finding:
     """Result for one effect: status, probability, estimates, places and held-out share.
 

@@ -115,6 +115,30 @@ def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
     return table, max(len(told) - _MOST_OUTLIERS, 0)
 
 
+_HOLDS = {"placements": "places of joints", "zeros": "zeros of joints", "ticks": "zeros in ticks of an encoder"}
+
+
+def files(diagnosis: Diagnosis) -> Table:
+    """Shrinkage that is expected of each kind of robot file alone, and what it leaves, by how the file is written."""
+    ways: dict[str, dict[str, str]] = {}
+    kinds: dict[str, str] = {}
+    sizes = units.together((told.rms_after for told in diagnosis.files), "m")
+    for told, left in zip(diagnosis.files, sizes, strict=True):
+        way = "fitted alone (--alone)" if told.alone else "all parameters (--min-sigma 0)"
+        if told.min_sigma is not None:
+            way = f"beyond {told.min_sigma:g} σ (as written)"
+        options = ", ".join(name.replace("_", "-") for name in told.files)
+        kinds[told.holds] = f"{_HOLDS[told.holds]}: {options}"
+        bounds = f"{units.percent(told.shrinkage)} ({units.interval(told.shrinkage_ci95)} %)"
+        ways.setdefault(way, {})[told.holds] = f"{bounds}, {left}"
+    order = sorted(ways, key=lambda way: "as written" not in way)
+    return {
+        "label": "Expected of a robot file alone: shrinkage on rows held out (95 %), and what is left",
+        "heads": ("file", *order),
+        "rows": [[kinds[holds], *(ways[way].get(holds, "") for way in order)] for holds in kinds],
+    }
+
+
 def frames(diagnosis: Diagnosis) -> Table:
     """Poses of base and target: mm, and roll, pitch and yaw in degrees."""
     rows = []
