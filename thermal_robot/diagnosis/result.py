@@ -129,6 +129,8 @@ class Diagnosis(RenderedPage):
     ['status', 'value', 'std', 'unit', 'identified']
     >>> found.covariance.shape, found.residuals.shape, found.frames.shape
     ((6, 6), (120, 9), (2, 6))
+    >>> found.files  # no robot file holds elongation or lost motion
+    ()
     """
 
     campaign: str
