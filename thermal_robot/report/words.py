@@ -526,7 +526,8 @@ def deployed(diagnosis: Diagnosis) -> str:
         return ""
     if not diagnosis.files:
         return (
-            "No file of a robot holds any of this that rows held out could judge: use the model to predict and correct."
+            "A file of the robot holds what is constant; nothing here is, as far as rows held out can tell. Use the "
+            "model to predict and correct."
         )
     before = length(diagnosis.files[0].rms_before)
     return (
