@@ -291,16 +291,10 @@ class Diagnosis(RenderedPage):
 
         Empty where no file holds any of the model, or nothing can be held out.
         """
-        of_kind: dict[str, tuple[str, ...]] = {}
-        for name, told in FORMATS.items():
-            of_kind[told.holds] = (*of_kind.get(told.holds, ()), name)
-        return tuple(
-            RobotFile(
-                of_kind[gap.holds], gap.holds, gap.min_sigma, bool(gap.alone), gap.rms_before, gap.rms_after,
-                gap.shrinkage, gap.shrinkage_ci95,
-            )
-            for gap in (self.model.files if self.fit is not None else ())
-        )  # fmt: skip
+        gaps = self.model.files if self.fit is not None else ()
+        names = [tuple(name for name, own in FORMATS.items() if own.holds == gap.holds) for gap in gaps]
+        own = zip(names, gaps, strict=True)
+        return tuple(RobotFile(**{**vars(gap), "files": some, "alone": bool(gap.alone)}) for some, gap in own)
 
     @property
     def narrowed(self) -> bool:

@@ -419,7 +419,7 @@ class _Pursuit:
                 if among.any():
                     best = int(np.argmax(np.where(among, gains, -np.inf)))
                     order = peak(statistics, q, grid[best : best + 1]) if np.isfinite(gains[best]) else 0.0
-                    if grid[0] <= order <= grid[-1]:  # what peaks beyond is no ripple
+                    if _holds(grid, order):  # what peaks beyond is no ripple
                         yield _Wave(joint, order, tried)
 
     def _functions(self, wave: _Wave) -> Array:
@@ -482,6 +482,11 @@ def _orders(q: Array, slides: bool) -> Array:
     return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
 
 
+def _holds(grid: Array, order: float) -> bool:
+    """Whether an order lies between the ends of a grid (K,)."""
+    return bool(len(grid)) and bool(grid[0] <= order <= grid[-1])
+
+
 def as_ripple(law: Discovered, fit: Fit) -> JointRipple | None:
     """Ripple of a fit with one wave more: that of a law that is a harmonic of its joint's own position.
 
@@ -493,8 +498,7 @@ def as_ripple(law: Discovered, fit: Fit) -> JointRipple | None:
     robot, order = fit.campaign.robot, law.marks[0]
     j = robot.joint_names.index(law.place)
     grid = _orders(fit.campaign.q[:, j], robot.joint_types[j] == "prismatic")
-    within = len(grid) > 1 and grid[0] <= order <= 2.0 * grid[-1] - grid[-2]  # a peak at the end stands between two
-    return ripple_of(fit).having(law.place, order, law.tried) if within else None
+    return ripple_of(fit).having(law.place, order, law.tried) if _holds(grid, order) else None
 
 
 def _unit_vectors(target: Target, moves: Array) -> tuple[Array, Array]:

@@ -87,14 +87,14 @@ def fit(
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
         sets = np.vstack([values, _ahead(model, values, own, matrix, vector, sizes)])
         costs = _costs(model, sets, used, point.noise, sizes)
-        best = values.copy()
+        before, least = costs[:, 0].sum(), costs.min(axis=1).sum()
         if shared:
-            best, least = sets[np.argmin(costs.sum(axis=0))], costs.sum(axis=0).min()
+            whole = costs.sum(axis=0)
+            values, least = sets[np.argmin(whole)], whole.min()
         else:
+            values = values.copy()
             for j, cost in enumerate(costs):
-                best[joint_of == j] = sets[np.argmin(cost)][joint_of == j]
-            least = costs.min(axis=1).sum()
-        values, before = best, costs[:, 0].sum()
+                values[joint_of == j] = sets[np.argmin(cost)][joint_of == j]
         quiet = quiet + 1 if before - least < settings.SETTLED * before else 0
         if quiet > common.any():
             break
