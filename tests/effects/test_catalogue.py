@@ -143,6 +143,7 @@ def installed(monkeypatch, name, thing):
         return thing
 
     point = SimpleNamespace(name=name, value=f"their.package:{name}", load=load)
+    monkeypatch.setattr(catalogue, "_installed", catalogue._installed.__wrapped__)
     monkeypatch.setattr(catalogue, "entry_points", lambda group: {"thermal_robot.effects": [point]}[group])
 
 

@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import TypeVar
 
 from thermal_robot.campaign.names import did_you_mean
@@ -84,7 +84,7 @@ def library() -> dict[str, Effect]:
     'lost motion in the joints'
     """
     found: dict[str, Effect] = {name: kind() for name, kind in _SYSTEMATIC.items()}
-    for point in entry_points(group="thermal_robot.effects"):
+    for point in _installed():
         try:
             loaded = point.load()
             effect: Effect = loaded() if isinstance(loaded, type) else loaded
@@ -95,6 +95,12 @@ def library() -> dict[str, Effect]:
             continue
         found[effect.name] = effect
     return found
+
+
+@cache
+def _installed() -> tuple[EntryPoint, ...]:
+    """Entry points of installed packages, read once: a twentieth of a small diagnosis each time."""
+    return tuple(entry_points(group="thermal_robot.effects"))
 
 
 def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
