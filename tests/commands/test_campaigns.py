@@ -57,6 +57,11 @@ def test_check_says_what_a_diagnosis_would(run, folder, tmp_path):
     said = " ".join(run("check", cell)[1].split())
     assert "not testable backlash: add approach.<joint> or order" in said
     assert "not testable drift: add time or order" in said
+    inches = table[kept].assign(**{axis: table[axis] / 25.4 for axis in "xyz"})
+    inches.to_csv(cell / "measurements.csv", index=False)
+    said = " ".join(run("check", cell)[1].split())
+    assert "no effect The table is at fault, not the robot: positions stand in inch, not in mm" in said
+    assert "not testable" not in said
     table[kept].head(4).to_csv(cell / "measurements.csv", index=False)
     assert "none is possible 4 different poses are too few" in " ".join(run("check", cell)[1].split())
 

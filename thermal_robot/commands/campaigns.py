@@ -40,18 +40,23 @@ def check(options: argparse.Namespace) -> None:
 def _foretold(campaign: Campaign) -> str:
     """Describe a campaign, with what a diagnosis would say of it before anything is fitted."""
     from thermal_robot.diagnosis.data_checks import counted
+    from thermal_robot.diagnosis.data_faults.misfit import mismatch
     from thermal_robot.inference.fit import require_enough
+    from thermal_robot.report.words import misfit_sentences
 
     if not campaign.measured or not campaign.samples:
         return describe(campaign)
     kept, notes = counted(campaign)
-    said = [("rows that count", f"{kept.samples} of {campaign.samples}")]
+    said, lacking = [("rows that count", f"{kept.samples} of {campaign.samples}")], dict[str, list[str]]()
     try:
         require_enough(kept)
+        misfit = mismatch(kept)
     except EstimationError as error:
         said.append(("none is possible", str(error)))
-    lacking: dict[str, list[str]] = {}
-    for effect, asked in _needs(kept):
+        misfit = None
+    if misfit:
+        said.append(("no effect", next(misfit_sentences(misfit, kept.reach))))
+    for effect, asked in () if misfit else _needs(kept):
         if asked:
             lacking.setdefault(asked, []).append(effect.name)
     said += [("not testable", f"{', '.join(names)}: add {asked}") for asked, names in lacking.items()]
