@@ -22,9 +22,9 @@ ROUNDS, STARTS, CLOSED = 40, 6, 1e-11
 """Newton steps at most; how often a row is begun nearer, by half the way; and the distance in m at which a loop is
 closed: rounding of a metre is a thousandth of it."""
 LEAST = 1e-3  # share of a Jacobian's largest singular value below which a joint is no way to close a loop
-SWAY, BETWEEN, LED = 1.0, 0.05, 2.0
-"""By how much, rad or m, postures at one socket differ at most; m from one socket of a stand to the next;
-rad at most to which a joint is led."""
+SWAY, BETWEEN, NEARBY, LED = 1.0, 0.05, 0.1, 2.0
+"""By how much, rad or m, postures at one socket differ at most; m from one socket of a stand to the next, and by how
+much, rad or m, each joint turns towards it; rad at most to which a joint is led."""
 
 
 def brought(
@@ -110,10 +110,14 @@ def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], d
     stand = (np.arange(plan.samples) // (SOCKETS * each)).clip(max=STANDS - 1)
     socket = np.arange(plan.samples) // each % SOCKETS
     q = np.clip(middles[stand] + rng.uniform(-SWAY, SWAY, plan.q.shape), low, high)
-    places = observe(Campaign("middles", robot, middles, target=plan.target, base_known=True)).position
-    apart = BETWEEN * np.arange(SOCKETS)[:, None] * np.array([0.0, 1.0, 0.0])
+    # the further sockets lie on the chord to where a posture nearby leads, so that the robot reaches them
+    nearby = np.clip(middles + rng.choice([-NEARBY, NEARBY], middles.shape), low, high)
+    ends = Campaign("middles", robot, np.concatenate([middles, nearby]), target=plan.target, base_known=True)
+    first, further = np.split(observe(ends).position, 2)
+    chord = BETWEEN * (further - first) / np.linalg.norm(further - first, axis=1, keepdims=True)
+    places = first[:, None] + np.arange(SOCKETS)[:, None] * chord[:, None]
     sockets = tuple(str(k) for k in range(SOCKETS))
-    artefacts = {f"stand place {k}": Stand(sockets, place + apart) for k, place in enumerate(places)}
+    artefacts = {f"stand place {k}": Stand(sockets, place) for k, place in enumerate(places)}
     labels = {"stand": np.char.add("place ", stand.astype(str)), "socket": socket.astype(str)}
     return labels, artefacts, q, middles[stand]
 
