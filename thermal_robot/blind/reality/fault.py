@@ -243,7 +243,7 @@ _HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
 def _wheels(setting: Setting, values: Array) -> Array:
-    """Eccentric encoder disc and oval wheel, in exact geometry.
+    """Encoder reading error of an eccentric disc plus an oval wheel, in exact geometry.
 
     The disc turns with the joint, or ``ratio`` times as fast with its motor.
     """
