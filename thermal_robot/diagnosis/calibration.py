@@ -236,7 +236,7 @@ _libraries = cache(ThreadpoolController)
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Effects that were asked for, without duplicates."""
+    """Look up the effects to calibrate; refuse random ones and duplicates."""
     where, what = "calibrate(), effects", "names of effects, or effects of your own"
     require(where, effects, (str, Effect, list, tuple), what)
     given = (effects,) if isinstance(effects, (str, Effect)) else tuple(effects)

@@ -85,7 +85,7 @@ def noise_estimate(measured: Array, noise: Noise, measures: int) -> tuple[Array,
 
 
 def first_whitening(linear: Linear, noise: Noise) -> Whitening:
-    """Initial whitening: equal weights, and the stated noise or the gap's robust one, with no prior of it."""
+    """Initialise the whitening: equal weights, and the stated noise or the gap's robust one, without its prior."""
     measured = robust_noise(linear.gap, relative=noise.relative, seen=noise.seen)
     sigma, _ = noise_estimate(measured, noise, linear.measures)
     return Whitening(np.ones(len(linear.gap)), sigma, 0.0, relative=noise.relative, seen=noise.seen)

@@ -391,7 +391,7 @@ def another_motion(fitted: Fit) -> Misfit | None:
 
 
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
-    """Conclusion if its exact model is the one that was compared; else the frames alone, with the reason."""
+    """Conclusion of a converged Gauss-Newton fit; else that of the frames alone, with the reason."""
     note = unconverged(last.fit)
     return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
@@ -406,7 +406,7 @@ def frames_alone(
 
 
 def unconverged(fit: Fit) -> str:
-    """Sentence if the exact model of a fit is not the one that was compared and held out; else empty.
+    """Sentence if Gauss-Newton ended away from the linearised model that was compared; else empty.
 
     Combinations are compared, and rows held out, with the model linearised at the exact one. Where Gauss-Newton ends
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
