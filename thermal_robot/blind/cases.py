@@ -45,7 +45,7 @@ Together = Literal["same", "changed", "steady", "series", "fleet"]
 """Kinds of several campaigns."""
 Kind = Literal[Known, "mixed", "removed", "hidden", "unlisted", "both", "real", Together]
 How = Literal["", "changes", "begins", "jumps", "grows", "all", "hall"]
-"""What changes between campaigns of one robot, and how; which robots of a fleet share a fault."""
+"""Kinds of change between campaigns of one robot; sharing of a fault among the robots of a fleet."""
 
 ASKS = {"same": "comparison", "changed": "comparison", "steady": "wear", "series": "wear", "fleet": "fleet"}
 """Kinds of several campaigns, and what is asked of them: the request says no more."""

@@ -61,7 +61,7 @@ def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
 
 
 def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Quantities:
-    """The condition, or its product with the driver of the effect."""
+    """Right quantities of a modulated effect: the condition, or its product with the effect's driver."""
 
     def quantities(setting: Setting, places: Sequence[Place]) -> list[str]:
         known = conditions(setting, places)
