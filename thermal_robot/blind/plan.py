@@ -35,7 +35,7 @@ MIXED: Asked = {"ratio": (0.3, 10.0), "samples": (40, 140)}
 EVERYTHING = ("moving", "temperature", "sensor:links", "sessions", "humidity", "motor_temperature", "speed")
 """Columns recorded in every mixture: one that is there for its cause alone would give it away."""
 REPEATED = 1.0 / 3.0
-"""Share of mixtures whose poses are visited several times, without which nobody tells scatter from steps."""
+"""Share of mixtures whose poses are visited several times, without which scatter and steps are confounded."""
 
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """Effects that a larger effect contains exactly (formats.md)."""
@@ -240,7 +240,7 @@ _SIZES = {
     "series": (2, 96),
     "fleet": (1, 30),
 }
-"""How many cases of each kind a short trial has, and a full one."""
+"""Number of cases of each kind in a short trial, and in a full one."""
 SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0, 1))
 
 

@@ -232,7 +232,7 @@ def calibrate(
 
 
 _libraries = cache(ThreadpoolController)
-"""What holds the threads of the libraries; to look for them takes as long as a tenth of a calibration."""
+"""Cached controller of the libraries' threads; to find them takes a tenth of the time of a calibration."""
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:

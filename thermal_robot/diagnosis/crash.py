@@ -211,7 +211,7 @@ _KINDS = {
     frozenset({False}): "link",
     frozenset({True, False}): "both",
 }
-"""By whether those of a set are zeros."""
+"""Verdicts by whether the members of a set are zeros."""
 
 
 def _zero(item: Block) -> bool:

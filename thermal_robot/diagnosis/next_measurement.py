@@ -90,7 +90,7 @@ def _learnt(root: Array, row: Array) -> Array:
 
 @dataclass(frozen=True)
 class NextSample:
-    """One sample to measure.
+    """Proposed sample of the optimal design.
 
     ``position``: joint positions by name, rad or m. ``conditions`` that the explanations depend on, by column, SI;
     ``time`` is a proposal, any later one will do. ``separates``: the explanations that it tells apart best, each a

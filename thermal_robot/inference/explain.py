@@ -469,7 +469,7 @@ class Explanation:
         return self.searched.without(frozenset(out)).explanation(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
-        """Block of the best combination that belongs to this effect, in whatever setting."""
+        """Block of the best combination that belongs to an effect, in any setting."""
         return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
 
     def held(self, block: int) -> Array:

@@ -48,7 +48,7 @@ from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
 Runs = NDArray[np.int64]
-"""(C, 2) first row of each run in the order of measurement, and the first behind it."""
+"""Runs of rows (C, 2) in the order of measurement: the first row of each, and the first behind it."""
 
 
 @dataclass(frozen=True, eq=False)

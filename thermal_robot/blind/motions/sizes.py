@@ -1,4 +1,4 @@
-"""Numbers of the trial of motions that somebody chose, each with its unit and its reason."""
+"""Chosen numbers of the trial of motions, each with its unit and reason."""
 
 from __future__ import annotations
 

@@ -193,7 +193,7 @@ def _background(case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, r
 
 
 _SENSORS = ("robot", "links")
-"""What may be recorded of the links: where only the air is, their lag would be another wall's each day."""
+"""Temperature sensors that may be recorded: where only the air is, their lag would be another wall's each day."""
 
 
 def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:

@@ -379,7 +379,7 @@ ELUSIVE = (
         fixed=((6, (1.0,)), (7, (0.0,))),
     ),
 )
-"""Free periods, memory, new zeros, and what nobody records."""
+"""Faults of free periods, memory, new zeros, and unrecorded quantities."""
 
 UNLISTED: dict[str, Fault] = {fault.name: fault for fault in (*_ALONE, *INTERPLAY, *ELUSIVE)}
 """Eleven kinds of one quantity at one place, those that interplay and those that elude, by name."""

@@ -178,12 +178,12 @@ def stacked(several: Sequence[Readings]) -> Readings:
 
 
 def _norm2(vectors: Array) -> Array:
-    """(...) squared lengths of vectors (..., 3)."""
+    """Squared lengths (...) of vectors (..., 3)."""
     return np.asarray((vectors * vectors).sum(axis=-1))
 
 
 Repair = Callable[[Readings, Rows], Readings]
-"""Readings, and the (N,) rows that the fault struck; returns the readings mended in these rows."""
+"""Function from readings and the affected rows (N,) to the readings repaired in these rows."""
 Numbered = Callable[[float], tuple[str, Repair]]
 """Place and repair of a fault by its number."""
 
@@ -200,7 +200,7 @@ class Proposal:
 
 
 Fault = tuple[Proposal, ...]
-"""What is wrong with a table: nothing, one fault, or two at once, mended one after the other."""
+"""Fault hypothesis of a table: none, one fault, or two at once, repaired one after the other."""
 
 
 class Family(NamedTuple):

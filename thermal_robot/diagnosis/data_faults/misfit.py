@@ -164,7 +164,7 @@ class Recalibrated:
         return float(wide * np.log1p(away / wide).sum() + state @ self.prior @ state)
 
     def _columns(self) -> Array:
-        """(N, m, B (6 + m) + 6 J) Jacobian of the prediction by base and target of each part, and by each joint."""
+        """Jacobian (N, m, B (6 + m) + 6 J) of the prediction by base and target of each part, and by each joint."""
         frames, point, gap = self._seen
         rows, measures = gap.shape
         columns = np.zeros((rows, measures, len(self.bases), 6 + measures))
