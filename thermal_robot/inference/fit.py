@@ -147,7 +147,7 @@ def _fitted(
 
 
 def require_enough(campaign: Campaign) -> None:
-    """Refuse a campaign with too few rows for the frames, the effects and a held-out fold."""
+    """Refuse a campaign with too few different poses for the frames, the effects and a held-out fold."""
     still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
     poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
     unknown = len(unknown_frames(campaign))

@@ -308,7 +308,7 @@ def _evaluate(
 
 
 def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Integrate validated cases one by one."""
+    """Integrate validated cases, together or, with several generators, by groups of equal covariance."""
     if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
         return _cases(law, sizes, shape, outside)
     # sums over several generators are as fine as the normal part demands: one covariance after the other

@@ -86,7 +86,7 @@ class UniformSpread:
         *,
         over: Literal["links", "area"] = "links",
     ) -> UniformSpread:
-        """Displacements ``generators @ delta`` with ``lower <= delta <= upper`` (Eqs 14-15).
+        """Distribution of displacements ``generators @ delta``, ``lower <= delta <= upper`` (Eqs 14-15).
 
         Parameters
         ----------
@@ -456,7 +456,7 @@ def _facet_normals(edges: Array) -> Array:
 
 
 def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
-    """Faces by their normals: each face is the polygon of the generators in it, at one end of all the others."""
+    """Polyhedron by its facet normals: each face is the polygon of its generators, at one end of all the others."""
     edges = columns * (high - low)
     basis, rank = _directions(edges)
     if rank < 3:  # no volume: its polygon, segment or point, in its own plane

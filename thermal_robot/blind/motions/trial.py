@@ -84,7 +84,7 @@ class Answer:
 
 
 def ask(case: Case) -> Answer:
-    """Draw the world of a case, diagnose its log and return what was answered."""
+    """Run one case: draw its world, diagnose its log and return the answer."""
     rng = np.random.default_rng([case.seed, EVERYTHING.index(case.fault), case.joints])
     world = draw_world(rng, case.joints, case.motions)
     try:
@@ -122,7 +122,7 @@ def plan(
 
 
 def run(cases: Sequence[Case], workers: int = 1, progress: Callable[[Answer], None] = lambda _: None) -> list[Answer]:
-    """Ask every case, several at a time; ``progress`` is called with each answer in the order of the cases."""
+    """Run all cases in parallel processes; ``progress`` is called with each answer in the order of the cases."""
     found = []
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for answer in pool.map(ask, cases):

@@ -405,7 +405,7 @@ def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
 
 
 def _tip(setting: Setting, values: Array) -> Array:
-    """Base on springs, tipped by the moment of all weights about a point on the vertical through its origin."""
+    """Twist (N, 6) of a base on springs by the moment of all weights, about a point on its origin's vertical."""
     springs, depth = np.abs(values[0, :2]), values[0, 2]
     turn = np.column_stack([setting.overturning[:, :2] * springs, np.zeros(setting.samples)])
     return np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn])
