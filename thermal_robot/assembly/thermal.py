@@ -1,7 +1,7 @@
 """Thermal elongation of links and displacement of the tool, and the inverse (Kluz et al. 2018, Eqs 5-13).
 
-What a temperature adds to the lengths of a robot (Eq 5); whether a mean has moved to where the model says (Eq 13);
-links that lag behind the hall; at which poses to measure, and the elongations from displacements there (Eq 12).
+Elongations of a robot by temperature (Eq 5); z test of the displaced mean (Eq 13); first-order thermal lag of links;
+optimal design of measuring poses, and least squares for the elongations from displacements there (Eq 12).
 """
 
 from __future__ import annotations

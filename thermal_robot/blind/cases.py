@@ -45,10 +45,10 @@ Together = Literal["same", "changed", "steady", "series", "fleet"]
 """Kinds of several campaigns."""
 Kind = Literal[Known, "mixed", "removed", "hidden", "unlisted", "both", "real", Together]
 How = Literal["", "changes", "begins", "jumps", "grows", "all", "hall"]
-"""What changes between campaigns of one robot, and how; which robots of a fleet share a fault."""
+"""Kinds of change between campaigns of one robot; sharing of a fault among the robots of a fleet."""
 
 ASKS = {"same": "comparison", "changed": "comparison", "steady": "wear", "series": "wear", "fleet": "fleet"}
-"""Kinds of several campaigns, and what is asked of them: the request says no more."""
+"""Type of answer requested for each kind of several campaigns: the request says no more."""
 SEVERAL = tuple(ASKS)
 LISTED = "campaigns.csv"
 """The list of several campaigns in a case's folder: ``campaign``, and ``date`` or ``robot`` and ``hall``."""
@@ -65,7 +65,7 @@ class RobotChoice:
 
 @dataclass(frozen=True)
 class Several:
-    """What a case of several campaigns asks in addition.
+    """Parameters of a case of several campaigns.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Several:
 
 @dataclass(frozen=True)
 class Case:
-    """One robot with its hidden fault.
+    """Test case: one robot with its hidden fault.
 
     Attributes
     ----------

@@ -27,10 +27,10 @@ DOES = "run the blind trial: effects are withheld, then named"
 EXAMPLE = " --seed 7 --report trial.html"
 KINDS: tuple[str, ...] = get_args(Kind)
 ALWAYS = ("single", "null")
-"""Kinds that can be asked with any one effect."""
+"""Kinds of cases that any one effect suffices for."""
 DATA = "THERMAL_ROBOT_DATA"
 OWN_CASES = 6
-"""How often each fault of the user's own is asked for."""
+"""Number of cases with each fault of the user's own."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""Process under examination: it is given a folder with a campaign, without the answers.
+"""Subprocess that diagnoses the campaigns of a trial without access to the answers.
 
 ``python -m thermal_robot.blind.examinee DIRECTORY`` reads one request a line, as JSON, and writes one reply a line::
 
@@ -46,7 +46,7 @@ from thermal_robot.observations import Observations, observe
 Plain = dict[str, Any]
 CAMPAIGN, FRESH, MODEL = "campaign.toml", "fresh.csv", "model.json"
 MOST = 6
-"""Effects of which every subset is fitted: 64 fits."""
+"""Largest number of effects of which every subset is fitted: 64 fits."""
 _ROUNDS = 3  # after which noise and fit agree to a per cent
 
 
@@ -219,7 +219,7 @@ def comparison(folder: Path, only: Sequence[str]) -> Plain:
 
 
 def followed(folder: Path, only: Sequence[str]) -> Plain:
-    """Change over time of the robot of dated campaigns: ``thermal-robot/wear/1``."""
+    """Diagnose the change over time of a robot from dated campaigns: ``thermal-robot/wear/1``."""
     listed = campaigns(folder / LISTED)
     date = listed.names.index("date")
     dated = [(labels[date], listed.folder(name)) for name, labels in listed.campaigns]
@@ -244,7 +244,7 @@ def fleet(folder: Path, only: Sequence[str]) -> Plain:
 
 
 ANSWERS = {"comparison": comparison, "wear": followed, "fleet": fleet}
-"""By what is asked (:data:`thermal_robot.blind.cases.ASKS`)."""
+"""Functions that answer requests for several campaigns, by :data:`thermal_robot.blind.cases.ASKS`."""
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ SIGMAS = 1.959963984540054
 """Half the width of a normal law's central 95 %, in standard deviations."""
 LAW = "discovered."
 ABSENT, PRESENT = 0.1, 0.5
-"""× noise: what leaves less is not there, what leaves more is."""
+"""Residual rms over the noise: an effect that leaves less counts as absent, one that leaves more as present."""
 BLAME = 0.9
 BAD = frozenset({"false_alarm"})
 """Questions to which yes is wrong."""
@@ -129,9 +129,9 @@ def unexplained(record: Record) -> bool:
 
 
 def corrects(record: Record) -> bool:
-    """Whether the corrected model holds more than the frames: a named effect with a shrinkage.
+    """Whether the corrected model holds an effect beside the frames: one named, with a shrinkage.
 
-    Effects that scatter are named, too, but no correction takes them away.
+    Random effects are named, too, but no correction removes them.
     """
     named = set(said(record)["verdict"]["effects"])
     return any(e["name"] in named and e.get("shrinkage") for e in said(record)["effects"])

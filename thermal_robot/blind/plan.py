@@ -19,7 +19,7 @@ Asked = dict[str, Any]
 """Fields of a :class:`~thermal_robot.blind.cases.Case`."""
 
 LARGE, LAGGING = (10.0, 60.0), (10.0, 40.0)
-"""× noise: effects as large as on real robots, and those with a lag or a time constant."""
+"""Sizes over the noise: of effects as large as on real robots, and of those with a lag or a time constant."""
 LAGS: tuple[Asked, ...] = (
     {"effects": ("tracking_lag",)},
     {"effects": ("drift",)},
@@ -30,27 +30,27 @@ HARD: Asked = {"ratio": (0.7, 1.5), "samples": (30, 60), "background": 0.15, "he
 MANY = (3, 5)
 """Fewest and most effects of many together."""
 CHANCE, STRANGE = 0.3, 0.3
-"""Of a mixture: the largest chance of an effect, as each draws its own in each case, and that of an unlisted cause."""
+"""Probabilities in a mixture: the largest of an effect, as each draws its own, and that of an unlisted cause."""
 MIXED: Asked = {"ratio": (0.3, 10.0), "samples": (40, 140)}
 EVERYTHING = ("moving", "temperature", "sensor:links", "sessions", "humidity", "motor_temperature", "speed")
-"""Recorded in every mixture: a column that is there for its cause alone would give it away."""
+"""Columns recorded in every mixture: one that is there for its cause alone would give it away."""
 REPEATED = 1.0 / 3.0
-"""Share of mixtures whose poses are visited several times, without which nobody tells scatter from steps."""
+"""Share of mixtures whose poses are visited several times, without which scatter and steps are confounded."""
 
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
-"""What a larger effect can do exactly as well (formats.md)."""
+"""Effects that a larger effect contains exactly (formats.md)."""
 IMITATES = {"transmission_error": {"joint_gain"}, "link_compliance": {"base_compliance"}}
-"""What a larger effect can do nearly as well: over less than a turn, two harmonics are a straight line; the upright
+"""Effects that a larger effect nearly imitates: over less than a turn, two harmonics are a straight line; the upright
 link that stands on the base bends under the moment that tips it."""
 RANDOM = ("encoder_resolution", "excess_repeatability")
-"""Effects that scatter: they leave nothing for a mean to explain, and are asked alone."""
+"""Random effects: they leave nothing for a mean to explain, and are asked alone."""
 CONDITION = {
     "thermal_elongation": ("temperature",),
     "drift": ("time",),
     "backlash": ("approach",),
     "tracking_lag": ("velocity", "acceleration", "approach"),
 }
-"""Columns that a cause cannot be seen without."""
+"""Columns without which an effect is not observable."""
 _FRAMES = ("base_frame", "tool_frame")
 
 
@@ -60,7 +60,7 @@ which joint. Of a bent link's six numbers some are a joint's zero as well."""
 BESIDE = (*LOCAL, "link_compliance", "thermal_elongation")
 """Effects that a robot may have on all days: its own, and none that begins anew with a campaign."""
 SIZES = {"changes": (4.0, 4.0), "jumps": (4.0, 4.0), "begins": (16.0, 64.0), "grows": (8.0, 16.0)}
-"""Of a change, in deviations. Four are what the program is to find. What begins has to be named in campaigns that have
+"""Size of a change, in deviations. Four are what the program is to find. What begins has to be named in campaigns with
 it: with 90 rows 16 to 64 deviations leave one to four times the noise, as the effects of other kinds do. What grows by
 8 to 16 over all has passed four in the middle."""
 PAIR, DAYS, FLEET = (2, 2), (12, 12), (10, 14)
@@ -240,7 +240,7 @@ _SIZES = {
     "series": (2, 96),
     "fleet": (1, 30),
 }
-"""How many cases of each kind a short trial has, and a full one."""
+"""Number of cases of each kind in a short trial, and in a full one."""
 SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0, 1))
 
 

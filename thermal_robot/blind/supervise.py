@@ -18,7 +18,7 @@ from typing import Any
 START_TIMEOUT = 180.0
 """Seconds for imports and the warm-up, on a busy machine."""
 NO_ANSWER: dict[str, Any] = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
-"""The reply of one who was not heard."""
+"""Reply in place of an examinee that gave none."""
 _KEPT = ("PATH", "HOME", "LD_LIBRARY_PATH")  # a Pinocchio that came with ROS or conda is found by the last
 
 

@@ -61,7 +61,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
 
 
 def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple[Fit, Shrinkage, tuple[Discovery, ...]]:
-    """Renumber the laws of a fit: by held-out share, the largest first; laws outside the fit last."""
+    """Renumber the discovered laws by held-out share, the largest first; laws outside the fit last."""
     held = {effect.name for effect, _ in fit.effects}
     names = [name for name in dict.fromkeys(fit.families) if name.startswith(PREFIX)]
     names.sort(key=lambda name: (name not in held, -shrinkage.shares.get(name, (0.0,))[0]))
@@ -179,7 +179,7 @@ def answer(
 
 
 def _last_words(fit: Fit, last: Conclusion, sensitivity: Sensitivity) -> tuple[str, ...]:
-    """Return what the readings cannot see, and the cautions of the final fit."""
+    """Return the warnings of the final fit, its unobservable parameters first."""
     return (*unseen(fit), *cautions(fit, last.refused, sensitivity))
 
 

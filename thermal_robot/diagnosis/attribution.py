@@ -93,7 +93,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
 
 
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:
-    """(N, m) displacement by place; a parameter common to all links is divided by its response at each."""
+    """Displacement (N, m) by place; a parameter common to all links is divided by its response at each."""
     found: dict[tuple[str, str], Array] = {}
     whole = block.columns
     for k, parameter in enumerate(block.parameters):

@@ -232,11 +232,11 @@ def calibrate(
 
 
 _libraries = cache(ThreadpoolController)
-"""What holds the threads of the libraries; to look for them takes as long as a tenth of a calibration."""
+"""Cached controller of the libraries' threads; to find them takes a tenth of the time of a calibration."""
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Effects that were asked for, without duplicates."""
+    """Look up the effects to calibrate; refuse random ones and duplicates."""
     where, what = "calibrate(), effects", "names of effects, or effects of your own"
     require(where, effects, (str, Effect, list, tuple), what)
     given = (effects,) if isinstance(effects, (str, Effect)) else tuple(effects)

@@ -1,11 +1,10 @@
-"""After a crash: which joint's zero moved, or which link is not where the URDF has it.
+"""Bayesian model comparison after a crash: which joint's zero moved, or which link is not where the URDF has it.
 
-Of one campaign after the crash. Ordinary errors of all zeros and placements, up to a few times those of an uncalibrated
-arm, stand in the model as the background; beside them a single joint may have another zero, or a single link another
-place, or two of these. Every such set is weighed by its
-evidence (Gaussian, prior sizes and noise at their most probable values, as everywhere: :mod:`.inference.evidence`),
-with the odds that one of all n moved; probabilities are normalised over the sets. The zero is that of the most probable
-set, beside its background.
+One campaign after the crash is enough. Ordinary errors of all zeros and placements, up to a few times those of an
+uncalibrated arm, stand in the model as the background; beside them a single joint may have another zero, or a single
+link another place, or two of these. Every such set is compared by its evidence (Gaussian, prior sizes and noise at
+their most probable values, as everywhere: :mod:`.inference.evidence`), with the odds that one of all n moved;
+probabilities are normalised over the sets. The zero is that of the most probable set, beside its background.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ class Moved:
 
 @dataclass(frozen=True)
 class Crash:
-    """What a campaign after a crash says.
+    """Result of :func:`after_crash`: posterior probabilities that each joint's zero or link moved.
 
     Attributes
     ----------
@@ -108,11 +107,11 @@ class Crash:
 
     @property
     def named(self) -> tuple[Moved, ...]:
-        """Those that are more probable than not."""
+        """Joints and links that more probably moved than not."""
         return tuple(one for one in self.moved if one.probability > settings.LIKELY)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI, ready for JSON."""
+        """Return the result as plain values, SI, ready for JSON."""
         moved = [vars(one) for one in self.moved]
         plain = {name: value for name, value in vars(self).items() if name not in ("moved", "misfit")}
         return dict(jsonable({**plain, "summary": registered_renderer().crash_headline(self), "moved": moved}))
@@ -168,7 +167,7 @@ def after_crash(campaign: Campaign | str | Path, *, progress: Callable[[str], No
 
 
 def _weighed(fit: Fit) -> Crash:
-    """Weigh all sets of at most two joints and links beside the ordinary errors of a fit."""
+    """Compare by their evidence all sets of at most two moved joints and links, beside ordinary errors."""
     e, seen = fit.explanation, fit.corrected
     kinds = (JointOffset(), Geometric())
     ordinary = [
@@ -212,7 +211,7 @@ _KINDS = {
     frozenset({False}): "link",
     frozenset({True, False}): "both",
 }
-"""By whether those of a set are zeros."""
+"""Verdicts by whether the members of a set are zeros."""
 
 
 def _zero(item: Block) -> bool:

@@ -86,13 +86,13 @@ class Model:
 
     @cached_property
     def spans(self) -> tuple[NDArray[np.int64], ...]:
-        """Per block: the numbers of its columns."""
+        """Column numbers of each block."""
         ends = self.flat + np.cumsum([0, *(len(b.sizes) for b in self.linear.blocks)])
         return tuple(np.arange(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def prior_precision(self) -> Array:
-        """(K − flat,) prior precision of each parameter, SI."""
+        """Prior precision (K − flat,) of each parameter, SI."""
         own = [(b.sizes * scale) ** -2.0 for b, scale in zip(self.linear.blocks, self.scales, strict=True)]
         return np.concatenate([*own, np.zeros(0)])
 
@@ -128,18 +128,18 @@ class Model:
 
     @cached_property
     def _touched(self) -> Rows:
-        """(N, flat) which rows have to do with which of the frames' columns."""
+        """Mask (N, flat) of the rows in which each column of the frames is not zero."""
         return np.asarray((self.linear.frames != 0.0).any(axis=1))
 
     def own_artefacts(self, test: Rows) -> NDArray[np.int64]:
-        """Return the numbers of the frames' columns that only rows held out have to do with: their own artefacts."""
+        """Return the indices of the frames' columns that are zero in all but the held-out rows: own artefacts."""
         others = self._touched[~test & self._used].any(axis=0)
         return np.flatnonzero(self._touched[test].any(axis=0) & ~others)
 
     def test_columns(self, test: Rows) -> Array:
-        """(n, m, K + 1) columns and gap of rows held out, less what artefacts of theirs alone take up of each.
+        """Columns and gap (n, m, K + 1) of held-out rows, with their own artefacts projected out.
 
-        Where a stand stands is no property of the robot: of a stand held out, its rows are judged by how they spread.
+        The place of an instrument's stand is no property of the robot: a held-out stand is judged by its scatter.
         """
         key = test.tobytes()
         if key not in self._test_columns:
@@ -180,7 +180,7 @@ class Model:
         return self.products(np.ones(len(self.block), dtype=bool))
 
     def determines(self, rows: Rows) -> bool:
-        """Tell whether some rows determine as much of the frames as all rows do, but what the others alone share."""
+        """Tell whether the frames have full rank in training rows, but for the held-out rows' own artefacts."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
         return bool(some.shape[1] + len(self.own_artefacts(~rows)) >= every.shape[1])
 
@@ -252,7 +252,7 @@ class CrossValidation:
         return total
 
     def residuals(self, chosen: Sequence[int]) -> Array:
-        """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
+        """Held-out residuals (H, m) of a model with some of the blocks, fold after fold, m and rad."""
         picked, stack = self.model.columns(chosen), self.model.test_columns
         fits = self.model.fits([~test for test in self.tests], chosen)
         return np.concatenate([stack(test)[:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)])
@@ -393,7 +393,7 @@ def _outside_model(explanation: Explanation, families: Sequence[str]) -> dict[in
 
 
 def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[int]], Array]) -> Array:
-    """(1 + B,) Shapley value of an effect: its mean gain over all orders in which effects join."""
+    """Shapley value (1 + B,) of an effect: its mean gain over all orders in which effects join."""
     others, value = sorted(players - {player}), np.zeros_like(squares(players))
     for size in range(len(players)):
         weight = 1.0 / (len(players) * comb(len(others), size))
@@ -485,7 +485,7 @@ def _ends(values: Array) -> list[Rows]:
 
 
 def _temperature(campaign: Campaign) -> Array | None:
-    """(N,) temperature of the robot, or the mean of its links, °C; ``None`` if not recorded."""
+    """Temperature (N,) of the robot, or the mean of its links, °C; ``None`` if not recorded."""
     recorded = campaign.covariates
     names = ["temperature"] if "temperature" in recorded else [c for c in recorded if c.startswith("temperature.")]
     return np.mean([recorded[c] for c in names], axis=0) if names else None

@@ -55,7 +55,7 @@ SAID = {
     GRAVITY: "gravity points the other way than stated, as of an arm that hangs: it is read with the other sign; write "
     "it under [robot]",
 }
-"""By quantity: what is told first where it is turned round."""
+"""Opening words of the note on a reversed quantity, by quantity."""
 STRAIGHT = (
     "directions of approach that follow from the order of the rows have the wrong sign: where the robot does not go "
     'straight from the pose before to the next, write moves = "unknown" under [robot]'
@@ -133,7 +133,7 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def counted(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out what no diagnosis uses (:func:`usable`, :func:`not_executed`), with notes.
+    """Leave out rows and columns that no diagnosis uses (:func:`usable`, :func:`not_executed`), with notes.
 
     Examples
     --------
@@ -203,7 +203,7 @@ def _against_gravity(campaign: Campaign) -> Iterator[str]:
 
 
 def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str | None:
-    """Untried quantity with the strongest evidence of the opposite sign."""
+    """Untried quantity whose reversal has the largest evidence; ``None`` where none gains clearly."""
     linear, sides = _linear(campaign, own)
     if not any((names != "").any() for names in sides):
         return None
@@ -259,7 +259,7 @@ def _sign_scores(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[s
 
 
 def _agree(z: Array) -> bool:
-    """Whether all significant z scores are negative, or, where none is, their sum is significantly negative."""
+    """Sign test: whether all significant z scores, or if none is significant their sum, are negative."""
     least = diagnosis_settings.WRONG_SIDE
     sure = z[np.abs(z) > least]
     return bool((sure < 0.0).all() if len(sure) else z.sum() < -least * np.sqrt(len(z)))

@@ -1,4 +1,4 @@
-"""The diagnosis of a campaign."""
+"""Steps of a diagnosis: data checks, model selection, pruning, scatter, and the answer."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def diagnose(
 
 
 def _asked_of(campaign: Campaign, effects: Sequence[Effect]) -> Sequence[Effect]:
-    """Return the effects that may be at work: where the rows are a model's word, those that a model holds."""
+    """Return the candidate effects; where rows are predictions of another model, only those a model can hold."""
     return [effect for effect in effects if effect.in_model] if of_model(campaign) else effects
 
 

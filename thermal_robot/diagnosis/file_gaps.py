@@ -76,7 +76,7 @@ def _alone(fit: Fit, model: CorrectedModel, whole: Model, validation: CrossValid
 
 
 def _fits(fit: Fit, whole: Model, held: Sequence[tuple[Effect, Array]], rows: Sequence[Rows]) -> Array:
-    """Parameters (S, P) of some effects of about given sizes, fitted to each subset of the rows beside the frames."""
+    """Ridge estimates (S, P) of some effects of about given sizes and the frames, on each subset of the rows."""
     linear = replace(fit.before, blocks=tuple(block(fit.nominal, effect).held for effect, _ in held))
     part = whole.partial(linear, [values for _, values in held])
     return np.asarray(-part.fits(rows, range(len(held)))[:, part.flat : -1])
@@ -87,7 +87,7 @@ class _Moved(Model):
 
     @classmethod
     def of(cls, fit: Fit, whole: Model) -> _Moved:  # type: ignore[override]
-        """Columns of a fit, weighted as in its explanation without what is smooth."""
+        """Columns of a fit, weighted as in its explanation without a smooth discrepancy."""
         seen, measures = fit.nominal, fit.before.measures
         segments = seen.segment_sensitivity[:, :measures]
         columns = np.concatenate([seen.joint_sensitivity[:, :measures], segments.reshape(*segments.shape[:2], -1)], 2)

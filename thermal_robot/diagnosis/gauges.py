@@ -1,4 +1,4 @@
-"""Gauge freedom: what no reading of a campaign can see, found by the rank of the columns."""
+"""Gauge freedoms: directions of the model that no reading observes, found by the rank of the columns."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from thermal_robot.inference.fit import Fit
 
 
 def unseen(fit: Fit) -> Iterator[str]:
-    """Yield in sentences which rigid motion of the root, which size and which zeros the readings do not see.
+    """Yield a sentence for each gauge freedom: unobservable motion of the root, scale, and joint zeros.
 
-    A direction is not seen where its column lies, to rounding, in the span of the frames and of what rows share.
-    Where an instrument measured in a frame of its own its frames are told elsewhere, and nothing is yielded.
+    A direction is unobservable where its column lies, to rounding, in the span of the columns of frames and artefacts.
+    Nothing is yielded for an instrument with a frame of its own, whose frames are reported elsewhere.
     """
     campaign, seen = fit.campaign, fit.nominal  # corrected, what varies may part what is alike
     if campaign.position is not None:

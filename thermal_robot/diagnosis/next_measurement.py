@@ -76,7 +76,7 @@ def most_informative(
 
 
 def _log_det(root: Array) -> Array:
-    """(K,) half the log determinant of root root' + 1 of each candidate, nats."""
+    """Half the log determinant (K,) of root root' + 1 of each candidate, nats."""
     return np.asarray(0.5 * np.linalg.slogdet(root @ root.transpose(0, 2, 1) + np.eye(root.shape[1]))[1])
 
 
@@ -90,7 +90,7 @@ def _learnt(root: Array, row: Array) -> Array:
 
 @dataclass(frozen=True)
 class NextSample:
-    """One sample to measure.
+    """Proposed sample of the optimal design.
 
     ``position``: joint positions by name, rad or m. ``conditions`` that the explanations depend on, by column, SI;
     ``time`` is a proposal, any later one will do. ``separates``: the explanations that it tells apart best, each a
@@ -298,7 +298,7 @@ def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination])
 
 
 def _root(design: Array, precision: Array) -> Array:
-    """(K, m, p) root of the covariance of design · N(0, precision⁻¹), the precision at least that of the prior, 1."""
+    """Square root (K, m, p) of the covariance of design · N(0, precision⁻¹), the precision at least the prior's, 1."""
     value, vector = np.linalg.eigh(precision)
     return np.asarray(design @ (vector / np.sqrt(np.maximum(value, 1.0))))
 

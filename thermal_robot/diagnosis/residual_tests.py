@@ -266,7 +266,7 @@ def _smooth_laws(observations: Observations, left: Residual) -> Iterator[LawTest
 
 
 def _in_a_row(fit: Fit) -> Outcome:
-    """P-value of so many consecutive outliers by chance: a change gives runs of them, gross errors do not."""
+    """Poisson test of the number of consecutive outliers: a change gives runs of them, gross errors do not."""
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
     follow = int((aside[1:] & aside[:-1]).sum())

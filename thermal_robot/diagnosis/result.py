@@ -1,6 +1,6 @@
-"""The diagnosis as one frozen value, its tables and its JSON.
+"""Result of a diagnosis as a frozen dataclass, with its tables and its JSON.
 
-This module knows nothing of reports: whoever is registered in :mod:`thermal_robot.renderer` puts it into words.
+This module knows nothing of reports: the renderer registered in :mod:`thermal_robot.renderer` puts it into words.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ class Point(NamedTuple):
 
 
 class Judge(NamedTuple):
-    """Model of the diagnosis that weights new rows: point, (m,) one sigma of its residual, m and rad, row count."""
+    """Fixed model of a diagnosis for weights of new rows: point, residual sigma (m,), m and rad, row count."""
 
     point: Point
     sigma: Array

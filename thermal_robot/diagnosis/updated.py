@@ -109,7 +109,7 @@ class Watch:
     rows: int
 
     def look(self, before: Sequential, new: WeightedRows, last: Agreement) -> Agreement:
-        """Test new rows against the model of all rows before, and with those since the diagnosis."""
+        """Test new rows, and all since the diagnosis, against the posterior predictive of the rows before them."""
         fitted, choice = before.fitted, replace(before.choice, rivals=self.tested)
         white = linearised(new.campaign, fitted.point, choice, rivals=True) / fitted.noise[:, None]
         near = (white[:, :, -1] ** 2).sum(axis=1) <= distance_limit(choice.measures, before.samples + len(white))
@@ -153,7 +153,7 @@ class Watch:
 
 
 def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
-    """Overdispersion, at least 1, of blocks (N,) of rows: variance of their sums of squares over that of χ²."""
+    """Overdispersion factor, at least 1: variance of sums of squares over blocks (N,) of rows over that of χ²."""
     if len(blocks) < 2:
         return 1.0
     squares = (left**2).sum(axis=1)

@@ -15,8 +15,8 @@ from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_words import Size
 
 UNIT = 30.0
-"""Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
-hundred, mm a thousand; sisters differ by three."""
+"""Factor, up or down, on the lengths of all links from which a unit is wrong, not the model: inches read as m are 39,
+cm a hundred, mm a thousand; sisters differ by three."""
 
 Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
 

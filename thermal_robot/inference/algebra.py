@@ -22,7 +22,7 @@ def rms(vectors: Array) -> float:
 
 
 def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
-    """Return R (D, r) with Rᵀ G R = 1: it makes columns with the Gram matrix G (D, D) orthonormal.
+    """Return the whitening matrix R (D, r), Rᵀ G R = 1, of columns with the Gram matrix G (D, D).
 
     G is first scaled to a unit diagonal. Directions whose eigenvalue is then below ``floor`` times the largest are
     left out: what remains of them is rounding.
@@ -35,7 +35,7 @@ def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
 
 
 def solve(matrix: Array, vector: Array) -> Array:
-    """Return the (D,) least-squares solution of normal equations, zero in directions that nothing determines."""
+    """Solve normal equations by a pseudo-inverse: (D,), zero in directions that nothing determines."""
     root = whitener(matrix)
     return np.asarray(root @ (root.T @ vector))
 
@@ -43,7 +43,7 @@ def solve(matrix: Array, vector: Array) -> Array:
 def orthonormal(columns: Array) -> Array:
     """Return an orthonormal basis (E, r) of the span of columns (E, D).
 
-    By their Gram matrix, twice: the second time takes the rounding of the first (Yamamoto et al., *Electronic
+    Columns are whitened twice, the second time against rounding, as in CholeskyQR2 (Yamamoto et al., *Electronic
     Transactions on Numerical Analysis* 44, 2015).
     """
     for _ in range(2):

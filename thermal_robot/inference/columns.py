@@ -22,7 +22,7 @@ from thermal_robot.observations import Observations, observe
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The P parameters of one effect, in one setting of its nonlinear arguments, as columns (N, m, P).
+    """Design matrix (N, m, P) of the P parameters of one effect, in one setting of its nonlinear arguments.
 
     ``source`` is the columns, or the observations from which they are recomputed on demand to save memory. ``bare`` are
     the parameters without responses, ``sizes`` (P,) their expected sizes with the campaign's ``[priors]``, ``spread``
@@ -38,7 +38,7 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """Derivative (N, m, P) of the gap by each parameter, root frame axes; rounding errors are set to 0."""
+        """Jacobian (N, m, P) of the gap by the parameters, root frame axes; rounding errors are set to 0."""
         if not isinstance(self.source, Observations):
             return self.source
         found = moved_by(self.source, self.parameters)
@@ -66,7 +66,7 @@ class Block:
 
 
 def block(observations: Observations, effect: Effect) -> Block:
-    """Block of an effect at the linearisation point of observations; :class:`EffectError` on a breach of contract."""
+    """Build the design matrix of an effect at some observations; :class:`EffectError` on a breach of contract."""
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])
@@ -80,7 +80,7 @@ def block(observations: Observations, effect: Effect) -> Block:
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:
-    """Return the derivative (N, m, P) of the gap by each of P parameters, root frame axes."""
+    """Return the Jacobian (N, m, P) of the gap by P parameters, root frame axes."""
     campaign = observations.campaign
     measures = components(campaign)
     columns = np.zeros((campaign.samples, measures, len(parameters)))
@@ -91,7 +91,7 @@ def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Arr
 
 
 def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
-    """(N, m, f) derivative of the gap by the unknown frames and artefacts, and what each column is.
+    """Jacobian (N, m, f) of the gap by the unknown frames and artefacts, and the name of each column.
 
     Base: twist in the root frame, of rows that an instrument measured. Tool: translation of the target in the tool
     frame, and its turn where orientation is measured. Artefacts: what rows share beside the robot, by their names.
@@ -113,7 +113,7 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
 
 
 def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
-    """Return to which frame, ``base`` or ``tool``, or artefact each of the columns of the unknown frames belongs."""
+    """Return the frame, ``base`` or ``tool``, or artefact to which each column of :func:`frame_columns` belongs."""
     known = _unknown(campaign)
     if campaign.position is not None or not campaign.measured:
         return known

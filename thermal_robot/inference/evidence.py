@@ -66,7 +66,7 @@ class Columns:
 class Posterior:
     """Posterior of the parameters of one combination at given scales and noise: mode, and covariance about it.
 
-    Of a dropped column (``free`` (D,) False) the mode is zero, with its mean square. ``log_volume`` is the log ratio of
+    A dropped column (``free`` (D,) False) has the mode zero, and its mean square. ``log_volume`` is the log ratio of
     posterior to prior volume: −½ log|I + Λ G/s²|, and the factors of the half lines; ``effective`` per block, how many
     of its columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
     """
@@ -360,7 +360,7 @@ def conditional_scales(spread: Array, log_scale: Array, own: Array) -> tuple[flo
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """Maximum of the density of scales and noise; where the search stopped early, with the gain still expected."""
+    """Posterior mode of scales and noise; where the search stopped early, with the gain still expected."""
 
     posterior: Posterior
     hessian: Array
@@ -379,7 +379,7 @@ def _most_probable(
     floor: float,
     settled: float,
 ) -> _Mode:
-    """Maximise the density of scales and noise; stop early where the log evidence cannot reach ``floor``."""
+    """Find the posterior mode of scales and noise; stop early where the log evidence cannot reach ``floor``."""
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:

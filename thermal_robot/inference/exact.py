@@ -162,7 +162,7 @@ def _has_constants(item: Block, factor: float) -> bool:
 
 
 def weighed(kept: Products, blocks: Sequence[Block]) -> float:
-    """Log evidence of these effects together, with the prior odds of each."""
+    """Log evidence of a combination of effects plus their log prior odds."""
     priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
     return _evaluated(kept, blocks)[2].log_evidence + priors
 
@@ -188,7 +188,7 @@ def downweighted(explanation: Explanation) -> Whitening:
 def _refined_block(
     kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float
 ) -> Block:
-    """Block at one place after hill climbing over the constants of its effect."""
+    """Hill climbing over the constants of one effect, the others fixed; return its block."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
     seen: dict[Effect, float] = {}
 
@@ -217,7 +217,7 @@ def _refined_block(
 
 
 def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
-    """Evidence of exactly these blocks."""
+    """Evidence of the combination of all these blocks."""
     linear, problem = kept.problem(blocks)
     return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))
 
@@ -244,7 +244,7 @@ def select_exactly(
     before: Explanation | None = None,
     starts: Sequence[Sequence[Effect]] = (),
 ) -> ExactSelection:
-    """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
+    """Model selection at the exact fit: select effects, refine their constants, refit, until convergence.
 
     Starts at ``start``, the exact model of the effects ``held`` with their values, and at the weights of the
     explanation ``before``. The first search starts from each of the ``starts``, by default from the effects held.

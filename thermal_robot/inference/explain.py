@@ -198,7 +198,7 @@ class ModelSearch:
     def _climbed(
         self, found: tuple[Hyperparameters, float, tuple[int, ...]], best: Combination
     ) -> tuple[Hyperparameters, Combination] | None:
-        """Climb where an amplitude promises more evidence than the best; return an improvement, if any."""
+        """Hill climbing from an amplitude with more evidence than the best; return an improvement, if any."""
         hyper, promised, blocks = found
         return self._better(hyper, blocks, best) if promised > best.log_evidence + settings.BETTER else None
 
@@ -209,7 +209,7 @@ class ModelSearch:
         return (hyper, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _larger_moves(self, hyper: Hyperparameters, best: Combination) -> tuple[Hyperparameters, Combination] | None:
-        """Search beyond single steps with the present discrepancy; return an improvement, if any."""
+        """Hill climbing with larger moves at a fixed discrepancy; return an improvement, if any."""
         found = self.search_at(hyper).run(best.blocks)
         return (hyper, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
@@ -463,13 +463,13 @@ class Explanation:
     searched: _Iteration | None = None
 
     def without(self, out: Sequence[int]) -> Explanation:
-        """Best explanation without some blocks, at the same weights, from the memo."""
+        """Best explanation without some blocks, at the same weights, from memoised evidences."""
         if self.searched is None:
             raise ValueError("what was weighed for this explanation is no longer known")
         return self.searched.without(frozenset(out)).explanation(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
-        """Block of the best combination that belongs to this effect, in whatever setting."""
+        """Block of the best combination that belongs to an effect, in any setting."""
         return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
 
     def held(self, block: int) -> Array:

@@ -67,7 +67,7 @@ class Fit:
         return frozenset(self.families[b] for b in combination.blocks)
 
     def probability(self, name: str) -> float:
-        """Posterior probability that an effect is in the model, in whatever setting."""
+        """Posterior inclusion probability of an effect, summed over its settings."""
         return self.explanation.probability(self.blocks_of(name))
 
     def probability_of_just(self, names: Set[str]) -> float:
@@ -76,7 +76,7 @@ class Fit:
         return min(float(e.probabilities[[self.names_of(c) == names for c in e.combinations]].sum()), 1.0)
 
     def odds(self, name: str) -> float:
-        """Posterior odds of an effect of the explanation against nothing in its place."""
+        """Posterior odds of an effect of the explanation against the same explanation without it."""
         best = self.names_of(self.explanation.best)
         return self.probability_of_just(best) / max(self.probability_of_just(best - {name}), settings.TINY)
 
@@ -147,7 +147,7 @@ def _fitted(
 
 
 def require_enough(campaign: Campaign) -> None:
-    """Refuse a campaign with too few rows for the frames, the effects and a held-out fold."""
+    """Refuse a campaign with too few different poses for the frames, the effects and a held-out fold."""
     still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
     poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
     unknown = len(unknown_frames(campaign))

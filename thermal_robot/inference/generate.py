@@ -1,11 +1,11 @@
-"""Candidate terms that nobody listed: change points, gear ripple, and laws of any quantity at any place.
+"""Generation of terms outside the library: change points, gear ripple, and laws of any quantity at any place.
 
 Change points: every run of rows in the order of measurement is weighed at every place by a likelihood ratio (Page,
 *Biometrika* 42, 1955, for one change; Siegmund, *Annals of Statistics* 14, 1986, for a run between two), from
 cumulative sums. Clustered outliers count fully, as they may be the event.
 
-Ripple: a matching pursuit (Mallat and Zhang, *Matching pursuits with time-frequency dictionaries*, 1993) over all
-joints and orders at once, all that is known fitted anew beside each wave.
+Ripple: an orthogonal matching pursuit (Mallat and Zhang, *Matching pursuits with time-frequency dictionaries*, 1993)
+over all joints and orders at once: all terms are refitted with each wave.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
 Runs = NDArray[np.int64]
-"""(C, 2) first row of each run in the order of measurement, and the first behind it."""
+"""Runs of rows (C, 2) in the order of measurement: the first row of each, and the first behind it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ class _Sums:
         return run
 
     def shared(self, rows: Rows) -> float:
-        """Log evidence of a displacement of rows (N,), or if smaller that without the few farthest rows.
+        """Robust log evidence of a displacement of rows (N,): the smaller of that with and without the farthest.
 
         All rows contribute to an event, but only a few to consecutive gross errors.
         """
@@ -455,7 +455,7 @@ class _Pursuit:
 
 
 def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
-    """Log evidence (W,) of each pair of columns (E, K) beside all others.
+    """Wald test of each pair of columns (E, K) given all others: the log evidence (W,) that dropping it costs.
 
     Without a pair the sum of squares is larger by β_wᵀ C_ww⁻¹ β_w, β the values fitted and C their covariance.
     """
@@ -547,7 +547,7 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
 
 
 def listed(sample: RowSample, law: Discovered) -> bool:
-    """Whether a known effect, with a zero that is off, is identical to a law in its joint."""
+    """Whether a law is collinear with a known effect in its joint, up to constants and frames."""
     if law.kind != "joint":
         return False
     own = [item for item in sample.linear.blocks if item.effect.places == (law.place,)]
@@ -629,7 +629,7 @@ def _sorted(found: dict) -> tuple:  # type: ignore[type-arg]
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:
-    """Place of a law as a diagnosis names it: a segment by the link that carries it."""
+    """Kind and name of a law's place; a segment is named by the link that carries it."""
     if law.kind != "link":
         return law.kind, law.place
     return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)

@@ -99,7 +99,7 @@ STAND = "stand"  # Label of what stays in one place while the robot is brought t
 
 
 def held_out_groups(campaign: Campaign) -> tuple[Labels, str]:
-    """(N,) label of the rows that are held out at a time, and what they are: stands, or blocks where these are few."""
+    """Cross-validation folds (N,), and their scheme: an instrument's stands, or blocks of rows where these are few."""
     stands = campaign.labels.get(STAND)
     if stands is not None and campaign.position is None:
         number = np.unique(stands, return_inverse=True)[1].ravel()

@@ -73,7 +73,7 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
 def _without_prior_of(
     values: Array, covariance: Array, scale: float, across: Array, free: NDArray[np.bool_]
 ) -> tuple[Array, Array, Array]:
-    """Values (k,), covariance (k, k) and prior deviations (k,) in other coordinates, some without their prior.
+    """Posterior mean (k,), covariance (k, k) and prior deviations (k,) in new coordinates, some without prior.
 
     The likelihood follows from the posterior N(values, covariance) and the prior N(0, scale²). In the new coordinates,
     the columns of ``across``, free ones have a wide prior, the others the old one.
@@ -86,13 +86,13 @@ def _without_prior_of(
 
 
 def _inside(fit: Fit, effect: Effect) -> list[Effect]:
-    """Candidates, in all their places, that this effect contains; not itself."""
+    """List the candidate effects, in all their places, that an effect contains, itself excluded."""
     first, held = [known[0] for known in fit.variants.values() if known], {e.name for e, _ in fit.effects}
     return [e for e in first if e.told_inside and effect.name in e.contained_in and e.name not in held]
 
 
 def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Directions (P, D) of an effect that the data determine, parameters (D, W) in them, and which lie in their span.
+    """Basis (P, D) of an effect's determined directions, parameters (D, W) projected on it, and which it spans.
 
     All in prior sizes.
     """

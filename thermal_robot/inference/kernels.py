@@ -224,7 +224,7 @@ class GroupKernel:
         return float(np.log1p(tau**2 * self.value).sum())
 
     def degrees(self, tau: float) -> float:
-        """Trace of the smoother."""
+        """Effective degrees of freedom: the trace of the smoother."""
         return float((tau**2 * self.value / (1.0 + tau**2 * self.value)).sum())
 
     def whitened(self, tau: float, stack: Array) -> Array:

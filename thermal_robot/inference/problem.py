@@ -80,11 +80,11 @@ class Whitening:
 
     @property
     def unseen(self) -> int:
-        """How many components the rows in use do not see: they are no equations."""
+        """Number of components that the rows in use do not measure: they are no equations."""
         return 0 if self.seen is None else int((3 - self.seen[self.weights > 0]).sum())
 
     def figures(self, measures: int) -> NDArray[np.int64] | int:
-        """Return how many figures a row has: (N,) where rows differ."""
+        """Return the number of measured components of a row: (N,) where rows differ."""
         return measures if self.seen is None else np.maximum(self.seen.sum(axis=1), 1)
 
     def sigma(self, rows: NDArray[Any] | slice = slice(None)) -> Array:
@@ -141,7 +141,7 @@ def normal_equations(
 
 
 def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[int, ...]]:
-    """Directions of each block that the data determine, and their number.
+    """Eigenvectors of each block's information that the data determine, and their number.
 
     In a block with non-negative parameters, each determined parameter is its own direction.
     """

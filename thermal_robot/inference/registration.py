@@ -31,7 +31,7 @@ CUBE = [
     for signs in product((1.0, -1.0), repeat=3)
     if np.linalg.det(turn := np.array(axes) * np.array(signs)[:, None]) > 0.0
 ]
-"""The 24 turns of a cube: no turn is farther than 63° from the next of them."""
+"""The 24 rotations of a cube: no rotation is farther than 63° from the nearest of them."""
 
 
 class BaseAndTarget(NamedTuple):
@@ -206,7 +206,7 @@ def found_frames(campaign: Campaign) -> Frames:
 
 
 def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
-    """Find the base by those rows that an instrument measured; where there are none it stands as declared."""
+    """Register the base on the rows that an instrument measured; without any it stands as declared."""
     rows = np.flatnonzero(instrument_rows(campaign))
     if campaign.base_known or len(rows) < 3:
         return frames
@@ -216,7 +216,7 @@ def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
 
 
 def _turned(campaign: Campaign, frames: Frames) -> Frames:
-    """Find how the target is turned on the tool, where that matters: by the turn of a cube that leaves least."""
+    """Register the rotation of the target on the tool, if measured, from several of the 24 rotations of a cube."""
     if campaign.tool_known or tool_width(campaign) == 3:
         return frames
     rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
@@ -234,7 +234,7 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
 
 
 def _median_distance(campaign: Campaign, frames: Frames) -> float:
-    """Return the median distance that frames leave, m; infinite where it is no number."""
+    """Return the median residual distance with given frames, m; infinite where it is NaN."""
     distance = float(np.median(np.linalg.norm(observe(campaign, frames).gap, axis=1)))
     return distance if np.isfinite(distance) else np.inf
 

@@ -29,7 +29,7 @@ from thermal_robot.inference.weights import distance_limit
 from thermal_robot.observables import of_model
 
 Component = tuple[str, int]
-"""Anew at each ``visit`` or once a commanded ``pose``, and the number of a joint."""
+"""Kind of a variance component, drawn per ``visit`` or per commanded ``pose``, and the number of its joint."""
 _LOWEST, _HIGHEST = settings.LOG_VARIANCE
 _GRID = np.log(settings.VARIANCE_GRID)
 
@@ -600,7 +600,7 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
 
 
 def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tuple[Array, Array]:
-    """Frequencies, none where there are too many, and the log likelihood of each, averaged over phase.
+    """Frequencies, none where there are too many, and the marginal log likelihood of each over phase.
 
     All are in implied steps.
     """
@@ -701,10 +701,10 @@ def nothing_random(fit: Fit) -> RandomGap:
 
 
 def random_gap(fit: Fit) -> RandomGap:
-    """Which joints scatter beyond the instrument, per visit or per pose; without repeats these are one kind.
+    """Estimate the joints' scatter, per visit or per pose, as variance components beside the instrument's noise.
 
-    If a joint's errors follow a smooth law of a recorded quantity, they are no scatter. Errors of an encoder are a
-    sawtooth of the command with the period √12 σ; without repeats only that separates its steps from wear.
+    Errors that follow a smooth law of a recorded quantity are no scatter. Encoder errors are a sawtooth of the command
+    with the period √12 σ; without repeats, when visits and poses are one, only that separates steps from wear.
     """
     # what rows do not see would count as no scatter, and a model scatters nothing
     if fit.explanation.whitening.seen is not None or of_model(fit.campaign):
@@ -766,7 +766,7 @@ def _without_influential_rows(
 
 
 def _in_joints(fit: Fit) -> list[Component]:
-    """Kind and joints of a per-pose or per-visit discrepancy."""
+    """Variance components, kind and joint, of a per-pose or per-visit discrepancy."""
     kernel, names = fit.explanation.discrepancy.kernel, fit.campaign.robot.joint_names
     if kernel is None or not kernel.grouped:
         return []
@@ -784,7 +784,7 @@ def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None
 
 
 def _even(fit: Fit) -> Array:
-    """Divisors (N, m) that give all rows the same noise.
+    """Scale factors (N, m) by which rows are divided to have equal noise variance.
 
     For repeats of a pose it is their root mean square, so that per-pose errors cancel in contrasts, whose mean square
     stays that of the noise.

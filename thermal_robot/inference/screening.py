@@ -1,4 +1,4 @@
-"""Screening of further columns against a residual: which law, entering where, explains it best.
+"""Screening of candidate laws, each a quantity at a place, against a residual by an information criterion.
 
 The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`bic_gain`).
 Screened are laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
@@ -133,7 +133,7 @@ class Target:
         )
 
     def statistics(self, moves: Array) -> PlaceStatistics:
-        """Precomputed sums for laws at a place whose d components displace the target by (N, m, d) a unit."""
+        """Sufficient statistics for laws at a place whose d components displace the target by (N, m, d) a unit."""
         own = moves * self.root[:, :, None]
         basis = self.basis.reshape(*self.root.shape, -1)
         return PlaceStatistics(
@@ -148,7 +148,7 @@ class Target:
 def _reweighted(
     gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
 ) -> Target:
-    """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
+    """Return the target with Cauchy weights from a former residual, or equal weights the ``first`` time."""
     noise = np.repeat(robust_noise(left, seen=seen), 3)
     figures = left.shape[1] if seen is None else np.maximum(seen.sum(axis=1), 1)
     far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * figures)
@@ -308,7 +308,7 @@ def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> 
 def shapes(
     law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
 ) -> list[Discovered]:
-    """All shapes of a law that may suffice: its own, smooth, and simpler ones, each once.
+    """Alternative functional forms of a law: its own, smooth, and simpler ones, each once.
 
     Always straight, quadratic, and hinges at quantiles of the quantity; with ``jumps`` (positions, gravity, clock) also
     steps and bumps; of a velocity its sign; of a joint's own position harmonics of the given orders; of labels one that
@@ -589,7 +589,7 @@ def _varying_responses(parameter: Parameter) -> Iterator[Response]:
 
 
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
-    """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
+    """Interactions of two quantities, 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
     turns = components(observations.campaign) == 6
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
@@ -617,7 +617,7 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Laws of joint memory: last turning point (smooth, or stop operators), and start."""
+    """Hysteresis of each joint by its last turning point (smooth, or stop operators), and relaxation after starts."""
     found, past, known = [], observations.campaign.since_turn, quantities(observations)
     clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:
@@ -739,7 +739,7 @@ def _candidates(cache: ScanCache, effects: Iterable[Effect] | None) -> dict[str,
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Law in the shape of the largest gain less the cost of choosing it.
+    """Select the functional form of a law by its net gain of log evidence.
 
     Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
     """
@@ -755,7 +755,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
 
 
 def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
-    """Gains of a law in every shape that it may have."""
+    """Gain of log evidence of a law in each functional form."""
     observations = cache.observations
     whole = replace(law, shape="product") if law.by else law
     values = None if law.quantity == "none" else whole.values(observations)
@@ -892,12 +892,12 @@ def _prefer_sessions(single: dict[Site, Scanned], session: Site, cache: ScanCach
 
 
 def _best_shape(cache: ScanCache, t: int, law: Discovered) -> float:
-    """Gain of a law in its best shape, less the cost of choosing it."""
+    """Largest net gain of log evidence of a law over its functional forms."""
     return max(item.net_gain for item in _gains_by_shape(cache, t, law))
 
 
 def _best(own: Mapping[str, list[Scanned]], cache: ScanCache, t: int) -> list[Scanned]:
-    """Candidates that beat what they contain, sorted; of a smooth and a straight law the better one."""
+    """Candidates better than the laws nested in them, sorted; of a smooth and a straight law the better one."""
     single: dict[Site, Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)

@@ -333,7 +333,7 @@ class Search:
             found = best
 
     def _rescued(self, best: Combination) -> Combination | None:
-        """Evaluate exactly what was screened and comes near the best; return an improvement, if any."""
+        """Evaluate exactly the screened combinations near the best; return an improvement, if any."""
         near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
         found = max((self._at_least(blocks, best) for blocks in near), key=lambda c: c.log_evidence, default=best)
         return found if found.log_evidence > best.log_evidence + settings.BETTER else None

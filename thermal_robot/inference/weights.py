@@ -16,7 +16,7 @@ from thermal_robot.inference.problem import Linear, Whitening
 from thermal_robot.observables import of_model, seen_components
 
 Figures = int | NDArray[np.int64]
-"""How many figures a row has, or (N,) each row."""
+"""Number of measured components of every row, or (N,) of each row."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class Noise:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Noise:
-        """Return what a campaign states."""
+        """Return the noise that a campaign states."""
         seen, place, turn = seen_components(campaign), campaign.noise_position, campaign.noise_orientation
         if of_model(campaign):  # what is computed has no noise: it is written to some digits
             place, turn = place or settings.WRITTEN_TO, turn or settings.WRITTEN_TO
         return cls(place, turn, campaign.relative_noise, seen)
 
     def figures(self, measures: int) -> NDArray[np.int64] | int:
-        """Return how many figures a row has: (N,) where rows differ."""
+        """Return the number of measured components of a row: (N,) where rows differ."""
         return measures if self.seen is None else np.maximum(self.seen.sum(axis=1), 1)
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
@@ -85,7 +85,7 @@ def noise_estimate(measured: Array, noise: Noise, measures: int) -> tuple[Array,
 
 
 def first_whitening(linear: Linear, noise: Noise) -> Whitening:
-    """Equal weights of all rows, and the noise from the median of the gap, free of what is stated."""
+    """Initialise the whitening: equal weights, and the stated noise or the gap's robust one, without its prior."""
     measured = robust_noise(linear.gap, relative=noise.relative, seen=noise.seen)
     sigma, _ = noise_estimate(measured, noise, linear.measures)
     return Whitening(np.ones(len(linear.gap)), sigma, 0.0, relative=noise.relative, seen=noise.seen)

@@ -181,7 +181,7 @@ def _needed(model: JointModel, choice: Choice, allowed: Mask) -> Choice:
 
 
 def _kept(model: JointModel, choice: Choice) -> Mask:
-    """Return which parameters of a choice stay, by the linear problem at its fit."""
+    """Backward elimination at a fit: mask of the parameters with enough odds that do no harm on held-out rows."""
     active, search = choice.active & seen(model, choice.point), choice.search
     while active.any():
         best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)

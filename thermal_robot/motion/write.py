@@ -163,7 +163,7 @@ def _tell_kept(cause: Cause, written: Written, reasons: dict[str, str]) -> None:
 
 
 def _need_stiffness(cause: Cause, written: Written, *effects: str) -> None:
-    """Say which effects stay over a stiffness that nobody knows."""
+    """Record the effects that cannot be written because the joint's stiffness is unknown."""
     for effect in effects:
         if effect in cause.values and cause.stiffness is None:
             reason = "its stiffness is not stated, and no droop tells it, so that no torque follows"

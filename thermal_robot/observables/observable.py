@@ -134,7 +134,7 @@ class Observable(ABC):
 
     @abstractmethod
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) or (n, 6) measured − predicted: displacement, m, and turn, rad, root frame axes."""
+        """Gap, measured − predicted, (n, 3) or (n, 6): displacement, m, and turn, rad, root frame axes."""
 
     @abstractmethod
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:

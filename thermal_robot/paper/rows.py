@@ -391,7 +391,7 @@ def _simulate(r: float, n: int, alpha: float, samples: int, seed: int) -> Power:
 
 
 def _mostly_passes(power: Power) -> bool:
-    """Whether it is rejected at most twice as often as a normal sample."""
+    """Whether the rejection rate is compatible with at most twice the level of the test."""
     return power.low <= 2.0 * power.alpha
 
 

@@ -82,7 +82,7 @@ def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
 
 
 def _effect(d: MotionDiagnosis, one: Finding, heading: str, told: bool) -> dict[str, Any]:
-    """Return an effect as the table of every effect wants it."""
+    """Return the template fields of one effect for the table of all effects."""
     means, moves = words.MEANS.get(one.name, ""), words.places(d, one.name) if told else ""
     rivals = f"These data cannot tell it from {', '.join(one.confounded_with)}." if one.confounded_with else ""
     known = words.parameters(d, one.name) if told else []

@@ -194,7 +194,7 @@ class FlatNormal(_Frozen):  # type: ignore[misc]  # scipy has no annotations
 
 
 def _upper_quantile(q: Array, sigma: Array, half_width: Array) -> Array:
-    """``x`` with P(X > x) = q.
+    """Inverse survival function: ``x`` with P(X > x) = q.
 
     Newton's iteration on ``log P(X > x)``, which is concave: started beyond the root it approaches it from there
     without overshooting, down to ``q = 1e-300`` and for any proportion of the two parts.
@@ -256,7 +256,7 @@ def _checked(sample: Array) -> Array:
 
 
 def fit_moments(sample: Array) -> Estimate:
-    """``(r, mean, total standard deviation)`` by the first, second and fourth moment.
+    """Moment estimates ``(r, mean, total standard deviation)`` from first, second and fourth moments.
 
     The excess kurtosis is ``-6/5 (r**2 / (1 + r**2))**2``; a sample flatter than a uniform one gives ``inf``.
     """
@@ -269,7 +269,7 @@ def fit_moments(sample: Array) -> Estimate:
 
 
 def log_likelihood(sample: Array, ratio: float, loc: float, scale: float) -> float:
-    """Logarithm of the likelihood."""
+    """Log-likelihood of a sample under the flat-normal distribution."""
     angle = np.arctan(ratio)
     half_width = scale * _ROOT_3 * np.sin(angle)
     sigma = 0.0 if np.isinf(ratio) else scale * np.cos(angle)
@@ -279,7 +279,7 @@ def log_likelihood(sample: Array, ratio: float, loc: float, scale: float) -> flo
 def fit_maximum_likelihood(
     sample: Array, *, ratio: float | None = None, loc: float | None = None, scale: float | None = None
 ) -> Estimate:
-    """``(r, mean, total standard deviation)`` of the largest likelihood; given ones are held.
+    """Maximum likelihood estimates ``(r, mean, total standard deviation)``; given ones are held.
 
     The search runs over mean, logarithm of the total standard deviation and ``arctan r``, in which both limits are at a
     finite distance. The limits themselves are compared by their own closed-form estimates, since a maximum often lies
@@ -307,7 +307,7 @@ def fit_maximum_likelihood(
 
 
 def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
-    """Largest likelihoods from several starts; empty where all three parameters are fixed."""
+    """Local maxima of the likelihood from several starts; empty where all three parameters are fixed."""
     free = [k for k in range(3) if held[k] is None]
     if not free:
         return []
@@ -357,7 +357,7 @@ _CHUNK = 2_000_000  # numbers held at once
 
 @dataclass(frozen=True)
 class FlatNormalND:
-    """Law of ``mean + normal + uniform``, both parts independent.
+    """Multivariate flat-normal distribution: ``mean + normal + uniform``, both parts independent.
 
     Parameters
     ----------
@@ -492,7 +492,7 @@ def flat_normal_nd(covariance: npt.ArrayLike, spread: UniformSpread, mean: npt.A
 
 
 def _log_product(white: Array, edges: Array, lengths: Array) -> Array:
-    """Flat-normal along each of orthogonal edges, standard normal across; points in units of the normal part."""
+    """Log density at whitened points: flat-normal along each of orthogonal edges, standard normal across."""
     directions = edges / lengths
     along = white @ directions
     across = white - along @ directions.T

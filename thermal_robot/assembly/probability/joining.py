@@ -24,7 +24,7 @@ Thermal = UniformSpread | npt.ArrayLike | None
 
 @dataclass(frozen=True)
 class Law:
-    """Batch of laws of planar errors; leading axes broadcast.
+    """Batch of probability distributions of planar errors; leading axes broadcast.
 
     Covariances ``(..., 2, 2)`` and means ``(..., 2)`` of the normal parts; a uniform ``spread`` of all of them, or one
     of each, from ``-segment`` to ``segment``, ``(..., 2)``.
@@ -187,7 +187,7 @@ def _rule(length: float, reach: float) -> tuple[Array, Array]:
 
 
 def _rule_size(length: float, reach: float) -> tuple[int, int]:
-    """Return the number of panels of that rule, and of points on each."""
+    """Return the number of panels of :func:`_rule`, and of points on each."""
     panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
     return panels, _node_count(length / panels * (reach + length))
 
@@ -308,7 +308,7 @@ def _evaluate(
 
 
 def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Integrate validated cases one by one."""
+    """Integrate validated cases, together or, with several generators, by groups of equal covariance."""
     if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
         return _cases(law, sizes, shape, outside)
     # sums over several generators are as fine as the normal part demands: one covariance after the other
@@ -337,7 +337,7 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
 
 
 def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Flattened cases; zero and infinite clearances are answered here."""
+    """Integrate flattened cases; zero and infinite clearances have probability 0 and 1."""
     result = np.full(len(sizes), 1.0 if outside else 0.0)
     pieces = law.spread.pieces if law.spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
     reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)

@@ -129,7 +129,7 @@ def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLik
 
 
 def log_tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Logarithm of the probability beyond ``x``, P(X > x), measured from the mean; arguments broadcast."""
+    """Log survival function P(X > x) with ``x`` measured from the mean; arguments broadcast."""
     shape = _shape(x, sigma, half_width)
     x, sigma, half_width = _split(x, sigma, half_width)
     distance = np.abs(x)
@@ -178,7 +178,7 @@ def density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -
 
 
 def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """P(X > x) with ``x`` measured from the mean; as `log_tail`, but cheaper, and zero below 1e-300."""
+    """Survival function P(X > x); as `log_tail`, but cheaper, and zero below 1e-300."""
     shape = _shape(x, sigma, half_width)
     x, sigma, half_width = _split(x, sigma, half_width)
     distance = np.abs(x)
@@ -195,14 +195,14 @@ def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> A
 
 
 def _either_tail(x: Array, sigma: Array, half_width: Array) -> Array:
-    """P(X > x); without the uniform part one call of ``ndtr``."""
+    """Survival function P(X > x); without the uniform part one call of ``ndtr``."""
     if not np.any(half_width) and np.all(sigma > 0.0):
         return np.asarray(ndtr(-x / sigma))
     return tail(x, sigma, half_width)
 
 
 def outside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """P(X < low or X > high), both measured from the mean; ``low <= high`` of one shape. A sum, so relatively accurate.
+    """Probability P(X < low or X > high), relatively accurate; bounds from the mean, ``low <= high`` of one shape.
 
     A point mass (``sigma = half_width = 0``) on the edge is inside. The widths broadcast.
     """
@@ -211,7 +211,7 @@ def outside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_widt
 
 
 def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """P(low <= X <= high), both measured from the mean; ``low <= high`` of one shape, relatively accurate.
+    """Probability P(low <= X <= high), relatively accurate; bounds from the mean, ``low <= high`` of one shape.
 
     An interval on one side of the mean is a difference of the tails on that side; an interval much shorter than
     ``sigma`` is a Gauss-Legendre sum of the density, because there that difference cancels. The widths broadcast.

@@ -230,7 +230,7 @@ _CHANGE = 12.0  # wide standard deviations by which a chord may change for 64 no
 
 
 def _window(narrow: Array, beside: Array) -> tuple[Array, Array, Array, Array]:
-    """Angle of the mean, window about it, and relative distance of the mean beyond the edge.
+    """Integration window over chords: angle of the mean, limits about it, and distance beyond the edge.
 
     ``narrow`` and ``beside`` are the deviation and the mean's distance (not negative) over the radius. With ``1 - cos
     c = d`` the difference of two angles is ``2 asin`` of a quotient of products.
@@ -289,7 +289,7 @@ Found = tuple[Array, Array, Array]
 
 _CELLS = 1 << 17  # numbers of an array that stays in cache, eight bytes each
 TOLD = 1e-5
-"""Chance outside that is told everywhere: as one minus that inside, fewer than ten digits are left below it."""
+"""Probability outside that every method gives: as one minus that inside, fewer than ten digits are left below it."""
 _TOLD_BY_CHORDS = 1e-7  # the same by chords, which add tails
 MOST = 256  # angles beside which chords are worth their while
 _SHORT = 1.0  # half segments in standard deviations up to which a mean over it is a sum of so many nodes
@@ -487,7 +487,7 @@ class Rectangle:
         return np.clip(x, ends[:, :1], ends[:, -1:])
 
     def chord(self, owner: npt.NDArray[np.intp], t: Array) -> tuple[Array, Array]:
-        """Where the vertical line at ``t`` is within both strips ``|axis . point| <= half side``."""
+        """Interval of the vertical line at ``t`` within both strips ``|axis . point| <= half side``."""
         low, high = np.full_like(t, -np.inf), np.full_like(t, np.inf)
         axes = np.broadcast_to(self.axes, (len(self.half_sides), 2, 2))
         for k in (0, 1):
@@ -500,7 +500,7 @@ class Rectangle:
         return low, np.maximum(low, high)
 
     def crossings(self, slope: npt.ArrayLike, intercept: Array) -> Array:
-        """Where every line meets the four edges' lines."""
+        """Abscissae where every line meets the four edges' lines."""
         result = []
         for k in (0, 1):
             across, along = self.axes[..., 0, k, None], self.axes[..., 1, k, None]

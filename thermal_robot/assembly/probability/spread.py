@@ -86,7 +86,7 @@ class UniformSpread:
         *,
         over: Literal["links", "area"] = "links",
     ) -> UniformSpread:
-        """Displacements ``generators @ delta`` with ``lower <= delta <= upper`` (Eqs 14-15).
+        """Distribution of displacements ``generators @ delta``, ``lower <= delta <= upper`` (Eqs 14-15).
 
         Parameters
         ----------
@@ -276,11 +276,11 @@ class Zonotope:
 
     @property
     def farthest_distance(self) -> float:
-        """Largest displacement of the tool point."""
+        """Distance of the farthest vertex: the largest displacement of the tool point."""
         return float(np.linalg.norm(self.farthest))
 
     def support(self, direction: npt.ArrayLike) -> Array:
-        """Largest value of ``direction . displacement``.
+        """Support function: the largest value of ``direction . displacement``.
 
         Parameters
         ----------
@@ -443,9 +443,9 @@ def _directions(edges: Array) -> tuple[Array, int]:
 
 
 def _facet_normals(edges: Array) -> Array:
-    """Directions that, with their opposites, bound the zonotope of the given edges ``(d, k)``; shape ``(F, d)``.
+    """Facet normals ``(F, d)``, one of each opposite pair, of the zonotope of the given edges ``(d, k)``.
 
-    What it does not extend along counts as an edge without length.
+    A direction in which it has no extent counts as an edge without length.
     """
     basis, _ = _directions(edges)
     if len(edges) == 2:
@@ -456,7 +456,7 @@ def _facet_normals(edges: Array) -> Array:
 
 
 def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
-    """Faces by their normals: each face is the polygon of the generators in it, at one end of all the others."""
+    """Polyhedron by its facet normals: each face is the polygon of its generators, at one end of all the others."""
     edges = columns * (high - low)
     basis, rank = _directions(edges)
     if rank < 3:  # no volume: its polygon, segment or point, in its own plane

@@ -68,7 +68,7 @@ def draw_arm(rng: np.random.Generator, joints: int) -> Arm:
 
 
 def _geometric(rng: np.random.Generator, between: tuple[float, float], count: int) -> Array:
-    """(count,) numbers whose logarithms are uniform."""
+    """Log-uniform random numbers (count,)."""
     low, high = np.log(between)
     return np.asarray(np.exp(rng.uniform(float(low), float(high), count)))
 

@@ -1,4 +1,4 @@
-"""What may be wrong with a servo arm: each fault changes the MuJoCo model, the command, or the torques of a step."""
+"""Fault models of a servo arm: each changes the MuJoCo model, the command, or the torques of a step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _WHOLE = ("delay", "payload", "table")
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """What the arm did without a fault, (n, J): position and torque; (n,) height of the tool."""
+    """Motion of the fault-free arm: position and torque (n, J), height of the tool (n,)."""
 
     position: Array
     torque: Array
@@ -63,7 +63,7 @@ class Fault:
             change(spec, arm, self)
 
     def commanded(self, command: Array, position: Array) -> Array:
-        """(J,) what the servos take for the command, their joints being at a position."""
+        """Command (J,) as the servos receive it, their joints being at a position."""
         if self.name not in ("zero", "gain", "dead zone"):
             return command
         own, j = command.copy(), self.joint
@@ -89,7 +89,7 @@ class Fault:
 
     @property
     def delay(self) -> float:
-        """Of the command, s."""
+        """Dead time of the command, s."""
         return self.size if self.name == "delay" else 0.0
 
 

@@ -1,43 +1,43 @@
-"""Numbers of the trial of motions that somebody chose, each with its unit and its reason."""
+"""Chosen numbers of the trial of motions, each with its unit and reason."""
 
 from __future__ import annotations
 
 JOINTS = (2, 7)
-"""Of an arm: from a pan and tilt to a redundant arm."""
+"""Number of joints of an arm: from a pan and tilt to a redundant arm."""
 LENGTH = (0.08, 0.3)
-"""m of a link: of hobby arms and of cobots."""
+"""Length of a link, m: of hobby arms and of cobots."""
 MASS = (0.1, 1.0)
-"""kg of a link, with its motor."""
+"""Mass of a link, kg, with its motor."""
 RADIUS = (0.03, 0.08)
-"""m of a link, which is a cylinder; its centre of mass lies beside its axis by up to that."""
+"""Radius of a link, m, which is a cylinder; its centre of mass lies beside its axis by up to that."""
 DROOP = (0.01, 0.06)
-"""rad by which gravity bends a servo when the arm is stretched: cobots and hobby servos."""
+"""Deflection of a servo by gravity, rad, when the arm is stretched: cobots and hobby servos."""
 LAG = (0.02, 0.08)
-"""s: damping over stiffness of a servo."""
+"""Time constant of a servo, s: damping over stiffness."""
 LIMIT = (3.0, 8.0)
 """Torque limit over gravity's torque when the arm is stretched."""
 BITS = (12, 16)
-"""Of an encoder: 4096 counts a turn of hobby servos, 65536 of others."""
+"""Resolution of an encoder, bits: 4096 counts a turn of hobby servos, 65536 of others."""
 RATES = (50.0, 100.0)
-"""Hz of command and encoder."""
+"""Sampling rate of command and encoder, Hz."""
 STEPS = (0.5e-3, 1e-3, 2e-3)
-"""s: MuJoCo's time step."""
+"""Time step of MuJoCo, s."""
 STIFF = 1.0
 """Step times damping over inertia up to which an explicit step of fourth order errs by a percent; else implicit."""
 SECONDS, SETTLE = 6.0, 1.0
-"""s of a motion, and at rest before it: more than ten lags."""
+"""Duration of a motion, s, and of the rest before it: more than ten lags."""
 CENTRE, REACH = 0.8, 0.8
-"""rad: the place about which a motion goes, either side of an arm that points up, and how far it goes at most."""
+"""Centre of a motion, rad, either side of an arm that points up, and its largest amplitude."""
 SPEED = (0.3, 2.0)
-"""rad/s of commands."""
+"""Speed of commands, rad/s."""
 SPREAD = 0.5
 """Standard deviation of the logarithm of a fault's size."""
 VISIBLE = 1.0
-"""Encoder counts, rms, by which a fault must move the joint that it moves most; less is drawn anew."""
+"""Smallest rms displacement, encoder counts, of the joint that a fault moves most; less is drawn anew."""
 DRAWS = 6
-"""Times that a fault's size is drawn, half as large again each time, until it can be seen."""
+"""Largest number of draws of a fault's size, half as large again each time, until it can be seen."""
 FRICTION = 0.3
-"""Of the tool on the table: of plastics and metals, sliding."""
+"""Friction coefficient of the tool on the table: of plastics and metals, sliding."""
 ABOVE = (0.03, 0.15)
 """Share of the readings at which the tool would be below the table."""
 BEYOND = (0.02, 0.15)

@@ -16,14 +16,14 @@ from thermal_robot.blind.motions.world import Unseen, draw_log, draw_world
 from thermal_robot.motion.diagnose import diagnose_motion
 
 ALWAYS = frozenset({"lag", "droop"})
-"""Effects of every servo that nobody states."""
+"""Effects that every servo has if it is not stated."""
 MARKS = ("named", "first", "alone", "placed", "flagged")
-"""Of an answer, as :class:`Answer` tells them."""
+"""Names of the scores of an :class:`Answer`."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is asked: a fault by name, the seed of its world, and whether the servos are stated."""
+    """Test case: a fault by name, the seed of its world, and whether the servos are stated."""
 
     fault: str
     seed: int
@@ -34,7 +34,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was answered of a case.
+    """Result of one case.
 
     ``size`` and ``joint`` of the fault; ``verdict`` effects by share; ``groups`` what each is confounded with;
     ``places`` the joints of each; ``shares``; ``flagged`` whether something stays unexplained; rms before, after and
@@ -55,36 +55,36 @@ class Answer:
 
     @property
     def reported(self) -> tuple[tuple[str, ...], ...]:
-        """The verdict beyond what every servo has, each effect with its group."""
+        """Effects of the verdict, each with its group, without those of every servo."""
         usual = frozenset() if self.case.stated else ALWAYS
         pairs = zip(self.verdict, self.groups, strict=True)
         return tuple((name, *group) for name, group in pairs if name not in usual)
 
     @property
     def named(self) -> bool:
-        """Whether the right name is told, or stands in the group of one that is; of nothing, that nothing is told."""
+        """Whether the right effect, or its group, is reported; without a fault, whether nothing is."""
         right = FAULTS.get(self.case.fault, ())
         return any(set(right) & set(names) for names in self.reported) if right else not self.reported
 
     @property
     def first(self) -> bool:
-        """Whether it is the first by share."""
+        """Whether the right effect is the first by share."""
         return bool(self.reported) and bool(set(FAULTS.get(self.case.fault, ())) & set(self.reported[0]))
 
     @property
     def alone(self) -> bool:
-        """Whether nothing else is told."""
+        """Whether the right effect alone is reported."""
         return self.named and len(self.reported) <= 1
 
     @property
     def placed(self) -> bool:
-        """Whether the right name is told of the right joint; true of what is the whole arm's."""
+        """Whether the right effect is reported in the right joint; true for a fault of the whole arm."""
         own = zip(self.verdict, self.places, strict=True)
         return not self.joint or any(n in FAULTS.get(self.case.fault, ()) and self.joint in p for n, p in own)
 
 
 def ask(case: Case) -> Answer:
-    """Draw the world of a case, diagnose its log and return what was answered."""
+    """Run one case: draw its world, diagnose its log and return the answer."""
     rng = np.random.default_rng([case.seed, EVERYTHING.index(case.fault), case.joints])
     world = draw_world(rng, case.joints, case.motions)
     try:
@@ -122,7 +122,7 @@ def plan(
 
 
 def run(cases: Sequence[Case], workers: int = 1, progress: Callable[[Answer], None] = lambda _: None) -> list[Answer]:
-    """Ask every case, several at a time; ``progress`` is called with each answer in the order of the cases."""
+    """Run all cases in parallel processes; ``progress`` is called with each answer in the order of the cases."""
     found = []
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for answer in pool.map(ask, cases):
@@ -143,19 +143,19 @@ def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
 
 
 def blamed(answers: Sequence[Answer]) -> float:
-    """Share of unlisted faults for which an effect that is listed is told."""
+    """Rate of false attribution: share of unlisted faults for which a listed effect is reported."""
     own = [bool(one.reported) for one in answers if one.case.fault in UNLISTED and not one.failure]
     return float(np.mean(own)) if own else 0.0
 
 
 def silent(answers: Sequence[Answer]) -> float:
-    """Share of sound arms of which nothing is told."""
+    """Specificity: share of fault-free arms for which nothing is reported."""
     own = [not one.reported for one in answers if one.case.fault == NOTHING and not one.failure]
     return float(np.mean(own)) if own else 0.0
 
 
 def text(answers: Sequence[Answer]) -> str:
-    """Say what the trial found: a table of faults, and what was answered wrongly."""
+    """Format the result of the trial: a table of faults, and the wrong answers."""
     lines = [f"{'fault':16} asked  named  first  alone  place  unexplained"]
     for row in table(answers):
         shares = "".join(f"{100 * float(str(row[mark])):6.0f}%" for mark in MARKS)

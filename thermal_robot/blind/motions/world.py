@@ -19,7 +19,7 @@ from thermal_robot.robot import load_robot
 
 
 class Unseen(Exception):
-    """A fault moves no encoder of the arm that was drawn for it."""
+    """Error: a fault moves no encoder of the arm that was drawn for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ def _centre(rng: np.random.Generator) -> float:
 
 
 def _points(rng: np.random.Generator, time: Array) -> tuple[Array, Array]:
-    """Instants from the first to after the last, s, and places, rad."""
+    """Random waypoints: instants from the first to after the last, s, and positions, rad."""
     at = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 2 * int(time[-1]) + 2))])
     return at, _centre(rng) + sizes.REACH * rng.uniform(-1.0, 1.0, len(at))
 
@@ -163,13 +163,13 @@ def _ramps(rng: np.random.Generator, time: Array) -> Array:
 
 
 def _random(rng: np.random.Generator, time: Array) -> Array:
-    """Points joined by curves of least jerk."""
+    """Minimum-jerk motion through random points."""
     at, places = _points(rng, time)
     return _joined(at, places, time, lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def _trapezoids(rng: np.random.Generator, time: Array) -> Array:
-    """Move with trapezoids of velocity, a third each of speeding up, of cruising and of slowing, and pauses."""
+    """Trapezoidal velocity profiles, a third each of acceleration, cruise and deceleration, with pauses."""
     at, places = _points(rng, time)
     places[1::2] = places[:-1:2][: len(places[1::2])]
     third = lambda s: np.where(s < 1 / 3, 2.25 * s**2, np.where(s > 2 / 3, 1 - 2.25 * (1 - s) ** 2, 1.5 * s - 0.25))  # noqa: E731
@@ -188,4 +188,4 @@ MOVES: dict[str, Callable[[np.random.Generator, Array], Array]] = {
     "points": _random,
     "trapezoids": _trapezoids,
 }
-"""Kinds of commands: (n,) rad at instants (n,), s."""
+"""Kinds of commands: functions from instants (n,), s, to positions (n,), rad."""

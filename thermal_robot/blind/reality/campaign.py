@@ -124,7 +124,7 @@ def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None
 
 
 def _gears(setting: Setting, done: AtWork) -> dict[str, float]:
-    """Gear ratios that the file must state for errors of the motor's side to be testable."""
+    """Gear ratios by joint that the file must state to make errors on the motor's side testable."""
     ratios = {float(v) for fault, values in done if fault.name == "transmission_error" for v in values[:, 4]} - {1.0}
     return {name: ratio for ratio in sorted(ratios) for name in setting.world.names}
 
@@ -167,7 +167,7 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
 
 
 def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
-    """Redraw (:class:`Unseen`) where one of several effects could be imitated by another."""
+    """Raise :class:`Unseen` where another effect can imitate one of several, so that the case is redrawn."""
     if len(done) < 2:
         return
     for fault, values in done:
@@ -193,7 +193,7 @@ def _background(case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, r
 
 
 _SENSORS = ("robot", "links")
-"""What may be recorded of the links: where only the air is, their lag would be another wall's each day."""
+"""Temperature sensors that may be recorded: where only the air is, their lag would be another wall's each day."""
 
 
 def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:
@@ -341,7 +341,7 @@ def _moving(
 
 
 def _tells(several: Several, days: Sequence[Day], spot: FaultParameter, values: Array, others: AtWork) -> float:
-    """Return the standard deviation of a change, of a difference or of the first campaign."""
+    """Return the standard deviation of a parameter's estimated change; :class:`Unseen` if it is too large."""
     noise = days[0].instrument.noise
     told = days[:2] if several.how == "changes" else days[:1]
     found = [deviation(day.gauge, spot, values, others, noise) for day in told]

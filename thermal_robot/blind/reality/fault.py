@@ -14,14 +14,14 @@ from thermal_robot.blind.reality.world import Array, Body
 Place = tuple[str, str]
 Draw = Callable[[Setting, np.random.Generator], Array]
 Does = Callable[[Setting, Array], Array]
-"""(setting, values) → what a fault does in each row."""
+"""Displacement of each row by a fault, from (setting, values)."""
 Quantities = Callable[[Setting, Sequence[Place]], Sequence[str]]
 Known = Callable[[Setting, Array], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One kind of fault.
+    """Model of one kind of fault: draw of its sizes, action on the robot, and right answers.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ _SOFT = (0.02, 0.1)  # of friction: films of grease are thin
 _RATIOS = (30.0, 160.0)  # of gears, harmonic drives' among them
 _DELAY = (5e-4, 8e-3)  # s: half a cycle of a controller at 1 kHz, a whole one at 125 Hz
 _DRAG = (2e-5, 2e-4)
-"""rad (m): what a loop without integral part leaves of dry friction, 1 to 10 N·m against 5e4 N·m/rad."""
+"""Position error, rad (m), of a loop without integral part by dry friction, 1 to 10 N·m against 5e4 N·m/rad."""
 STEEL = 12e-6  # 1/K
 _SETTLES = (600.0, 72000.0)
 """s, evenly over the logarithm. Fastest: ρ c d / h of a steel tube of 2 mm in still air, 3.6e6 · 0.002 / 12. Between:
@@ -243,7 +243,7 @@ _HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
 def _wheels(setting: Setting, values: Array) -> Array:
-    """Eccentric encoder disc and oval wheel, in exact geometry.
+    """Encoder reading error of an eccentric disc plus an oval wheel, in exact geometry.
 
     The disc turns with the joint, or ``ratio`` times as fast with its motor.
     """
@@ -405,7 +405,7 @@ def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
 
 
 def _tip(setting: Setting, values: Array) -> Array:
-    """Base on springs, tipped by the moment of all weights about a point on the vertical through its origin."""
+    """Twist (N, 6) of a base on springs by the moment of all weights, about a point on its origin's vertical."""
     springs, depth = np.abs(values[0, :2]), values[0, 2]
     turn = np.column_stack([setting.overturning[:, :2] * springs, np.zeros(setting.samples)])
     return np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn])

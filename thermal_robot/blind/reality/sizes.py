@@ -264,7 +264,7 @@ def _named(places: Sequence[Place]) -> list[dict[str, str]]:
 SIZE = 0
 """The column of a fault's values that is its size."""
 GROWS_ONLY = ("backlash", "joint_compliance")
-"""What wear makes larger, and nothing smaller."""
+"""Faults that wear only makes larger."""
 _ZEROS = "joint_offset"
 _STEP = 1e-4  # rad, rad/(N·m) ...: where a fault has no size yet, of which a derivative could be a share
 _PRESENT = 0.1  # × noise: a number that leaves less is not at work

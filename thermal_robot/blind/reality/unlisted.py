@@ -61,7 +61,7 @@ def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
 
 
 def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Quantities:
-    """The condition, or its product with the driver of the effect."""
+    """Right quantities of a modulated effect: the condition, or its product with the effect's driver."""
 
     def quantities(setting: Setting, places: Sequence[Place]) -> list[str]:
         known = conditions(setting, places)
@@ -379,7 +379,7 @@ ELUSIVE = (
         fixed=((6, (1.0,)), (7, (0.0,))),
     ),
 )
-"""Free periods, memory, new zeros, and what nobody records."""
+"""Faults of free periods, memory, new zeros, and unrecorded quantities."""
 
 UNLISTED: dict[str, Fault] = {fault.name: fault for fault in (*_ALONE, *INTERPLAY, *ELUSIVE)}
 """Eleven kinds of one quantity at one place, those that interplay and those that elude, by name."""

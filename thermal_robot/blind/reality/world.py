@@ -75,12 +75,12 @@ class Joint:
 
     @property
     def movable(self) -> bool:
-        """Whether it is not fixed."""
+        """Whether the joint is not fixed."""
         return self.kind in ("revolute", "continuous", "prismatic")
 
     @property
     def commanded(self) -> bool:
-        """Whether it is movable, commanded and not mimicking."""
+        """Whether the joint is movable and mimics no other."""
         return self.movable and self.mimic is None
 
     @property

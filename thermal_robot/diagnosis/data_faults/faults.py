@@ -128,7 +128,7 @@ class Readings:
 
     @property
     def maps_place(self) -> bool:
-        """Whether the target's place is known, or :meth:`relaxed` fits it: a lower bound for rigid motions."""
+        """Whether :meth:`relaxed` bounds rigid motions from below: the target's place is known, or rows can fit it."""
         known = self.simulated_position is not None or self.tool_known
         return known or self.q.shape[-2] >= settings.FEWEST_RELAXED
 
@@ -178,12 +178,12 @@ def stacked(several: Sequence[Readings]) -> Readings:
 
 
 def _norm2(vectors: Array) -> Array:
-    """(...) squared lengths of vectors (..., 3)."""
+    """Squared lengths (...) of vectors (..., 3)."""
     return np.asarray((vectors * vectors).sum(axis=-1))
 
 
 Repair = Callable[[Readings, Rows], Readings]
-"""Readings, and the (N,) rows that the fault struck; returns the readings mended in these rows."""
+"""Function from readings and the affected rows (N,) to the readings repaired in these rows."""
 Numbered = Callable[[float], tuple[str, Repair]]
 """Place and repair of a fault by its number."""
 
@@ -200,7 +200,7 @@ class Proposal:
 
 
 Fault = tuple[Proposal, ...]
-"""What is wrong with a table: nothing, one fault, or two at once, mended one after the other."""
+"""Fault hypothesis of a table: none, one fault, or two at once, repaired one after the other."""
 
 
 class Family(NamedTuple):
@@ -262,11 +262,11 @@ def _turning(readings: Readings) -> list[int]:
 # --- joints ---
 
 _USUAL: dict[tuple[int, tuple[int, ...]], str] = {(6, (0, 3, 5)): " (as a KUKA's do)"}
-"""By the number of joints and those that are reversed: whose habit that is."""
+"""Robot makes that count some joints the other way, by the number of joints and those reversed."""
 
 
 def _reversed(readings: Readings, several: bool) -> Iterator[tuple[str, Repair, frozenset[str]]]:
-    """Candidates of joints with the opposite sign, small sets first; of many joints small sets alone."""
+    """Candidates of joints with reversed sign, small sets first; of many joints small sets alone."""
     count = readings.robot.n
     most = count if count <= settings.MOST_PATTERNS else settings.FEW_REVERSED
     for size in range(2, most + 1) if several else (1,):
@@ -278,7 +278,7 @@ def _reversed(readings: Readings, several: bool) -> Iterator[tuple[str, Repair, 
 
 
 def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
-    """Candidates of coupled joints: joint angles counted from the ground, and wrists whose motors drive two joints."""
+    """Candidates of coupled joints: a column is the sum or difference of the angles of two neighbouring joints."""
     names = readings.robot.joint_names
     for j, k in permutations(_turning(readings), 2):
         if abs(j - k) == 1:
@@ -364,7 +364,7 @@ _ANGLES = {
     "ZYZ": "rotations about turning z y z",
     "rotvec": "a rotation vector",
 }
-"""Three numbers that tell a turn, as SciPy names them, and in words."""
+"""Conventions of orientations of three numbers: SciPy's name and words."""
 
 
 def _converted(taken: str, meant: str, factor: float = 1.0) -> Repair:

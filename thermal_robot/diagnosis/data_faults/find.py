@@ -44,12 +44,12 @@ from thermal_robot.inference.settings import LEVEL
 
 
 def evenly(rows: NDArray[np.int64], count: int = settings.SAMPLED) -> NDArray[np.int64]:
-    """Take that many rows, evenly spaced; rows repeat where there are fewer."""
+    """Systematic sample of ``count`` rows, evenly spaced; rows repeat where there are fewer."""
     return np.asarray(rows[np.linspace(0, len(rows) - 1, count).round().astype(np.int64)])
 
 
 def spread(rows: NDArray[np.int64], most: int = settings.SAMPLED) -> NDArray[np.int64]:
-    """Take at most that many rows, evenly spaced."""
+    """Systematic sample of at most ``most`` rows, evenly spaced."""
     return evenly(rows, min(len(rows), most))
 
 
@@ -160,7 +160,7 @@ class AffectedRows:
 
 
 def part_of(readings: Readings, begun: BaseAndTarget) -> AffectedRows | None:
-    """Outlying rows where they are many but a minority; else ``None``."""
+    """Outlying rows of a robust registration where they are many but a minority; else ``None``."""
     frames, distance = begun, readings.distance(begun)
     for _ in range(settings.PART_ROUNDS):
         near = np.flatnonzero(~_strays(readings, distance))
@@ -202,10 +202,10 @@ def consensus(sample: Readings) -> BaseAndTarget:
 
 
 def mixture(struck: AffectedRows) -> AffectedRows | None:
-    """Two-component mixtures of unrepaired and repaired rows, one for each fault; returns the best one's repaired rows.
+    """Two-component mixture of unrepaired and repaired rows for each fault; returns the best one's repaired rows.
 
-    For a robot whose own errors are not small beside the fault: no row strays far. The rows are told anew in each
-    round. Each row may choose, which counts against the fault as one bit.
+    It serves robots whose own errors are not small beside the fault, so that no row is an outlier. Rows are classified
+    anew in each round; the choice counts against the fault as one bit a row.
     """
     readings = window(struck.readings)
     rows, every = spread(np.arange(len(readings.q)), settings.RELAXED), np.ones(len(readings.q), dtype=bool)

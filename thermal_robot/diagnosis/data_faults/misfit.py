@@ -164,7 +164,7 @@ class Recalibrated:
         return float(wide * np.log1p(away / wide).sum() + state @ self.prior @ state)
 
     def _columns(self) -> Array:
-        """(N, m, B (6 + m) + 6 J) Jacobian of the prediction by base and target of each part, and by each joint."""
+        """Jacobian (N, m, B (6 + m) + 6 J) of the prediction by base and target of each part, and by each joint."""
         frames, point, gap = self._seen
         rows, measures = gap.shape
         columns = np.zeros((rows, measures, len(self.bases), 6 + measures))
@@ -391,7 +391,7 @@ def another_motion(fitted: Fit) -> Misfit | None:
 
 
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
-    """Conclusion if its exact model is the one that was compared; else the frames alone, with the reason."""
+    """Conclusion of a converged Gauss-Newton fit; else that of the frames alone, with the reason."""
     note = unconverged(last.fit)
     return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
@@ -406,7 +406,7 @@ def frames_alone(
 
 
 def unconverged(fit: Fit) -> str:
-    """Sentence if the exact model of a fit is not the one that was compared and held out; else empty.
+    """Sentence if Gauss-Newton ended away from the linearised model that was compared; else empty.
 
     Combinations are compared, and rows held out, with the model linearised at the exact one. Where Gauss-Newton ends
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
