@@ -20,6 +20,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_every_part_is_on_the_page(folder):
     text = (folder / "performance.md").read_text(encoding="utf-8")
     kept = json.loads((folder / "performance.json").read_text(encoding="utf-8"))
@@ -33,6 +34,7 @@ def test_every_part_is_on_the_page(folder):
         assert (folder / picture).stat().st_size < 100_000
 
 
+@pytest.mark.slow
 def test_a_peer_that_is_not_there_is_told(folder):
     table = json.loads((folder / "performance.json").read_text(encoding="utf-8"))["calibration"]["tables"][0]
     names = [row[0] for row in table]
@@ -43,6 +45,7 @@ def test_a_peer_that_is_not_there_is_told(folder):
     assert "`tr.calibrate`" in names
 
 
+@pytest.mark.slow
 def test_parts_that_are_not_asked_for_stay(folder, tmp_path):
     kept = page.read(folder)
     page.write(tmp_path, kept)

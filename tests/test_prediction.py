@@ -33,6 +33,7 @@ def test_a_step_of_frames_and_parameters_moves_the_prediction_as_its_columns_say
         np.testing.assert_allclose((there - here) / step[p], moved[:, :, p], rtol=0, atol=2e-3 * np.abs(moved).max())
 
 
+@pytest.mark.slow
 def test_deviations_are_those_of_refits_with_fresh_noise(warm):
     """The spread of many fits to the same robot, each with noise of its own, is what one of them says of itself."""
     campaign, found, fresh = warm

@@ -156,6 +156,7 @@ def test_a_slip_starts_once_and_stays(made, measured_campaigns):
     assert not (folder / "fresh.csv").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("campaign", ["ur5_jacobi", "ipa_ur10_a"])
 def test_a_hidden_temperature_is_in_the_positions_only(made, campaign):
     told, _, _ = made("temperature", campaign)

@@ -386,6 +386,7 @@ def test_an_altered_file_is_refused(sealed):
 # ---- the whole command, and the golden answers
 
 
+@pytest.mark.slow
 def test_two_robots_that_nobody_has_seen_are_examined(tmp_path, capsys):
     pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
     options = ["--seed", "1", "--count", "single=1", "null=1", "real=0", "--effect", "drift", "--workers", "1"]

@@ -60,6 +60,7 @@ def test_the_common_frame_has_the_principal_axes_and_is_right_handed():
     np.testing.assert_allclose(np.linalg.det(quaternion_to_rotation(found.orientation)), 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("targets", "missing"), [(3, ()), (5, ()), (5, (0, 3))], ids=["three", "five", "three of five"]
 )

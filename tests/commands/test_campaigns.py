@@ -105,6 +105,7 @@ def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(run, folder, d
     assert of_poses["gap"]["orientation"]["rms_after"] < of_poses["gap"]["orientation"]["rms_before"]
 
 
+@pytest.mark.slow
 def test_only_and_without_choose_among_the_effects(run, folder, tmp_path):
     two = ["thermal_elongation", "joint_gain"]
     asked = ("diagnose", folder, "--json", "-", "--only")

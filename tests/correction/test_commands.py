@@ -171,6 +171,7 @@ def test_a_data_frame_comes_back_with_commands_in_its_own_units(rv_m2):
     assert (answer["part"] == "a bolt").all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
 def test_poses_in_space_are_reached_by_the_real_target(source):
     robot = load_robot(source, "tool0")

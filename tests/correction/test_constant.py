@@ -311,6 +311,7 @@ def test_a_zero_that_the_data_leave_as_wide_as_it_was_is_not_determined(rv_m2):
     assert not zero_offsets(wide(model, std, np.full(5, 1e-2)), min_sigma=1e3)["add_to_command"].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [["joint_offset"], ["geometric", "joint_offset"]])
 def test_what_a_diagnosis_does_not_identify_is_not_to_be_entered(effects):
     zeros = {"joint_offset": {"shoulder_lift_joint": 2e-3, "elbow_joint": -1.5e-3}}

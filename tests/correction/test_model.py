@@ -142,6 +142,7 @@ def test_samples_are_made_of_arrays_and_conditions(rv_m2):
             model.samples_at(np.zeros((3, 5)), conditions)
 
 
+@pytest.mark.slow
 def test_an_order_is_taken_at_its_word_unless_it_starts_again(rv_m2):
     """Of a campaign that drifts with the order of measurement, which starts at 0."""
 
@@ -189,6 +190,7 @@ def test_orientation_is_predicted_where_it_was_measured(arm):
     assert found.gap.orientation_after < 0.7 * found.gap.orientation_before
 
 
+@pytest.mark.slow
 def test_orientation_does_not_depend_on_the_sign_of_quaternions(rv_m2):
     campaign, _, _ = simulate(rv_m2, ["joint_offset"], seed=5, turning=TURNING)
     flipped = replace(campaign, orientation=campaign.orientation * np.where(np.arange(120) % 2, 1.0, -1.0)[:, None])

@@ -279,6 +279,7 @@ def test_geometry_that_is_found_mends_the_simulator_where_nothing_was_measured()
         assert gap(with_simulator(rest, calibrated_mjcf(robot, text))) < 1.3 * np.sqrt(3.0) * NOISE, sigma
 
 
+@pytest.mark.slow
 def test_a_simulator_is_mended_again_and_again():
     """What the first calibration missed, or came later, is added to it: tool and zeros."""
     arm, text = load_arm("rv_m2"), mjcf_of_urdf(load_arm("rv_m2").urdf)

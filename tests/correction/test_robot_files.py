@@ -249,6 +249,7 @@ def test_a_table_that_is_written_leads_to_the_models_poses(arm, configurations):
         leads_as_the_model(displaced(arm, seed=2, size=size), configurations(arm, 5, seed=3))
 
 
+@pytest.mark.slow
 @given(arms())
 def test_any_arm_has_a_table_and_is_written_and_read(arm):
     robot = displaced(arm, seed=8)

@@ -105,6 +105,7 @@ def test_fresh_poses_are_predicted(found):
     assert np.sqrt((away**2).sum(axis=1).mean()) < 1.5 * TRACKER * np.sqrt(3.0)
 
 
+@pytest.mark.slow
 def test_deviations_are_true():
     """Of parameters told without a prior, the squares of their errors over their variances are one on average."""
     squares = []

@@ -353,6 +353,7 @@ def warm(rv_m2):
     return found
 
 
+@pytest.mark.slow
 def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate_and_the_right_one_does_not(warm):
     # a correction that interpolates leaves more where it must extrapolate
     for name, factor in (("session", 1.2), ("temperature", 1.15)):

@@ -50,6 +50,7 @@ def test_noise_stated_ten_times_too_large_is_remarked(clean):
     assert any("stated too large" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 def test_encoders_that_deny_the_commands_are_a_fault_of_the_log(rv_m2):
     clean = simulate(rv_m2, ["drift"], seed=1)[0]
     read = clean.q[:, 2] + 1e-4

@@ -328,6 +328,7 @@ def test_several_targets_of_each_pose_tell_the_effect(arm, effects, lost):
     assert found["gap"]["rms_after"] == pytest.approx(found["gap"]["noise_floor"], rel=0.15)
 
 
+@pytest.mark.slow
 @two_arms
 def test_several_targets_of_one_visit_are_no_visits(arm):
     """A joint that scatters anew at each visit moves all targets at once: it is found, and its size is right."""

@@ -71,6 +71,7 @@ def test_large_effects_are_corrected_to_the_nanometre(arm, sizes):
     assert not found.unexplained.flagged
 
 
+@pytest.mark.slow
 def test_large_effects_are_corrected_in_poses_too(rv_m2):
     campaign, fresh, place = measured(rv_m2, {"geometric": 5e-3}, seed=2, noise=1e-9, turning=1e-9)
     found = diagnose(campaign)

@@ -128,6 +128,7 @@ def test_the_origin_and_the_unit_of_time_do_not_matter(rv_m2):
     assert found.gap.rms_after == pytest.approx(plain.gap.rms_after, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gross", "explained"), some([(0.2, True), (0.45, False)], 2))
 def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
     right = 0
@@ -144,6 +145,7 @@ def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
     assert right >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ["awkward-from-base"], indirect=True)
 def test_an_arm_with_sliding_joints_is_diagnosed_like_any_other(arm):
     alone = ["joint_offset", "joint_compliance", "thermal_elongation", "backlash"]
@@ -159,6 +161,7 @@ def test_an_arm_with_sliding_joints_is_diagnosed_like_any_other(arm):
     assert sum(right) >= len(alone) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
 def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, turning):
     shift = np.array([1e-3, -5e-4, 2e-4])
@@ -184,12 +187,14 @@ def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, 
             assert abs(estimate.value - true) < 5.0 * estimate.std
 
 
+@pytest.mark.slow
 def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(rv_m2):
     several = simulate(rv_m2, ["joint_offset"], seed=0, places=["joint_2", "joint_3", "joint_4"])[0]
     assert diagnose(several).verdict == ("joint_offset",)
     assert diagnose(replace(several, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
 
 
+@pytest.mark.slow
 def test_a_prior_that_rules_one_joint_out_leaves_it_to_the_placement_there(offset):
     """One place at fault needs no geometry of thirty numbers: a zero is a turn of what carries the joint."""
     plain, told = diagnose(offset), diagnose(replace(offset, priors={"joint_offset": 1e-9}))
@@ -207,6 +212,7 @@ def test_withholding_everything_is_refused(offset):
         diagnose(offset, only=["drift"], without=["drift"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turning", some((None, 3e-5), 2), ids=["positions", "poses"])
 @pytest.mark.parametrize("only", [("joint_offset",), ("tool_frame",)])
 def test_where_base_and_tool_are_known_one_effect_is_enough_to_ask_for(rv_m2, only, turning):
@@ -256,6 +262,7 @@ def test_a_fit_that_runs_away_is_not_delivered(campaign, monkeypatch):
     assert found.gap.held_out.rms_after == pytest.approx(found.gap.rms_after, rel=0.5)
 
 
+@pytest.mark.slow
 def test_large_errors_are_told_of_the_model_that_is_saved(rv_m2):
     """Zeros that are off by ten degrees: whatever is delivered, the figure is that of the model."""
     q = simulate(rv_m2, samples=60, seed=4)[0]

@@ -85,6 +85,7 @@ def test_the_order_of_rows_does_not_matter_where_a_column_tells_it(told):
     agree(said, answer(diagnose(campaign.take(np.random.default_rng(2).permutation(campaign.samples)))))
 
 
+@pytest.mark.slow
 def test_without_one_the_order_of_rows_chooses_the_blocks_that_are_held_out_and_nothing_else(rv_m2):
     """Rows stand in the order of measurement where nothing else says it: blocks are of consecutive rows."""
     campaign = simulate(rv_m2, ["thermal_elongation", "backlash"], seed=4)[0].drop_covariate("time")
@@ -142,6 +143,7 @@ def test_a_larger_arm_with_a_larger_gap_has_the_same_faults(told, s):
 ANGLES = ("joint_offset", "joint_gain", "transmission_error", "backlash", "joint_compliance", "thermal_elongation")
 
 
+@pytest.mark.slow
 def test_angles_and_strains_scale_exactly(rv_m2):
     """With effects whose parameters have no metre in them."""
     campaign = simulate(rv_m2, ["thermal_elongation", "backlash"], seed=4)[0]

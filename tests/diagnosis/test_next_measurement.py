@@ -149,6 +149,7 @@ def figures(rv_m2):
     return bayes_factors(rv_m2, SEEDS)
 
 
+@pytest.mark.slow
 def test_proposed_samples_speak_for_the_truth_more_than_random_ones(rv_m2):
     """Two campaigns of each case: the slow test below has the figures, this one notices when they are lost."""
     rows = np.vstack(list(bayes_factors(rv_m2, range(2)).values()))

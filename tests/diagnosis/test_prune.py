@@ -94,6 +94,7 @@ def test_what_fits_noise_alone_harms_and_is_less_probable_than_before(rv_m2):
     assert max(gone) < settings.PRIOR_PROBABILITY
 
 
+@pytest.mark.slow
 def test_the_worst_goes_first_and_what_is_at_work_stays(rv_m2):
     """An expansion at work, and beside it geometry and a law that follow the noise of thirty rows."""
     for seed in range(4):
@@ -260,6 +261,7 @@ def test_an_effect_of_twice_the_noise_helps_and_stays(rv_m2, name):
         assert pruned(known, lambda _: None) == (known, {})
 
 
+@pytest.mark.slow
 def test_of_two_effects_each_is_asked_beside_the_other(rv_m2):
     campaign = simulate(rv_m2, ["thermal_elongation", "backlash"], seed=1, samples=75)[0]
     both = held_out_tests(fit(campaign, choose((), (), ())))

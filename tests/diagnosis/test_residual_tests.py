@@ -24,6 +24,7 @@ from thermal_robot.inference.registration import register
 from thermal_robot.observations import Frames, observe
 
 
+@pytest.mark.slow
 def test_rows_set_aside_one_after_the_other_are_no_gross_errors(rv_m2):
     """A target that was knocked late leaves few rows, which look spoilt; spoilt rows do not follow each other."""
     plain = simulate(rv_m2, samples=100, seed=5)[0]
@@ -128,6 +129,7 @@ def repeated(campaign, times, seed, noise=20e-6):
     return replace(again, position=noisy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_repeated_commands_without_a_fault_leave_nothing_unexplained(clean, stated):
     campaigns = [repeated(clean, 2, seed) for seed in range(4)]
@@ -219,6 +221,7 @@ def at_random(count):
     return lambda campaign, rng: rng.permutation(campaign.samples)[:count]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 3, 5])
 def test_a_few_rows_anywhere_are_gross_errors(rv_m2, count):
     for seed in range(6):

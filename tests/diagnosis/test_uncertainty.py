@@ -50,6 +50,7 @@ def off(rv_m2):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_the_posterior_is_five_times_too_sure_where_neighbours_err_alike(off):
     """What is smooth enough to be taken for a gain cannot be told from one: two thirds too sure is what is left."""
     alone, wider = np.sqrt((off**2).mean(axis=0))
@@ -119,6 +120,7 @@ def test_fresh_rows_of_simulated_robots():
     assert min(noisy) > 0.80, noisy
 
 
+@pytest.mark.slow
 def test_noisy_rows_beside_quiet_ones_make_predictions_no_less_certain(rv_m2):
     """What is no noise is told by the quiet rows; a fresh measurement has the noise of all rows."""
     campaign, _, (fresh, _) = simulate(rv_m2, ["joint_offset"], samples=200, seed=7, fresh=50)

@@ -97,6 +97,7 @@ def test_the_order_of_campaigns_does_not_matter_but_for_since():
     assert places(tr.compare(days[0], days[2], days[1], names=["a", "c", "b"])) == [("joint_offset", "joint_3", "")]
 
 
+@pytest.mark.slow
 def test_an_effect_of_another_size_in_each_campaign_loses_its_name():
     days = [diagnosed(seed, gains=gain) for seed, gain in ((4, 2e-4), (5, 8e-4), (6, 3.2e-3))]
     found = tr.compare(*days, names=["a", "b", "c"])

@@ -71,6 +71,7 @@ def test_two_places_may_change_at_two_times():
     np.testing.assert_allclose(found.values, days, atol=0.12)
 
 
+@pytest.mark.slow
 def test_chance_makes_no_change_more_often_than_stated():
     rng = np.random.default_rng(0)
     truths = rng.normal(size=(150, 4))
@@ -78,6 +79,7 @@ def test_chance_makes_no_change_more_often_than_stated():
     assert sum(bool(fitted([truth, truth], rng).changes) for truth in truths) <= 8
 
 
+@pytest.mark.slow
 def test_a_change_of_five_deviations_is_found_and_nothing_else():
     rng, right = np.random.default_rng(0), 0
     for _ in range(60):
@@ -322,6 +324,7 @@ def test_a_model_says_what_the_rows_said_without_the_prior(times):
         np.testing.assert_allclose(getattr(model.some(own), name), true, atol=1e-4 * np.abs(true).max())
 
 
+@pytest.mark.slow
 def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_without_effects_nothing():
     robot = load_robot("builtin:rv_m2", "tool0")
     one = tr.diagnose(tr.simulate(robot, {"joint_gain": {"joint_3": 3e-3}}, rows=50, noise=NOISE, seed=1))

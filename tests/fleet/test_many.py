@@ -60,6 +60,7 @@ def test_a_campaign_that_cannot_be_read_is_a_row_with_its_reason(fleet, fleet_fo
     assert str(fleet).startswith("6 campaigns of 6 robots: 5 diagnosed, 1 failed.")
 
 
+@pytest.mark.slow
 def test_one_worker_writes_the_same_bytes(fleet, fleet_folder, tmp_path):
     alone = tr.diagnose_many(fleet_folder, tmp_path, labels=["hall", "robot"], only=reversed(ONLY), workers=1)
     assert alone.table.read_bytes() == fleet.table.read_bytes()
@@ -82,6 +83,7 @@ def test_what_is_done_is_not_done_again(fleet, fleet_folder, tmp_path, monkeypat
         tr.diagnose_many(fleet_folder, tmp_path, only=["backlash"])
 
 
+@pytest.mark.slow
 def test_what_has_changed_is_done_anew(rv_m2, tmp_path):
     root = write_fleet(rv_m2, tmp_path / "all", 2)
     first = tr.diagnose_many(root, tmp_path / "out", only=ONLY, workers=1).to_frame()
@@ -108,6 +110,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "ending", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGKILL], ids=["interrupted", "killed"]
 )
@@ -143,6 +146,7 @@ def test_only_what_the_program_failed_at_is_tried_again(rv_m2, tmp_path, monkeyp
     assert rows == [{"outcome": "failed", "reason": "the program failed: ZeroDivisionError: in measurements.csv"}]
 
 
+@pytest.mark.slow
 def test_a_campaign_that_takes_too_long_is_a_row_that_is_tried_again(rv_m2, tmp_path):
     write_robot(rv_m2, tmp_path / "in" / "arm", seed=1)
     late = tr.diagnose_many(tmp_path / "in", tmp_path / "out", only=ONLY, workers=1, time_limit=0.01)

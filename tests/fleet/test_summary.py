@@ -174,6 +174,7 @@ def test_a_robot_that_stands_out_is_named_against_its_own_hall(tmp_path):
     assert [a.usual for a in apart] == pytest.approx([8.0, 0.0], abs=2.0)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_shared_little_is_said(tmp_path):
     summaries = [of_robots(tmp_path, [7, seed]) for seed in range(60)]
     assert sum(len(s.shared) for s in summaries) <= 3  # of 360 parameters

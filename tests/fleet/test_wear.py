@@ -55,6 +55,7 @@ def test_the_jump_is_found(found):
     assert {w.place for w in found.parameters if not w.comparable} == {"joint_1", "joint_5"}
 
 
+@pytest.mark.slow
 def test_pairs_may_come_in_any_order_and_a_shift_of_all_dates_does_not_matter(campaigns, found):
     pairs = [(DATES[k].isoformat(), campaigns[k]) for k in (2, 0, 3, 1)]
     assert wear(pairs, effects="joint_offset", limits={"joint_offset": 2e-3}).to_dict() == found.to_dict()
@@ -62,6 +63,7 @@ def test_pairs_may_come_in_any_order_and_a_shift_of_all_dates_does_not_matter(ca
     assert [(w.kinds, w.values) for w in later.parameters] == [(w.kinds, w.values) for w in found.parameters]
 
 
+@pytest.mark.slow
 def test_diagnoses_do_as_well(campaigns):
     diagnoses = [diagnose(campaign, only=["joint_offset"]) for campaign in campaigns]
     undated = wear(diagnoses)
@@ -178,6 +180,7 @@ def test_zeros_are_followed_whatever_was_named_and_nil_where_unknown_frames_take
     assert [effect for effect, _ in found.keys] == ["joint_offset"] * 5
 
 
+@pytest.mark.slow
 def test_an_effect_that_one_campaign_cannot_show_is_nil_there(rv_m2):
     days = [campaign(rv_m2, seed, thermal_elongation=2e-5 * (seed < 3)) for seed in (1, 2, 3)]
     days[2] = replace(days[2], covariates={k: v for k, v in days[2].covariates.items() if k != "temperature"})

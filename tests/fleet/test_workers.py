@@ -151,6 +151,7 @@ def secured(tmp_path):
         process.wait(30)
 
 
+@pytest.mark.slow
 def test_a_scheduler_behind_tls_takes_who_has_its_files_and_nobody_else(secured, monkeypatch):
     import dask
 

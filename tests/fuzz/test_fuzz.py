@@ -57,6 +57,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.slow
 def test_every_outcome_is_told_from_the_others(tmp_path):
     assert set(BROKEN) == set(OUTCOMES)
     worker = Worker(tmp_path / "scratch")

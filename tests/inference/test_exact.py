@@ -166,6 +166,7 @@ def evidence(explanation, seen, effect):
     return Search(gram(linear, downweighted(explanation)), [0.0]).evaluate((0,)).log_evidence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])
 @pytest.mark.parametrize("ratio", [30.0, pytest.param(3.0, marks=pytest.mark.slow)])
 def test_no_constant_of_a_fine_grid_is_much_better(kind, constant, attribute, ratio):

@@ -82,6 +82,7 @@ def spoilt_in_few(name, seed, count, size, whole):
     return data.take(rng.permutation(90))
 
 
+@pytest.mark.slow
 def test_scatter_that_a_few_rows_carry_is_none():
     """Neither some bad visits nor one or two bad poses make a joint wear, or its encoder coarse."""
     named, carried = 0, 0

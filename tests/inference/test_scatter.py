@@ -63,6 +63,7 @@ def test_a_joint_that_scatters_is_found(robot, ratio, setting):
     assert right >= 23
 
 
+@pytest.mark.slow
 def test_interval_and_estimate_are_honest(robot):
     inside, variances = 0, []
     for seed in range(100):

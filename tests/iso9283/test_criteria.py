@@ -133,6 +133,7 @@ def test_an_instrument_alone_shows_what_its_noise_does():
     assert of_noise(2e-5) == pytest.approx(2e-5 * SPHERE, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycles", [5, 10, 30])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_nineteen_of_twenty_intervals_hold_the_repeatability_of_endlessly_many_cycles(shape, cycles):

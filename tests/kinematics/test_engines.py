@@ -139,6 +139,7 @@ def test_a_point_of_each_row(engine, awkward, configurations):
         same(placements[i], reference.placement_sensitivities(awkward, q[i], point=points[i])[0])
 
 
+@pytest.mark.slow
 @each_call
 def test_neither_neighbours_nor_places_of_rows_matter(fast, awkward, configurations, call, shape):
     q = configurations(awkward, MANY)

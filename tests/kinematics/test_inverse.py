@@ -111,6 +111,7 @@ def test_shapes_that_do_not_fit_are_refused(rv_m2):
         inverse_kinematics(rv_m2, tool_poses(rv_m2, q), q[:, :4])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rv_m2", "ur10", "panda"])
 def test_poses_are_found_from_anywhere(name):
     arm = load_arm(name)

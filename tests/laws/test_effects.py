@@ -140,7 +140,7 @@ def test_every_setting_passes_the_gate_does_nothing_by_zeros_and_is_drawn_agains
         assert all(what[0] for what in found if what)
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"])
+@pytest.mark.parametrize("arm", ["rv_m2", *(pytest.param(arm, marks=pytest.mark.slow) for arm in ("ur10", "panda"))])
 @every_effect
 def test_reads_names_exactly_what_changes_the_response(arm, name):
     campaign = campaign_of(arm, name=name)

@@ -70,6 +70,7 @@ def judged(robot, seeds):
     assert max(lone) < ALLOWED, found
 
 
+@pytest.mark.slow
 def test_a_law_leaves_no_more_than_registration_far_away(rv_m2):
     judged(rv_m2, range(100, 104))
 

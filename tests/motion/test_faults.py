@@ -59,6 +59,7 @@ def test_a_joint_that_is_turned_round_is_turned_back(along):
     np.testing.assert_allclose(found.log.motions[0].velocity.values, sound.motions[0].velocity.values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("motions", "rate"), [(3, 1.02), (10, 1.02), (10, 0.99), (6, 1.003)])
 def test_the_rate_of_a_clock_is_recovered_within_its_error(motions, rate):
     state, command = tables(motions, seconds=40.0)
@@ -181,6 +182,7 @@ def test_the_servo_arm_has_the_unit_fault_of_its_gripper_and_no_other(servo_arm)
     assert found.joints == servo_arm.joints
 
 
+@pytest.mark.slow
 def test_the_servo_arm_with_stamps_of_its_own_is_sound_but_a_slow_clock_is_found(servo_arm):
     def stamped(motion, rate):
         own = Channel(motion.command.time + 1e-4, motion.command.values)

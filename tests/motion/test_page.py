@@ -36,6 +36,7 @@ def test_the_page_says_what_the_text_says(page):
         assert said in words
 
 
+@pytest.mark.slow
 def test_equal_diagnoses_give_equal_pages():
     assert motion_html(found()) == motion_html(found())
 

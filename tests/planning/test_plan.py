@@ -72,6 +72,7 @@ def worst(expected):
     return max(p.sigma / p.size for name in DETERMINED for p in expected[name].parameters)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
 def test_a_plan_tells_more_than_random_rows(source):
     robot, ratios = load_robot(source, "tool0"), []

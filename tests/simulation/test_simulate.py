@@ -233,6 +233,7 @@ def test_a_robot_that_is_warm_all_the_time_is_larger_by_the_same_share(rv_m2):
     np.testing.assert_allclose(warm.position, (1.0 + 12e-5) * cold.position, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_page_prints_what_it_planted(capsys, diagnosed_once, monkeypatch):
     monkeypatch.setattr(thermal_robot, "diagnose", diagnosed_once)
     code = [text for language, text in blocks(ROOT / "docs" / "simulation.md") if language == "python"]

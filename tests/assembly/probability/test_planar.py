@@ -74,6 +74,7 @@ def both(monkeypatch, *case):
     return found
 
 
+@pytest.mark.slow
 @needs_loops
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0, 1e4, 1e8])
 @pytest.mark.parametrize("reach", [0.01, 1.0, 3.0, 12.0], ids="{}_deviations".format)

@@ -75,6 +75,7 @@ def test_a_known_offset_is_recovered_to_a_tenth_of_a_millisecond(rv_m2, offset):
     assert found.left < 2 * np.sqrt(3) * 5e-5
 
 
+@pytest.mark.slow
 def test_the_deviation_is_honest_where_the_robot_is_bent(rv_m2):
     """Errors of the robot that the fit does not know, of a millimetre, spoil the offset by no more than is told."""
     errors, told = [], []

@@ -175,6 +175,7 @@ def test_jacobi(name, tmp_path):
     np.testing.assert_allclose(ours.q, test.q, atol=6e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", IPA)
 def test_ipa(name, tmp_path):
     ours, known = taken("ipa_ur10", f"ipa_ur10/{IPA[name]}.csv", name, tmp_path / "c")

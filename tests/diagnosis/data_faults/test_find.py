@@ -52,6 +52,7 @@ def test_a_sound_table_has_no_fault(name, seed):
     assert data_fault(sound) is None
 
 
+@pytest.mark.slow
 def test_measurements_in_no_order_are_mended_by_nothing(sound):
     shuffled = np.random.default_rng(0).permutation(sound.samples)
     assert data_fault(measured_at(sound, shuffled)) is None
@@ -148,6 +149,7 @@ PAIRS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pair", "seed"), some(((pair, seed) for seed in (1, 2) for pair in PAIRS), 2))
 def test_two_faults_at_once_are_named_in_one_sentence(pair, seed):
     rng = np.random.default_rng(seed)

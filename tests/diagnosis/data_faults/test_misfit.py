@@ -84,6 +84,7 @@ def test_a_sound_table_is_usable(sound):
     assert found.to_dict()["verdict"]["usable"] is True
 
 
+@pytest.mark.slow
 def test_orientations_alone_can_be_a_misfit(rv_m2):
     poses = simulate(rv_m2, samples=40, seed=2, turning=3e-5)[0]
     rng = np.random.default_rng(1)
