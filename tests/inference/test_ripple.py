@@ -66,6 +66,16 @@ def test_a_law_that_is_a_wave_of_its_own_joint_is_ripple(rv_m2):
     assert ripple.share == pytest.approx(wave.share)
 
 
+@pytest.mark.parametrize("order", [26.6, 26.63])
+def test_a_wave_that_ripple_holds_is_not_added_twice(rv_m2, order):
+    found = fit(rippling(rv_m2, JointRipple(), (), 2), choose(only=("joint_offset", "joint_ripple")))
+    held = JointRipple().having("joint_1", 26.6, 1.0).having("joint_2", 26.6, 1.0)
+    rippled = replace(found, effects=((held, np.zeros(4)),))
+    wave = Discovered(place="joint_2", quantity="joint_2", shape="harmonic", marks=(order,))
+    assert as_ripple(wave, rippled) == held
+    assert as_ripple(replace(wave, marks=(28.0,)), rippled).orders == (26.6, 26.6, 28.0)
+
+
 @pytest.mark.parametrize(
     "other", [{"quantity": "joint_1"}, {"kind": "link"}, {"shape": "smooth", "marks": ()}, {"marks": (1.5,)}]
 )

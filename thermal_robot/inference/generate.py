@@ -490,7 +490,8 @@ def _holds(grid: Array, order: float) -> bool:
 def as_ripple(law: Discovered, fit: Fit) -> JointRipple | None:
     """Ripple of a fit with one wave more: that of a law that is a harmonic of its joint's own position.
 
-    ``None`` for other laws, where ripple is no candidate, and for orders that are no ripple's.
+    The ripple itself where it has this wave; ``None`` for other laws, where ripple is no candidate, and for orders that
+    are no ripple's.
     """
     is_wave = (law.kind, law.shape, law.follows, law.of) == ("joint", "harmonic", law.place, "")
     if not is_wave or JointRipple.name not in fit.variants:
@@ -498,7 +499,11 @@ def as_ripple(law: Discovered, fit: Fit) -> JointRipple | None:
     robot, order = fit.campaign.robot, law.marks[0]
     j = robot.joint_names.index(law.place)
     grid = _orders(fit.campaign.q[:, j], robot.joint_types[j] == "prismatic")
-    return ripple_of(fit).having(law.place, order, law.tried) if _holds(grid, order) else None
+    held = ripple_of(fit)
+    known = (n for name, n in zip(held.joints, held.orders, strict=True) if name == law.place)
+    if any(abs(n - order) < settings.SAME_ORDER for n in known):
+        return held
+    return held.having(law.place, order, law.tried) if _holds(grid, order) else None
 
 
 def _unit_vectors(target: Target, moves: Array) -> tuple[Array, Array]:
