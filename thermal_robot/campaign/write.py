@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal_robot.campaign import names
-from thermal_robot.campaign.campaign import Campaign, table_columns
+from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
 from thermal_robot.campaign.settings import facts_in
@@ -111,14 +110,11 @@ def write_commands(
 
     ``derived`` are columns that are left out; where temperatures are ``recorded`` their cells stay empty, too.
     """
-    blank = [""] * commands.samples
-    table: dict[str, Sequence[str]] = {}
-    for name, values in table_columns(replace(commands, orientation=None)).items():
-        empty = recorded and names.split_name(name)[0] == "temperature"
-        if name not in derived:
-            table[name] = blank if empty else [f"{value:.9g}" for value in values]
+    frame = replace(commands, orientation=None).to_frame().drop(columns=list(derived), errors="ignore")
     measured = names.POSITION if commands.orientation is None else names.MEASURED
-    _write_csv(Path(path), {**table, **_labels(commands), **dict.fromkeys(measured, blank)})
+    noted = [name for name in frame if names.split_name(name)[0] == "temperature"] if recorded else []
+    frame = frame.assign(**dict.fromkeys((*noted, *measured), ""))
+    _write(Path(path), frame.to_csv, lineterminator="\n", float_format="%.9g")
 
 
 def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
@@ -139,22 +135,13 @@ def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
 
 def write_table(campaign: Campaign, path: str | Path) -> None:
     """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
-    numbers = {
-        name: ["" if np.isnan(value) else repr(float(value)) for value in values]
-        for name, values in table_columns(campaign).items()
-    }
-    _write_csv(Path(path), {**numbers, **_labels(campaign)})
+    _write(Path(path), campaign.to_frame().to_csv, lineterminator="\n")
 
 
-def _labels(campaign: Campaign) -> dict[str, list[str]]:
-    return {name: labels.tolist() for name, labels in campaign.labels.items()}
-
-
-def _write_csv(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
-    with _writing(path), whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+def _write(path: Path, write: Callable[..., Any], **how: str) -> None:
+    """Write a data frame by one of its methods, as a whole or not at all."""
+    with _writing(path), whole(path) as place:
+        write(place, index=False, **how)
 
 
 def with_prediction(
@@ -228,13 +215,12 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
     if ending and ending not in TABLES:
         raise CampaignError(str(path), "is no table by its ending", found=ending, expected=", ".join(TABLES))
     try:
-        with _writing(Path(path)), whole(path) as place:
-            if ending in PARQUET:
-                predictions.to_parquet(place, index=False)
-            elif ending in WORKBOOKS:
-                predictions.to_excel(place, index=False)
-            else:
-                predictions.to_csv(place, index=False, lineterminator="\n")
+        if ending in PARQUET:
+            _write(Path(path), predictions.to_parquet)
+        elif ending in WORKBOOKS:
+            _write(Path(path), predictions.to_excel)
+        else:
+            _write(Path(path), predictions.to_csv, lineterminator="\n")
     except ImportError as error:
         raise without_library(str(path), ending) from error
 
