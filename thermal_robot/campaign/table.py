@@ -108,14 +108,18 @@ class Table:
             return ["" if np.isnan(value) else f"{value:.15g}" for value in cells]
         return ["" if cell.lower() in _EMPTY else cell for cell in cells]
 
-    def take(self, kept: NDArray[np.bool_]) -> Table:
-        """Subset of the rows, of (N,) booleans, with their numbers."""
-        index = np.flatnonzero(kept)
+    def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Table:
+        """Rows of (N,) booleans, or by their indices from 0, with their numbers."""
+        index = np.arange(len(self.rows))[chosen]
         columns: dict[str, Cells] = {
             name: cells[index] if isinstance(cells, np.ndarray) else [cells[int(i)] for i in index]
             for name, cells in self.columns.items()
         }
         return replace(self, columns=columns, rows=self.rows[index])
+
+    def numeric(self) -> dict[str, Array]:
+        """Return the columns that hold nothing but numbers, (N,) each, NaN for empty cells."""
+        return {name: self.numbers(name, gaps=True) for name in self.columns if self.first_text(name) is None}
 
     def frame(self, *, numbers: bool = False) -> pd.DataFrame:
         """Return the data frame of the cells, with ``numbers`` where a column has nothing else.
@@ -124,9 +128,7 @@ class Table:
         """
         import pandas as pd
 
-        asked = self.columns if numbers or self.decimal_comma else ()
-        plain = {name: self.numbers(name, gaps=True) for name in asked if self.first_text(name) is None}
-        return pd.DataFrame({**self.columns, **plain})
+        return pd.DataFrame({**self.columns, **(self.numeric() if numbers or self.decimal_comma else {})})
 
     def first_text(self, column: str) -> int | None:
         """Index of the first cell that is not a number, ``None`` for a numeric column."""
@@ -192,9 +194,6 @@ NO_TABLES = {
     **dict.fromkeys((".src", ".ls", ".mod", ".modx", ".tp"), "a robot's program"),
 }
 """Endings of files that people have beside a table and that hold none, and what they are."""
-NO_PARQUET = "Parquet files need pyarrow, which is not installed"
-WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
-WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
 TABLES = {".csv": "", **dict.fromkeys(PARQUET, "pyarrow"), ".xlsx": "openpyxl", ".ods": "odf"}
 """Endings of tables that are written, and the module that writes each."""
 TYPED = tuple(ending for ending, module in TABLES.items() if module)
@@ -243,14 +242,15 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
         raise CampaignError(file, problem, expected="the table of measurements")
     if path.stat().st_size > LARGEST_TABLE:
         raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
-    if what := NO_TABLES.get(path.suffix.lower()):
+    ending = path.suffix.lower()
+    if what := NO_TABLES.get(ending):
         expected = "CSV, Parquet, .xlsx, .ods or .mat; `thermal-robot import --help` lists what else is read"
         raise CampaignError(file, f"is {what} by its ending, and no table", found=path.suffix, expected=expected)
-    if path.suffix.lower() == MATLAB:
+    if ending == MATLAB:
         return _read_matlab(path)
-    if path.suffix.lower() in PARQUET:
+    if ending in PARQUET:
         return _read_parquet(path)
-    if path.suffix.lower() in WORKBOOKS:
+    if ending in WORKBOOKS:
         return _read_workbook(path, layout)
     try:
         encoding = _encoding(path)
@@ -266,10 +266,9 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
 
 def without_library(file: str, ending: str) -> CampaignError:
     """Error of a file whose ending needs a library that is not installed."""
-    if ending in PARQUET:
-        return CampaignError(file, NO_PARQUET, expected=WITH_PARQUET)
-    problem = f"workbooks need {WORKBOOKS[ending]}, which is not installed"
-    return CampaignError(file, problem, expected=WITH_EXCEL)
+    extra, library = ("parquet", "pyarrow") if ending in PARQUET else ("excel", WORKBOOKS[ending])
+    problem = f"{'Parquet files' if ending in PARQUET else 'workbooks'} need {library}, which is not installed"
+    return CampaignError(file, problem, expected=f'pip install "thermal-robot[{extra}]", or the table as CSV')
 
 
 def _encoding(path: Path) -> str:
@@ -435,12 +434,12 @@ def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[st
 
 
 def _separator(lines: Iterator[str]) -> str:
-    """Detect the separator in the header: white space where no other is in it."""
+    """Detect the separator in the first line: white space where no other is in it, nor in the next line."""
     held = (line for line in lines if line.strip())
     header, line = next(held, ""), next(held, "")
     parts = header.split()
     figures = all(_DECIMAL_COMMA.fullmatch(part) or "," not in part for part in parts)
-    blanks = len(parts) > 1 and figures and len(line.split()) == len(parts)
+    blanks = len(parts) > 1 and figures and len(line.split()) in (0, len(parts))
     return next((each for each in (";", "\t") if each in header), SPACE if blanks else ",")
 
 

@@ -179,6 +179,12 @@ SOUND = {
              "position": [[0.8, 0.2, 0.52], [1.00025, 0, 0.5005], [0.9, 0.1, 0.51], [1.00025, 0, 0.5005]]}, "",
         ) for line in LINE
     },
+    **{
+        f"points, decimal commas, {mark!r}": (
+            "points", {"p.txt": pointed().replace(".", ",").replace(" ", mark), "c.csv": commanded()}, RAD_MM,
+            {"q": IN_MM, "position": [[1.00025, 0, 0.5005], [0.9, 0.1, 0.51], [0.8, 0.2, 0.52]]}, "",
+        ) for mark in ";\t "
+    },
     "points, numbers": (
         "points", {"p.txt": pointed(*"123", before="Main "), "c.csv": commanded("123")}, RAD_MM,
         {"q": IN_MM, "pose": ["1", "2", "3"]}, "",

@@ -24,17 +24,17 @@ their place. The T-Mac sits about 93 mm before the flange, which is where its pl
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, found, planned
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import PLAIN, SPACE, Cells, Layout, Table, read_table
+from thermal_robot.campaign.table import PLAIN, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 
 _FEW = 3  # Names of either table that a sentence shows: enough to see how the two spell them
@@ -62,7 +62,7 @@ def commands(file: Path, plan: Plan) -> Table:
 def _fits(table: Table) -> bool:
     if table.header is not None:
         return not table.headless
-    rest = table.take(table.rows != table.rows[0])
+    rest = table.take(np.arange(1, len(table.rows)))
     return not any(table.first_text(name) == 0 and rest.first_text(name) is None for name in table.columns)
 
 
@@ -74,9 +74,8 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
     it the rows of both are in the same order. Refused are tables of different lengths without names, a point that is
     commanded twice, and no name in common; messages speak of rows and columns of the measured table.
     """
-    taken = ""
+    taken, order = "", np.arange(len(commanded.rows))
     notes: tuple[str, ...] = (f"rows of {measured.file} and {commanded.file} joined in their order",)
-    order: Sequence[int] = range(len(commanded.rows))
     if key:
         taken = _names_of(measured, commanded, key)
         measured, order, notes = _by_name(measured, commanded, key, taken)
@@ -86,9 +85,11 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         found = f"{len(measured.rows)} and {len(commanded.rows)} rows{', without that line' if headless else ''}"
         expected = "as many, in the same order, or a column of names in both"
         raise CampaignError(measured.file, f"{together}{headless}", found=found, expected=expected)
-    columns = _reordered(measured, range(len(measured.rows)))
+    # numbers at once, as one of the tables may have decimal commas
+    columns = {**measured.columns, **measured.numeric()}
+    commanded = commanded.take(order)
     first = len(columns)
-    for k, (name, cells) in enumerate(_reordered(commanded, order).items(), start=1):
+    for k, (name, cells) in enumerate({**commanded.columns, **commanded.numeric()}.items(), start=1):
         # columns without names are known by their numbers, which go on from those of the first table
         called = str(first + k) if commanded.unnamed else name
         if name != taken and called in columns:
@@ -114,34 +115,23 @@ def _names_of(measured: Table, commanded: Table, key: str) -> str:
     return best
 
 
-def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Sequence[int], tuple[str, ...]]:
+def _by_name(
+    measured: Table, commanded: Table, key: str, taken: str
+) -> tuple[Table, NDArray[np.int64], tuple[str, ...]]:
     """Join by name: measured rows that are commanded, their rows among the commands, and what was left out."""
-    points, commands = measured.text(key), commanded.text(taken)
-    twice = [name for name, count in Counter(commands).items() if count > 1]
-    if twice:
-        rows = [int(row) for row, name in zip(commanded.rows, commands, strict=True) if name == twice[0]]
-        problem, again = "a point is commanded more than once", f"{twice[0]!r}, as in row {rows[0]}"
-        row, expected = rows[1], "each name once"
-        raise CampaignError(commanded.file, problem, row=row, column=taken, found=again, expected=expected)
-    where = {name: k for k, name in enumerate(commands)}
-    unknown, unmeasured = [name for name in points if name not in where], sorted(set(commands) - set(points))
-    notes = []
-    if unknown:
-        notes.append(f"{len(unknown)} points left out, not commanded: {listed(unknown, _FEW)}")
+    points, where = measured.text(key), dict[str, int]()
+    for row, name in enumerate(commanded.text(taken)):
+        if name in where:
+            again = f"{name!r}, as in row {commanded.rows[where[name]]}"
+            problem = "a point is commanded more than once"
+            raise commanded.error(problem, taken, row, found=again, expected="each name once")
+        where[name] = row
+    unknown, unmeasured = [name for name in points if name not in where], sorted({*where} - {*points})
+    notes = [f"{len(unknown)} points left out, not commanded: {listed(unknown, _FEW)}"] if unknown else []
     if unmeasured:
         notes.append(f"{len(unmeasured)} commands left out, not measured: {listed(unmeasured, _FEW)}")
-    order = [where[name] for name in points if name in where]
-    return measured.take(np.array([name in where for name in points])), order, tuple(notes)
-
-
-def _reordered(table: Table, order: Sequence[int]) -> dict[str, Cells]:
-    """Reorder rows, and convert columns of numbers, decimal commas included."""
-    columns: dict[str, Cells] = {}
-    for name in table.columns:
-        plain = table.first_text(name) is None
-        cells = table.numbers(name, gaps=True) if plain else np.array(table.text(name), dtype=object)
-        columns[name] = cells[list(order)] if plain else cells[list(order)].tolist()
-    return columns
+    order = np.array([where.get(name, -1) for name in points])
+    return measured.take(order >= 0), order[order >= 0], tuple(notes)
 
 
 def _read_table(files: Sequence[Path], plan: Plan) -> Source:
@@ -185,18 +175,14 @@ def _read_points(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _laid_out(file: Path) -> Layout:
-    """Detect the layout of a list of points from its first line that is no comment."""
-    for separator in (",", ";", "\t", SPACE):
-        layout = Layout(separator, 0, False, COMMENT)
-        try:
-            table = read_table(file, layout)
-        except CampaignError:  # another number of fields in some line: not this separator
-            continue
-        if len(table.columns) >= len(_AXES):
-            first = table.take(table.rows == table.rows[0])
-            return replace(layout, header=all(first.first_text(name) is not None for name in first.columns))
-    expected = "lines of names and x y z, separated by blanks, commas or tabs"
-    raise CampaignError(str(file), "is no list of points", expected=expected)
+    """Detect the layout of a list of points; its first line that is no comment may be a header."""
+    layout = Layout(header=False, comment=COMMENT)
+    table = read_table(file, layout)
+    if len(table.columns) < len(_AXES):
+        expected = "lines of names and x y z, separated by blanks, commas or tabs"
+        raise CampaignError(str(file), "is no list of points", expected=expected)
+    first = table.take(np.array([0]))
+    return replace(layout, header=all(first.first_text(name) is not None for name in first.columns))
 
 
 def _called(table: Table, plan: Plan) -> Table:
