@@ -88,6 +88,18 @@ FILE_NAME = "campaign.toml"
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
 
 
+def _content(file: Path, most: int, name: str, kind: str) -> str:
+    """Content of a UTF-8 file; refused are other encodings, and one larger than ``most`` bytes."""
+    try:
+        if file.stat().st_size > most:
+            raise CampaignError(str(file), f"is larger than any {name}", expected=f"at most {most >> 10} KiB")
+        return file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise CampaignError(str(file), f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CampaignError(str(file), "is not UTF-8 text", expected=f"a {kind} file saved as UTF-8") from error
+
+
 class Document:
     """A parsed TOML file together with its text, so that an error can name the line.
 
@@ -104,15 +116,9 @@ class Document:
         self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
 
     def _parsed(self, file: Path) -> tuple[str, dict[str, Any]]:
+        text = _content(file, _LARGEST_FILE, self.name, "TOML")
         try:
-            if file.stat().st_size > _LARGEST_FILE:
-                raise CampaignError(self.file, f"is larger than any {self.name}", expected="at most 64 KiB")
-            text = file.read_text(encoding="utf-8-sig")
             return text, tomllib.loads(text)
-        except OSError as error:
-            raise CampaignError(self.file, f"cannot be read: {error.strerror}") from error
-        except UnicodeDecodeError as error:
-            raise CampaignError(self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8") from error
         except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
             raise CampaignError(self.file, f"not valid TOML: {error}", row=int(line[1]) if line else None) from error
@@ -159,16 +165,13 @@ class Document:
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
         """Return the validated values of a section; errors name the line."""
-        known = self.kinds[section]
-        kind = record(known, may_lack=known) if isinstance(known, Mapping) else known
         try:
-            values: dict[str, Any] = kind(content, section)
+            return fitted_sections(self.kinds, {section: content})[section]
         except MisfitError as error:
             key = re.split(r"[.\[]", error.path.removeprefix(f"{section}."))[0]
             key = key if self.row(section, key) else ""
             problem, told = error.problem or "wrong kind of value", {"found": shown(error.value)}
             raise self._error(problem, section, key, error.path, **told, expected=error.expected) from None
-        return values
 
     def required(self, section: str, key: str) -> Any:
         """Value of a required key."""
@@ -182,10 +185,14 @@ class Document:
         raise self._error("is missing", section, column=f"{section}.{key}", expected=f"{expected} under [{section}]")
 
 
-def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, Any]:
+def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return values by section and key as the kinds want them; a :class:`MisfitError` tells another."""
-    whole = {s: record(k, may_lack=k) if isinstance(k, Mapping) else k for s, k in kinds.items()}
-    return {section: whole[section](content, section) for section, content in sections.items()}
+    fitted = {}
+    for section, content in sections.items():
+        kind = kinds[section]
+        kind = record(kind, may_lack=kind) if isinstance(kind, Mapping) else kind
+        fitted[section] = kind(content, section)
+    return fitted
 
 
 _MOST_NAMED = 5  # campaigns of a folder in one sentence
@@ -262,7 +269,6 @@ def _absent(path: Path, name: str, section: bytes) -> CampaignError:
 
 
 _LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them
-WITH_YAML = 'pip install "thermal-robot[yaml]"'
 
 
 def is_yaml(file: Path) -> bool:
@@ -275,7 +281,8 @@ def _yaml(file: str) -> Any:
     try:
         import yaml
     except ImportError as error:
-        raise CampaignError(file, "YAML files need PyYAML, which is not installed", expected=WITH_YAML) from error
+        expected = 'pip install "thermal-robot[yaml]"'
+        raise CampaignError(file, "YAML files need PyYAML, which is not installed", expected=expected) from error
     return yaml
 
 
@@ -290,15 +297,9 @@ def read_yaml(file: Path) -> list[Any]:
     if not is_file(file):
         problem = "is a directory" if is_folder(file) else "there is no such file"
         raise CampaignError(str(file), problem, expected="a YAML file")
-    if file.stat().st_size > _LARGEST_YAML:
-        raise CampaignError(str(file), "is larger than can be read", expected=f"at most {_LARGEST_YAML >> 20} MiB")
+    text = _content(file, _LARGEST_YAML, "file of samples", "YAML")
     try:
-        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-        documents = list(yaml.load_all(file.read_text(encoding="utf-8-sig"), Loader=loader))
-    except OSError as error:
-        raise CampaignError(str(file), f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise CampaignError(str(file), "is not UTF-8 text", expected="a YAML file") from error
+        documents = list(yaml.load_all(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         row = None if mark is None else mark.line + 1
