@@ -121,16 +121,14 @@ def readings(
     kind, figures = np.array(stated, dtype=np.str_), dict[str, Array]()
     for own in columns.kinds:
         numeric, texts = names.KINDS[own]
-        here = kind == own
-        for column in numeric:
+        here, spare = kind == own, [name for name in names.OPTIONAL.get(own, ()) if name in table.columns]
+        for column in (*numeric, *spare):
             values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
-            row = first_true(np.asarray(here & np.isnan(values)))
-            if row is not None:
+            read = here & ~np.isnan(values)
+            row = first_true(here & ~read)
+            if row is not None and column in numeric:
                 raise table.error("a value is missing", column, row, found="an empty cell", expected="a number")
-            figures[column] = np.where(here, values, figures.get(column, 0.0))
-        for column in (name for name in names.OPTIONAL.get(own, ()) if name in table.columns):
-            values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
-            figures[column] = np.where(here & ~np.isnan(values), values, 0.0)
+            figures[column] = np.where(read, values, figures.get(column, 0.0))
         for column in texts:
             cells = np.array(table.text(column), dtype=np.str_)
             row = first_true(np.asarray(here & (cells == "")))

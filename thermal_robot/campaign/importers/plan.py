@@ -343,11 +343,6 @@ class Format:
     least: int = 1  # and most: how many files it has
     most: int = 2
 
-    def source(self, files: Sequence[Path], plan: Plan) -> Source:
-        """Read the files after a check of their number."""
-        files_of(files, self.files, self.least, self.most)
-        return self.read(files, plan)
-
 
 def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
     """Refuse a wrong number of files, naming what is expected."""

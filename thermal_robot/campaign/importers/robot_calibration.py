@@ -25,13 +25,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from thermal_robot.campaign.document import is_yaml, read_yaml
 from thermal_robot.campaign.importers.plan import Format, Plan, Source, files_of, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import Table, read_table
+from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
@@ -63,10 +61,9 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
 
 def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
     """Table of rows of numbers by name; rows are counted from 1."""
-    columns = {
-        name: np.array([row.get(name, np.nan) for row in rows]) for name in dict.fromkeys(n for r in rows for n in r)
-    }
-    return Table(file, columns, np.arange(1, len(rows) + 1))
+    import pandas as pd
+
+    return table_from_frame(pd.DataFrame(rows, index=range(1, len(rows) + 1)), file)
 
 
 def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joints", "positions")) -> dict[str, float]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.importers.hand_eye import CORNERS, MOVEIT
-from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of
+from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of, files_of
 from thermal_robot.campaign.importers.programs import KUKA, RAPID
 from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
 from thermal_robot.campaign.importers.rosbag import ROSBAG
@@ -76,7 +76,9 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
     """
     require_imported(files, directory, (FILE_NAME, TABLE_NAME, ROBOT_NAME))
     given = plan or Plan()
-    source = FORMATS[format].source(files, given)
+    chosen = FORMATS[format]
+    files_of(files, chosen.files, chosen.least, chosen.most)
+    source = chosen.read(files, given)
     full = given.over(source.plan)
     campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
     origin = f"{IMPORTED} {format}` from {', '.join(Path(file).name for file in files)}."
