@@ -15,7 +15,7 @@ import thermal_robot as tr
 from thermal_robot.campaign import Campaign, Settings
 from thermal_robot.campaign.campaign import appended, read_alike, turned_round
 from thermal_robot.campaign.checked import checked_array
-from thermal_robot.campaign.more_rows import more_rows
+from thermal_robot.campaign.read import more_rows
 from thermal_robot.campaign.targets import posed
 from thermal_robot.errors import CampaignError
 

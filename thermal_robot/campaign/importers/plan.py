@@ -20,7 +20,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.checked import first_true, no_orientation
 from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
-from thermal_robot.campaign.document import Document, fitted_sections
+from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
 from thermal_robot.campaign.recognise import bare, headings, size, wanted
@@ -33,7 +33,6 @@ from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, MisfitError, below, boolean, number, record, text, word
 from thermal_robot.schema import listed as list_of
 from thermal_robot.schema import whole as whole_number
-from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
 JOINTS = "joints"  # Key of the list that names the columns of all joints, in the order of the chain
 
@@ -317,8 +316,8 @@ def read_mapping(path: Path) -> Plan:
     """Read a mapping; the robot's path is relative to the file. Errors name the line."""
     sections = Document(path, KINDS).sections
     for key, named in sections.get("robot", {}).items():
-        if key in ("urdf", "kinematics") and not named.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
-            sections["robot"][key] = str(path.parent / named)
+        if key in ("urdf", "kinematics"):
+            sections["robot"][key] = str(robot_reference(named, path.parent))
     return Plan(str(path), sections)
 
 

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
-from thermal_robot.campaign.importers.hand_eye import CORNERS, MOVEIT
+from thermal_robot.campaign.importers.kinds import CORNERS, MOVEIT, MUKCA
 from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of, files_of
 from thermal_robot.campaign.importers.programs import KUKA, RAPID
 from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
 from thermal_robot.campaign.importers.rosbag import ROSBAG
-from thermal_robot.campaign.importers.sockets import MUKCA
 from thermal_robot.campaign.importers.table import IPA_UR10, JACOBI, POINTS, TABLE
 from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
 from thermal_robot.errors import CampaignError

@@ -24,8 +24,9 @@ their place. The T-Mac sits about 93 mm before the flange, which is where its pl
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -246,17 +247,6 @@ POINTS = Format(
 )
 
 
-def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
-    table = read_table(files[0], plan.layout())
-    joints = sorted((name for name in table.columns if re.fullmatch(r"joint_\d", name)), key=lambda name: name[-1])
-    measured = {axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}
-    sections: dict[str, dict[str, Any]] = {
-        "measurements": {"angle_unit": "deg", "length_unit": "mm"},
-        "columns": {"joints": joints, **measured, "order": "step_order"},
-    }
-    return Source(table, planned(sections))
-
-
 def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
     table, stamp = read_table(files[0], plan.layout()), "Timestamp"
     whole = stamp in table.columns and all(re.fullmatch(r"\d{14}", each) for each in table.text(stamp))
@@ -273,8 +263,20 @@ def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
     return Source(table, planned(sections), notes)
 
 
+def _mapped(files: Sequence[Path], plan: Plan, mapping: Mapping[str, Any]) -> Source:
+    """Read one table, of which a mapping says everything."""
+    return Source(read_table(files[0], plan.layout()), planned(mapping))
+
+
+_JACOBI = {
+    "measurements": {"angle_unit": "deg", "length_unit": "mm"},
+    "columns": {**{axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}, "order": "step_order"},
+}
 JACOBI = Format(
-    "the data sets of P. Jacobi: UR5 and WAM, laser tracker", "3D_UR5_uncalibrated_grid_cleaned.csv", _jacobi, most=1
+    "the data sets of P. Jacobi: UR5 and WAM, laser tracker",
+    "3D_UR5_uncalibrated_grid_cleaned.csv",
+    partial(_mapped, mapping=_JACOBI),
+    most=1,
 )
 IPA_UR10 = Format(
     "the data set of Landgraf et al.: UR10, laser tracker with T-Mac", "measurements_grid.csv", _ipa_ur10, most=1
