@@ -274,8 +274,26 @@ class Campaign:
         """
         import pandas as pd
 
+        robot, units, several = self.robot, self.units, self.targets
+        scales = [units.joint_scale(kind) for kind in robot.joint_types]
+        columns: dict[str, Array] = dict(zip(robot.joint_names, (self.q / scales).T, strict=True))
+        if several is not None:
+            for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
+                columns |= dict(zip(names.axes_of(number), points / units.length_scale, strict=True))
+        for group, values, scale in (
+            (names.POSITION, None if several else self.position, units.length_scale),
+            (names.ORIENTATION, None if several else self.orientation, 1.0),
+            (names.SIMULATED_POSITION, self.simulated_position, units.length_scale),
+            (names.SIMULATED_ORIENTATION, self.simulated_orientation, 1.0),
+        ):
+            if values is not None:
+                columns |= dict(zip(group, values.T / scale, strict=True))
+        columns |= {name: v / names.reading_scale(name, units.length_scale) for name, v in self.readings.items()}
+        if self.noise_of_rows is not None:
+            columns[names.NOISE] = self.noise_of_rows / units.length_scale
+        columns |= {name: v / covariate_scale(name, robot, units) for name, v in self.covariates.items()}
         labels = {name: labels.astype(object) for name, labels in self.labels.items()}
-        shown = pd.DataFrame({**table_columns(self), **labels}, index=pd.Index(self.rows, name="row"))
+        shown = pd.DataFrame({**columns, **labels}, index=pd.Index(self.rows, name="row"))
         shown.attrs = {"angle_unit": self.units.angle, "length_unit": self.units.length}
         return shown
 
@@ -421,28 +439,6 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     if array.base is None:
         array.flags.writeable = False
     return array
-
-
-def table_columns(campaign: Campaign) -> dict[str, Array]:
-    """Numeric columns of a campaign's table by name, (N,) each, in the units of the file."""
-    robot, units, several = campaign.robot, campaign.units, campaign.targets
-    scales = [units.joint_scale(kind) for kind in robot.joint_types]
-    columns: dict[str, Array] = dict(zip(robot.joint_names, (campaign.q / scales).T, strict=True))
-    if several is not None:
-        for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
-            columns |= dict(zip(names.axes_of(number), points / units.length_scale, strict=True))
-    for group, values, scale in (
-        (names.POSITION, None if several else campaign.position, units.length_scale),
-        (names.ORIENTATION, None if several else campaign.orientation, 1.0),
-        (names.SIMULATED_POSITION, campaign.simulated_position, units.length_scale),
-        (names.SIMULATED_ORIENTATION, campaign.simulated_orientation, 1.0),
-    ):
-        if values is not None:
-            columns |= dict(zip(group, values.T / scale, strict=True))
-    columns |= {name: v / names.reading_scale(name, units.length_scale) for name, v in campaign.readings.items()}
-    if campaign.noise_of_rows is not None:
-        columns[names.NOISE] = campaign.noise_of_rows / units.length_scale
-    return columns | {name: v / covariate_scale(name, robot, units) for name, v in campaign.covariates.items()}
 
 
 def describe(campaign: Campaign) -> str:

@@ -213,7 +213,7 @@ def doubts(campaign: Campaign) -> list[str]:
     """Sentences of all plausibility checks, none for an ordinary campaign."""
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
-    checks = (_limits, _time, _speed, _pose_labels, _temperature, _payload, _noise, _slides)
+    checks = (_limits, _conditions, _pose_labels, _noise)
     return [
         *_beside(campaign),
         *lost,
@@ -348,41 +348,54 @@ def _apart(campaign: Campaign) -> Iterator[str]:
 
 
 def _limits(campaign: Campaign) -> Iterator[str]:
-    robot = campaign.robot
+    robot, units = campaign.robot, campaign.units
     joints = list(zip(robot.joint_names, robot.joint_types, campaign.q.T, robot.lower, robot.upper, strict=True))
     free = [name for name, kind, _, *bounds in joints if kind != "continuous" and np.isinf(bounds).any()]
     if free:
         yield f"the URDF gives no limits for {listed(free)}: no command is checked against any there"
     for name, kind, q, lower, upper in joints:
-        outside = (q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE)
-        if outside.any():
-            first = int(np.argmax(outside))
-            scale, unit = campaign.units.joint_scale(kind), campaign.units.joint_unit(kind)
+        outside = np.flatnonzero((q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE))
+        if len(outside):
+            first, scale, unit = outside[0], units.joint_scale(kind), units.joint_unit(kind)
             limit = upper if q[first] > upper else lower
             yield (
                 f"joint {name!r} is outside its limits in {_rows(outside)}, first in row "
                 f"{campaign.rows[first]}: {q[first] / scale:.6g} {unit}, limit {limit / scale:.6g} {unit}"
             )
+        farthest, limit = float(np.abs(q).max()), max(abs(lower), abs(upper))
+        if kind == "prismatic" and math.isfinite(limit) and farthest > SLIDES * limit:
+            yield (
+                f"joint {name!r} slides, is commanded to {farthest:.4g} m and its limit is {limit:.4g} m: "
+                f"is its column in {units.length}, as length_unit says?"
+            )
 
 
-def _time(campaign: Campaign) -> Iterator[str]:
-    time = campaign.covariates.get("time", np.empty(0))
-    back = np.diff(time) < 0
-    if back.any():
-        first = int(np.argmax(back)) + 1
+def _conditions(campaign: Campaign) -> Iterator[str]:
+    covariates, robot = campaign.covariates, campaign.robot
+    time, speed = (covariates.get(name, np.empty(0)) for name in ("time", "speed"))
+    back = np.flatnonzero(np.diff(time) < 0) + 1
+    if len(back):
         yield (
-            f"column 'time' runs backwards {int(back.sum())} time{'s' if back.sum() > 1 else ''}, "
-            f"first in row {campaign.rows[first]}: {time[first]:.6g} s after {time[first - 1]:.6g} s"
+            f"column 'time' runs backwards {len(back)} time{'s' if len(back) > 1 else ''}, "
+            f"first in row {campaign.rows[back[0]]}: {time[back[0]]:.6g} s after {time[back[0] - 1]:.6g} s"
         )
-
-
-def _speed(campaign: Campaign) -> Iterator[str]:
-    speed = campaign.covariates.get("speed", np.empty(0))
-    outside = (speed < 0) | (speed > 1)
-    if outside.any():
-        first = int(np.argmax(outside))
-        where = f"{_rows(outside)}, first in row {campaign.rows[first]}: {speed[first]:.6g}"
+    outside = np.flatnonzero((speed < 0) | (speed > 1))
+    if len(outside):
+        where = f"{_rows(outside)}, first in row {campaign.rows[outside[0]]}: {speed[outside[0]]:.6g}"
         yield f"column 'speed' is outside 0..1 in {where}; it is a fraction of the maximum, not per cent"
+    names = [n for n in covariates if n.split(".")[0] == "temperature" and n not in campaign.extra]
+    told = [(f"column {n!r} has a median of", float(np.median(covariates[n]))) for n in names]
+    for what, value in (*told, ("the reference temperature is", campaign.reference_temperature)):
+        if value > WARMEST:
+            yield f"{what} {value:.4g} °C: are these {'kelvin' if value > HOTTEST else 'degrees Fahrenheit'}?"
+    heaviest = float(covariates.get("payload", np.zeros(1)).max())
+    if heaviest > (HEAVIEST * robot.mass if robot.has_masses else HEAVIEST_ALONE):
+        beside = f", and the arm weighs {robot.mass:.3g} kg" if robot.has_masses else ""
+        yield f"the payload is up to {heaviest:.4g} kg{beside}: are these grams?"
+
+
+def _rows(chosen: NDArray[np.int64]) -> str:
+    return f"{len(chosen)} row{'s' if len(chosen) != 1 else ''}"
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:
@@ -391,25 +404,6 @@ def _pose_labels(campaign: Campaign) -> Iterator[str]:
     different = [label for label in known if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND]
     if different:
         yield f"rows with the same pose label have different joint commands: {listed(different, 5)}"
-
-
-def _rows(chosen: Mask) -> str:
-    return f"{int(chosen.sum())} row{'s' if chosen.sum() != 1 else ''}"
-
-
-def _temperature(campaign: Campaign) -> Iterator[str]:
-    names = [n for n in campaign.covariates if n.split(".")[0] == "temperature" and n not in campaign.extra]
-    told = [(f"column {n!r} has a median of", float(np.median(campaign.covariates[n]))) for n in names]
-    for what, value in (*told, ("the reference temperature is", campaign.reference_temperature)):
-        if value > WARMEST:
-            yield f"{what} {value:.4g} °C: are these {'kelvin' if value > HOTTEST else 'degrees Fahrenheit'}?"
-
-
-def _payload(campaign: Campaign) -> Iterator[str]:
-    heaviest, robot = float(campaign.covariates.get("payload", np.zeros(1)).max()), campaign.robot
-    if heaviest > (HEAVIEST * robot.mass if robot.has_masses else HEAVIEST_ALONE):
-        beside = f", and the arm weighs {robot.mass:.3g} kg" if robot.has_masses else ""
-        yield f"the payload is up to {heaviest:.4g} kg{beside}: are these grams?"
 
 
 def _noise(campaign: Campaign) -> Iterator[str]:
@@ -421,17 +415,6 @@ def _noise(campaign: Campaign) -> Iterator[str]:
             f"the noise of position is {1e6 * place:.3g} µm, finer than any instrument that measures robots: "
             f"is it in {campaign.units.length}, as length_unit says?"
         )
-
-
-def _slides(campaign: Campaign) -> Iterator[str]:
-    robot = campaign.robot
-    limits, commanded = np.maximum(np.abs(robot.lower), np.abs(robot.upper)), np.abs(campaign.q).max(axis=0)
-    for name, kind, limit, farthest in zip(robot.joint_names, robot.joint_types, limits, commanded, strict=True):
-        if kind == "prismatic" and math.isfinite(limit) and farthest > SLIDES * limit:
-            yield (
-                f"joint {name!r} slides, is commanded to {farthest:.4g} m and its limit is {limit:.4g} m: "
-                f"is its column in {campaign.units.length}, as length_unit says?"
-            )
 
 
 def _rounded(campaign: Campaign) -> Iterator[str]:
