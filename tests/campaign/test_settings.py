@@ -72,7 +72,7 @@ def robot() -> Robot:
 
 UNIT = {
     **dict.fromkeys(("turn", "roll", "tilt.x", "tilt.beam.y", "encoder.turn"), ("rad", "deg")),
-    **dict.fromkeys(("slide", "x", "sim.z", "noise", "encoder.slide"), ("m", "mm")),
+    **dict.fromkeys(("slide", "x", "y.2", "sim.z", "noise", "encoder.slide"), ("m", "mm")),
     **dict.fromkeys(("temperature", "temperature.beam"), ("°C", "°C")),
     "time": ("s", "s"),
     "payload": ("kg", "kg"),

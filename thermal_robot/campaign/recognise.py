@@ -17,7 +17,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.targets import FEWEST
-from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units, unit_of
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, unit_of
 from thermal_robot.robot import Robot
 
 _KINDS: tuple[dict[str, float], ...] = (
@@ -82,11 +82,6 @@ def size(unit: str | None, other: str) -> float | None:
     return None if kind is None or rate != other_rate else kind[one] / kind[base]
 
 
-def wanted(name: str, robot: Robot, units: Units = SI) -> str:
-    """Return the unit of a campaign's column in a file; columns of several targets count as one's."""
-    return unit_of((names.target_of(name) or (name,))[0], robot, units)
-
-
 def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, str]:
     """Column of each joint found by name: its own, ``<joint>/position``, ``…/<joint>/position``."""
     there = list(dict.fromkeys(columns))
@@ -117,7 +112,7 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
         meant = own if own in defined else small.get(low, low if names.target_of(low) else "")
         # what need not be there is asked about where its name alone is written otherwise
         sure = meant in needed or names.target_of(meant) or unit is not None
-        if meant and sure and size(unit, wanted(meant, robot)) is not None:
+        if meant and sure and size(unit, unit_of(meant, robot)) is not None:
             said.setdefault(meant, []).append(Heading(column, unit))
     found = {name: several[0] for name, several in said.items() if name not in there and len(several) == 1}
     original = {own: Heading(column, unit) for column, (own, unit) in plain.items()}
@@ -164,7 +159,7 @@ def named(table: Table, robot: Robot, units: Units) -> Table:
     other: dict[tuple[str, str], list[str]] = {}
     for column, cells in table.columns.items():
         name = called.get(column, column)
-        unit = wanted(name, robot, units)
+        unit = unit_of(name, robot, units)
         scale = size(known[name].unit, unit) if column in called else None
         columns[name] = cells
         if scale not in (1.0, None):

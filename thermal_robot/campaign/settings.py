@@ -220,22 +220,19 @@ def settings_kind(value: Any, path: str) -> Settings:
 
 def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[str, Any]:
     """Return what the tables of kinds of measurement state, lengths in m."""
-    found: dict[str, Any] = {}
-    if socket := sections.get("socket"):
-        pairs = ((str(one), str(other), length * scale) for one, other, length in socket.get("distances", ()))
-        found["socket"] = {"distances": tuple(pairs)}
-    if camera := sections.get("camera"):
-        found["camera"] = {name: dict(own) for name, own in camera.items()}
+    found = {key: sections[key] for key in ("socket", "camera") if sections.get(key)}
+    if "socket" in found:
+        pairs = found["socket"].get("distances", ())
+        found["socket"] = {"distances": tuple((str(one), str(other), scale * length) for one, other, length in pairs)}
     return found
 
 
 def facts_in(facts: Mapping[str, Any], scale: float) -> dict[str, Any]:
     """Return the tables of campaign.toml that state facts, lengths in a unit of ``scale`` m."""
-    found: dict[str, Any] = {}
-    if socket := facts.get("socket"):
-        found["socket"] = {"distances": [[one, other, length / scale] for one, other, length in socket["distances"]]}
-    if camera := facts.get("camera"):
-        found["camera"] = {name: dict(own) for name, own in camera.items()}
+    found = dict(facts)
+    if "socket" in found:
+        pairs = found["socket"]["distances"]
+        found["socket"] = {"distances": [[one, other, length / scale] for one, other, length in pairs]}
     return found
 
 

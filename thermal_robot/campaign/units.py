@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from thermal_robot.campaign.names import NOISE, PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, split_name, tilted
+from thermal_robot.campaign import names
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
@@ -76,13 +76,13 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
     kinds = dict(zip(robot.joint_names, robot.joint_types, strict=True))
     if column in kinds:
         return units.joint_unit(kinds[column])
-    if column in (*POSITION, *SIMULATED_POSITION, NOISE):
+    if column in (*names.POSITION, *names.SIMULATED_POSITION, names.NOISE) or names.target_of(column):
         return units.length
-    if tilted(column) is not None:
+    if names.tilted(column) is not None:
         return units.angle
-    quantity, place = split_name(column)
-    if quantity not in PER_JOINT:
-        return _OF_ITS_OWN.get(quantity if quantity in PER_LINK else column, "")
+    quantity, place = names.split_name(column)
+    if quantity not in names.PER_JOINT:
+        return _OF_ITS_OWN.get(quantity if quantity in names.PER_LINK else column, "")
     if place not in kinds:
         return ""
     if quantity == "torque":
@@ -92,9 +92,5 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
 
 def covariate_scale(column: str, robot: Robot, units: Units) -> float:
     """SI factor of a covariate's column; 1 where it is in SI, in °C, or dimensionless."""
-    if tilted(column) is not None:
-        return units.angle_scale
-    quantity, place = split_name(column)
-    if quantity in _OF_A_JOINT and place in robot.joint_names:
-        return units.joint_scale(robot.joint_types[robot.joint_names.index(place)])
-    return 1.0
+    word = unit_of(column, robot, units).partition("/")[0]
+    return (ANGLE_UNITS | LENGTH_UNITS).get(word, 1.0)

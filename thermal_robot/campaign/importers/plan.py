@@ -23,10 +23,10 @@ from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
-from thermal_robot.campaign.recognise import bare, headings, size, wanted
+from thermal_robot.campaign.recognise import bare, headings, size
 from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector
 from thermal_robot.campaign.table import SPACE, Cells, Layout, Table
-from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, unit_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
@@ -360,7 +360,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     columns = _columns(table, plan, robot)
     plan = plan.over(planned({"measurements": _units(table, columns, robot)}))
     settings = plan.settings(robot)
-    columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
+    columns = {name: _in_units(column, table, unit_of(name, robot, settings.units)) for name, column in columns.items()}
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
     measured = np.full(len(table.rows), not places)  # rows of other kinds are measured without a position
     for axis in places:
