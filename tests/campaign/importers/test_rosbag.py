@@ -351,6 +351,12 @@ def test_stamps_count_for_more_than_the_time_of_coming(tmp_path):
     np.testing.assert_allclose(joints.values, [[0.25, 0.5], [0.35, 0.6]])
 
 
+def test_joints_named_in_two_ways_keep_the_order_of_the_chain(tmp_path):
+    joints, _ = read(tmp_path, "time,b,field.name0,field.position0\n1,0.5,a,0.25\n2,0.6,a,0.35\n")
+    assert joints.names == JOINTS
+    np.testing.assert_allclose(joints.values, [[0.25, 0.5], [0.35, 0.6]])
+
+
 def test_orientations_are_put_scalar_first(tmp_path):
     parts = [f"field.transform.rotation.{axis}" for axis in "xyzw"]
     places = [f"field.transform.translation.{axis}" for axis in "xyz"]

@@ -19,7 +19,7 @@ the place of the target are fitted together to what was measured in motion.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -241,10 +241,7 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
         expected = f"one of {', '.join(_CLOCKS)}"
         raise CampaignError(str(file), "has no column of time", row=table.header, expected=expected)
     time = table.numbers(clock, gaps=True) * _CLOCKS[clock]
-    own, target = (
-        stream(str(file), time, _figures(table, list(columns.values())), list(columns)) if columns else None
-        for columns in (_joints(table, joints), _target(table))
-    )
+    own, target = (_series(table, time, columns) for columns in (_joints(table, joints), _target(table)))
     return own, target
 
 
@@ -256,8 +253,12 @@ def _begins_with_figures(file: Path) -> bool:
         return re.match(rb"\d+,\d+,", content.read(64)) is not None
 
 
-def _figures(table: Table, columns: Sequence[str]) -> Array:
-    return np.column_stack([table.numbers(name, gaps=True) for name in columns])
+def _series(table: Table, time: Array, columns: Mapping[str, str]) -> Stream | None:
+    """Time series of columns by what they are; ``None`` without any."""
+    if not columns:
+        return None
+    values = np.column_stack([table.numbers(name, gaps=True) for name in columns.values()])
+    return stream(table.file, time, values, tuple(columns))
 
 
 def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
@@ -273,7 +274,7 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
     if columns and len(columns) < len(joints):
         lacking = next(joint for joint in joints if joint not in columns)
         raise table.error("a joint of the chain is not recorded", lacking, expected="all of them")
-    return columns
+    return {joint: columns[joint] for joint in joints if columns}
 
 
 def _target(table: Table) -> dict[str, str]:
@@ -303,8 +304,8 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
     recorded = [table.text(name)[0] for name in fields[_BEFORE_NAMES + 1 : first]]  # the first text is the frame
     columns = joint_columns(recorded, joints)
     if columns and len(columns) == len(joints):
-        wanted = [fields[first + recorded.index(columns[joint])] for joint in joints]
-        return stream(table.file, time, _figures(table, wanted), joints), None
+        wanted = {joint: fields[first + recorded.index(columns[joint])] for joint in joints}
+        return _series(table, time, wanted), None
     if len(recorded) > 1:
         problem, found = "a joint of the chain is not among the names", listed(recorded)
         lacking, expected = next(j for j in joints if j not in columns), f"all of {listed(joints)}"
@@ -312,8 +313,7 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
     rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
     if len(rest) in (len(names.POSITION), len(names.MEASURED)):
         by_name = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), rest, strict=False))
-        wanted = [name for name in names.MEASURED if name in by_name]
-        return None, stream(table.file, time, _figures(table, [by_name[name] for name in wanted]), wanted)
+        return None, _series(table, time, {name: by_name[name] for name in names.MEASURED if name in by_name})
     problem = "neither joint states nor poses are recognised in lines without a header"
     expected = "sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)"
     raise CampaignError(table.file, problem, found=f"{len(fields)} fields", expected=expected)
