@@ -98,9 +98,9 @@ def axes_of(target: int) -> tuple[str, str, str]:
 
 
 def of_kinds() -> set[str]:
-    """Return the columns of all kinds of measurement."""
+    """Return the columns of all kinds of measurement, and that which says the kind of each row."""
     optional = {column for columns in OPTIONAL.values() for column in columns}
-    return optional | {column for groups in KINDS.values() for group in groups for column in group}
+    return {KIND} | optional | {column for groups in KINDS.values() for group in groups for column in group}
 
 
 def reading_scale(column: str, length: float) -> float:

@@ -94,6 +94,12 @@ def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, st
     return found
 
 
+def defined(robot: Robot) -> dict[str, None]:
+    """Columns of the format for a robot, in order, as keys of a dict; those of several targets and of kinds apart."""
+    conditions = names.conditions(robot.joint_names, robot.urdf_links)
+    return dict.fromkeys((*robot.joint_names, *names.RESERVED, *conditions))
+
+
 def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
     """Columns under another name or with a unit, by the campaign's names for a robot.
 
@@ -101,15 +107,14 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
     another kind.
     """
     there = [str(name).strip() for name in columns]
-    conditions = names.conditions(robot.joint_names, robot.urdf_links)
-    defined = dict.fromkeys((*robot.joint_names, *names.RESERVED, *conditions))
+    known = defined(robot)
     needed = {*robot.joint_names, *names.MEASURED, *names.SIMULATED}
-    small = {name.lower(): name for name in defined}
+    small = {name.lower(): name for name in known}
     said: dict[str, list[Heading]] = {}
-    plain = {column: bare(column) for column in there if column not in defined and not names.target_of(column)}
+    plain = {column: bare(column) for column in there if column not in known and not names.target_of(column)}
     for column, (own, unit) in plain.items():
         low = own.lower()
-        meant = own if own in defined else small.get(low, low if names.target_of(low) else "")
+        meant = own if own in known else small.get(low, low if names.target_of(low) else "")
         # what need not be there is asked about where its name alone is written otherwise
         sure = meant in needed or names.target_of(meant) or unit is not None
         if meant and sure and size(unit, unit_of(meant, robot)) is not None:
@@ -228,9 +233,8 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
     has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
-    taken |= (
-        names.of_kinds() | {names.KIND} if kinds or kind or _by_columns(table) or names.KIND in table.columns else set()
-    )
+    if kinds or kind or _by_columns(table) or names.KIND in table.columns:
+        taken |= names.of_kinds()
     taken |= {names.NOISE} if has_noise or not measured else set()
     parts: dict[str, list[str]] = {_COVARIATE: [], _EXTRA: [], _IGNORED: []}
     for column in table.columns:

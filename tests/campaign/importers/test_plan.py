@@ -12,7 +12,6 @@ from thermal_robot.campaign.importers.plan import (
     campaign_of,
     column_kind,
     columns_kind,
-    files_of,
     orientation_kind,
     planned,
     read_mapping,
@@ -288,9 +287,3 @@ def test_several_targets_come_from_columns_of_other_names_and_rows_without_any_a
     assert found.rows.tolist() == [2, 3, 5, 6, 7]
     assert "1 row (4) left out, without a measured position" in notes
     np.testing.assert_allclose(found.targets.points, points[[0, 1, 3, 4, 5]])
-
-
-def test_another_number_of_files(tmp_path):
-    files_of([tmp_path], "ONE or TWO", 1, 2)
-    with pytest.raises(CampaignError, match="FILES: another number of files than this format has; found 3, expected A"):
-        files_of([tmp_path] * 3, "A", 1, 2)

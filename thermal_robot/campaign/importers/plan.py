@@ -23,7 +23,7 @@ from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
-from thermal_robot.campaign.recognise import bare, headings, size
+from thermal_robot.campaign.recognise import bare, defined, headings, size
 from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector
 from thermal_robot.campaign.table import SPACE, Cells, Layout, Table
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, unit_of
@@ -399,13 +399,7 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    known = {
-        *names.RESERVED,
-        names.KIND,
-        *names.of_kinds(),
-        *robot.joint_names,
-        *names.conditions(robot.joint_names, robot.urdf_links),
-    }
+    known = {*defined(robot), *names.of_kinds()}
     own = {name: name for name in table.columns if name in known or names.target_of(name) is not None}
     own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
     found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
