@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import description, names
+from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import (
-    SMALLEST,
     check_covariate,
     check_joints,
     check_quaternions,
@@ -21,14 +21,14 @@ from thermal_robot.campaign.checked import (
     checked_mapping,
     first_true,
 )
-from thermal_robot.campaign.settings import ABOUT, HOW_MOVED, STANDARD_TEMPERATURE, Settings, as_vector, given
+from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
+from thermal_robot.schema import Kind, MisfitError, boolean, listed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,26 +47,19 @@ def _instance(kind: Any, expected: str) -> Kind:
     return take
 
 
-def _sigma(value: Any, path: str) -> float | None:
-    """Return the standard deviation as given; 0 counts as ``None``, not stated."""
-    if value is None or (isinstance(value, (int, float, np.number)) and value == 0):
-        return None
-    return float(number(least=SMALLEST, expected="a number above 0, or None")(value, path))
-
-
-_SIZES = mapping(number(least=SMALLEST, expected="a number above 0"))
 _TEXTS = listed(_instance(str, "a tuple of texts"), expected="a tuple of texts")
 _KINDS: dict[str, Kind] = {
     "robot": _instance(Robot, "a robot, from load_robot"),
     "units": _instance(Units, "Units"),
     "targets": _instance((Targets, type(None)), "Targets, as read from columns x.1 …, or None"),
-    "moves": HOW_MOVED,
+    "moves": kinds.HOW_MOVED,
     **dict.fromkeys(("extra", "derived", "turned", "warnings"), _TEXTS),
     **dict.fromkeys(("base_known", "tool_known"), boolean),
-    **dict.fromkeys(("noise_position", "noise_orientation"), _sigma),
-    **dict.fromkeys(("priors", "gears"), _SIZES),
-    "reference_temperature": number(expected="a number"),
-    "about": ABOUT,
+    **dict.fromkeys(("noise_position", "noise_orientation"), kinds.sigma),
+    "priors": kinds.PRIORS,
+    "gears": kinds.GEARS,
+    "reference_temperature": kinds.TEMPERATURE,
+    "about": kinds.ABOUT,
 }
 """What each part may be that is no array."""
 _WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simulated_orientation": 4}
@@ -236,7 +229,7 @@ class Campaign:
         if self.noise_of_rows is None:
             return
         self._hold("noise_of_rows", (samples,))
-        row = first_true(self.noise_of_rows < SMALLEST)
+        row = first_true(self.noise_of_rows < kinds.SMALLEST)
         if row is not None:
             found, problem = f"{self.noise_of_rows[row]:.15g} at index {row}", "no standard deviation"
             raise CampaignError(file, problem, column="noise_of_rows", found=found, expected="a number above 0")

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import did_you_mean, listed, split_name
-from thermal_robot.campaign.settings import ABSOLUTE_ZERO
+from thermal_robot.campaign.settings import ABSOLUTE_ZERO, SMALLEST
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import LARGEST
 
-SMALLEST = 1e-30  # In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from thermal_robot.campaign import settings as kinds
-from thermal_robot.campaign.checked import SMALLEST
 from thermal_robot.campaign.names import KINDS as NAMED_KINDS
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.settings import Settings
@@ -29,13 +28,6 @@ _KNOWN = word(("unknown", "known"), kinds.WORD)
 
 def _named(meaning: str) -> Kind:
     return text(f"{meaning}, as text in quotes")
-
-
-def _sigma(value: Any, path: str) -> float:
-    sigma = float(kinds.SIGMA(value, path))
-    if 0.0 < sigma < SMALLEST:
-        raise MisfitError(path, value, "a number above 0, or 0 for not given", "smaller than any noise")
-    return sigma
 
 
 def _vector(value: Any, path: str) -> Any:
@@ -73,7 +65,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "kind": word(tuple(NAMED_KINDS), kinds.WORD),
     },
     "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
-    "noise": {"position": _sigma, "orientation": _sigma},
+    "noise": {"position": kinds.sigma, "orientation": kinds.sigma},
     "payload": {"com": _vector},
     "priors": kinds.PRIORS,
     "gears": kinds.GEARS,

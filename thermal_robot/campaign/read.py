@@ -17,7 +17,6 @@ from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.campaign import Campaign, read_alike
 from thermal_robot.campaign.checked import (
     LARGEST_COMMAND,
-    SMALLEST,
     check_covariate,
     check_joints,
     check_quaternions,
@@ -36,7 +35,7 @@ from thermal_robot.campaign.units import SI, Units, covariate_scale
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import boolean, optional, text, word
+from thermal_robot.schema import boolean, text, word
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,7 +210,7 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
     sigmas = cells * settings.units.length_scale
     if settings.noise_position is not None:
         sigmas = np.where(np.isnan(sigmas), settings.noise_position, sigmas)
-    index = first_true(~(sigmas >= SMALLEST))
+    index = first_true(~(sigmas >= kinds.SMALLEST))
     if index is not None:
         empty = bool(np.isnan(sigmas[index]))
         found = "an empty cell" if empty else f"{cells[index]:.15g}"
@@ -533,8 +532,8 @@ def campaign_from_table(
         "frames.base": ("base", base, frame),
         "frames.tool": ("tool", tool, frame),
         "frames.target": ("target", target, kinds.VECTOR, "three numbers"),
-        "noise.position": ("noise_position", noise_position, optional(kinds.SIGMA), _NOISE),
-        "noise.orientation": ("noise_orientation", noise_orientation, optional(kinds.SIGMA), _NOISE),
+        "noise.position": ("noise_position", noise_position, kinds.sigma, _NOISE),
+        "noise.orientation": ("noise_orientation", noise_orientation, kinds.sigma, _NOISE),
         "payload.com": ("payload_com", payload_com, kinds.VECTOR, "three numbers"),
     }
     stated: dict[str, dict[str, Any]] = {}

@@ -44,12 +44,22 @@ TEMPERATURE = number(least=ABSOLUTE_ZERO, expected="a number of °C", problem="n
 VECTOR = listed(number(), 3, "three numbers")
 _G = STRONGEST_GRAVITY
 GRAVITY = listed(number(least=-_G, most=_G, expected=f"a number of m/s² from {-_G:g} to {_G:g}"), 3, "three numbers")
-SIGMA = number(
-    least=0.0, expected="a number above 0, or 0 for not given", problem="a standard deviation cannot be negative"
-)
-_ABOVE = "a number above 0"
-PRIORS = mapping(number(above=0.0, expected=_ABOVE, problem="the expected size of an effect must be positive"))
-GEARS = mapping(number(above=0.0, expected=_ABOVE, problem="a transmission ratio must be positive"))
+SMALLEST = 1e-30  # In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12
+_STATED = "a number above 0, or 0 for not given"
+_SIGMA = number(least=0.0, expected=_STATED, problem="a standard deviation cannot be negative")
+
+
+def sigma(value: Any, path: str) -> float | None:
+    """Take a standard deviation; 0 and ``None`` say that none is given."""
+    found: float = 0.0 if value is None else _SIGMA(value, path)
+    if 0.0 < found < SMALLEST:
+        raise MisfitError(path, value, _STATED, "smaller than any noise")
+    return found or None
+
+
+_SIZE: dict[str, Any] = {"least": SMALLEST, "expected": "a number above 0"}
+PRIORS = mapping(number(**_SIZE, problem="the expected size of an effect must be positive"))
+GEARS = mapping(number(**_SIZE, problem="a transmission ratio must be positive"))
 _TEXT = text("text in quotes, a number or a date")
 
 
@@ -164,7 +174,7 @@ class Settings:
             tool_known=frames.get("tool") == "known",
             target=as_vector(scale * value for value in frames.get("target", zero)),
             noise_position=(noise.get("position") or 0.0) * scale or None,
-            noise_orientation=noise.get("orientation") or None,
+            noise_orientation=noise.get("orientation"),
             payload_com=as_vector(scale * value for value in payload.get("com", zero)),
             priors=sections.get("priors", {}),
             gears=sections.get("gears", {}),
@@ -197,8 +207,8 @@ _KEYS: dict[str, Kind] = {
     "base_known": boolean,
     "tool_known": boolean,
     "target": VECTOR,
-    "noise_position": optional(SIGMA),
-    "noise_orientation": optional(SIGMA),
+    "noise_position": sigma,
+    "noise_orientation": sigma,
     "payload_com": VECTOR,
     "priors": PRIORS,
     "gears": GEARS,
@@ -214,8 +224,7 @@ def settings_kind(value: Any, path: str) -> Settings:
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
     unsaid = {"moves": "unknown", "turned": (), "kind": "", "facts": {}, "about": {}}
     values = record(_KEYS)({**unsaid, **value} if isinstance(value, Mapping) else value, path)
-    sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
-    return Settings(**{**values, **sigmas, "units": Units(**values["units"])})
+    return Settings(**{**values, "units": Units(**values["units"])})
 
 
 def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[str, Any]:
