@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from campaign.files import URDF
+from campaign.importers.written import complaint, imported, put
 
-from thermal_robot import cli
-from thermal_robot.campaign import read_campaign
 from thermal_robot.kinematics import quaternion_to_rotation
-from thermal_robot.robot import load_robot
 
-ROBOT = ("example-robot-data:ur5", "tool0")
+ROBOT = ("--robot", "example-robot-data:ur5", "--tool", "tool0")
 AXES = np.array([[0.0, -90.0, 90.5, 0.0, 1.25e-2, 0.0], [-12.3, -70, 80, 5, 60, -179.9], [30, -100, 95, -20, -35, 10],
                  [7, -60, 70, 15, -20, 40]])  # fmt: skip
 PLACES = np.array([[812.5, -3.25, 1200.0], [700, 100, 900], [650.125, -200, 800], [500, 30, 1000]])
@@ -51,16 +48,11 @@ def rapid(kind: str, moves: str = "") -> str:
     return head + "\n".join(rows) + f"\nPROC main()\n{moves}ENDPROC\nENDMODULE\n"
 
 
-def run(folder, format, *arguments):
+@pytest.fixture
+def taken(tmp_path, capsys):
+    """Import files of the folder with a UR5, as it is read again."""
     pytest.importorskip("example_robot_data")
-    named = [str(folder / a) if (folder / a).exists() else a for a in arguments]
-    robot = ("--robot", ROBOT[0], "--tool", ROBOT[1])
-    return cli.main(["import", format, *named, *robot, "-o", str(folder / "made")])
-
-
-def imported(folder, format, *arguments):
-    assert run(folder, format, *arguments) == 0
-    return read_campaign(folder / "made")
+    return lambda format, *files: imported(capsys, tmp_path, format, *files, *ROBOT, robot=False)[0]
 
 
 MEASURED = "point;X;Y;Z\n" + "\n".join(";".join([n, *map(str, p)]) for n, p in zip(NAMES, PLACES, strict=True)) + "\n"
@@ -72,11 +64,11 @@ MEASURED = "point;X;Y;Z\n" + "\n".join(";".join([n, *map(str, p)]) for n, p in z
     ("rapid", "c.mod", rapid("jointtarget")),
 ])  # fmt: skip
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 0, 0, 3, 1)])
-def test_axes_and_a_table_are_joined_by_the_names_of_points(tmp_path, capsys, format, name, text, order):
+def test_axes_and_a_table_are_joined_by_the_names_of_points(tmp_path, taken, format, name, text, order):
     header, *lines = MEASURED.split("\n")[:-1]
     (tmp_path / name).write_text(text)
     (tmp_path / "m.csv").write_text("\n".join([header, *(lines[k] for k in order)]))
-    campaign = imported(tmp_path, format, name, "m.csv")
+    campaign = taken(format, name, "m.csv")
     np.testing.assert_allclose(np.rad2deg(campaign.q), AXES[list(order)], atol=1e-9)
     np.testing.assert_allclose(1e3 * campaign.position, PLACES[list(order)], atol=1e-9)
     assert campaign.labels["pose"].tolist() == [NAMES[k] for k in order]
@@ -85,10 +77,10 @@ def test_axes_and_a_table_are_joined_by_the_names_of_points(tmp_path, capsys, fo
 @pytest.mark.parametrize(("format", "axes", "places", "ending"), [
     ("kuka", kuka_dat("E6AXIS"), kuka_dat("E6POS"), "dat"), ("rapid", rapid("jointtarget"), rapid("robtarget"), "mod"),
 ])  # fmt: skip
-def test_places_of_a_second_program_were_measured(tmp_path, capsys, format, axes, places, ending):
+def test_places_of_a_second_program_were_measured(tmp_path, taken, format, axes, places, ending):
     (tmp_path / f"a.{ending}").write_text(axes)
     (tmp_path / f"p.{ending}").write_text(places)
-    campaign = imported(tmp_path, format, f"p.{ending}", f"a.{ending}")
+    campaign = taken(format, f"p.{ending}", f"a.{ending}")
     np.testing.assert_allclose(1e3 * campaign.position, PLACES, atol=1e-9)
     turned = quaternion_to_rotation(campaign.orientation)
     if format == "rapid":
@@ -100,7 +92,7 @@ def test_places_of_a_second_program_were_measured(tmp_path, capsys, format, axes
     np.testing.assert_allclose(turned[0][2, 1:], [np.cos(b) * np.sin(c), np.cos(b) * np.cos(c)], atol=1e-12)
 
 
-def test_a_program_tells_the_order_and_may_hold_points_itself(tmp_path, capsys):
+def test_a_program_tells_the_order_and_may_hold_points_itself(tmp_path, taken):
     (tmp_path / "c.dat").write_text(kuka_dat("E6AXIS"))
     moves = [
         "PTP Xcorner C_PTP",
@@ -112,26 +104,26 @@ def test_a_program_tells_the_order_and_may_hold_points_itself(tmp_path, capsys):
     moves += ["PTP {A1 1.5,A2 -80,A3 70,A4 0,A5 -5E1,A6 +.5}", "END"]
     (tmp_path / "c.src").write_text("\n".join(["DEF c()", *moves]))
     (tmp_path / "m.csv").write_text("x,y,z\n1,2,3\n4,5,6\n7,8,9.5\n")
-    campaign = imported(tmp_path, "kuka", "c.src", "m.csv")
+    campaign = taken("kuka", "c.src", "m.csv")
     np.testing.assert_allclose(np.rad2deg(campaign.q), [AXES[2], AXES[0], [1.5, -80, 70, 0, -50, 0.5]], atol=1e-9)
     moves = ["corner,v200,fine,t1;", "P1\\NoEOffs, v1, z5, t1;", f"[{bracket(AXES[3])},{EXTERNAL}]\\ID:=0,v1,fine,t1;"]
     (tmp_path / "c.mod").write_text(rapid("jointtarget", "".join(f"MoveAbsJ {move}\n" for move in moves)))
-    campaign = imported(tmp_path, "rapid", "c.mod", "m.csv")
+    campaign = taken("rapid", "c.mod", "m.csv")
     np.testing.assert_allclose(np.rad2deg(campaign.q), AXES[[2, 0, 3]], atol=1e-9)
 
 
-def test_places_between_axes_are_passed_over(tmp_path, capsys):
+def test_places_between_axes_are_passed_over(tmp_path, taken):
     both = kuka_dat("E6AXIS").replace("ENDDAT", "DECL E6POS XP9={X 1,Y 2,Z 3,A 4,B 5,C 6}\nENDDAT")
     (tmp_path / "c.dat").write_text(both)
     (tmp_path / "m.csv").write_text(MEASURED)
-    np.testing.assert_allclose(np.rad2deg(imported(tmp_path, "kuka", "m.csv", "c.dat").q), AXES, atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(taken("kuka", "m.csv", "c.dat").q), AXES, atol=1e-9)
 
 
-def test_an_array_of_targets(tmp_path, capsys):
+def test_an_array_of_targets(tmp_path, taken):
     rows = ",\n".join(f"[{bracket(axes)}, {EXTERNAL}]" for axes in AXES)
     (tmp_path / "c.mod").write_text(f"MODULE m\nCONST jointtarget cal{{4}}:=[{rows}];\nENDMODULE\n")
     (tmp_path / "m.csv").write_text(MEASURED)
-    np.testing.assert_allclose(np.rad2deg(imported(tmp_path, "rapid", "c.mod", "m.csv").q), AXES, atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(taken("rapid", "c.mod", "m.csv").q), AXES, atol=1e-9)
 
 
 @pytest.mark.parametrize("files", [("p.dat", "m.csv"), ("a.dat",), ("a.dat", "a.dat"), ("gone.dat", "m.csv")])
@@ -139,20 +131,14 @@ def test_places_are_no_commands(tmp_path, capsys, files):
     for name, kind in (("a", "E6AXIS"), ("p", "E6POS")):
         (tmp_path / f"{name}.dat").write_text(kuka_dat(kind))
     (tmp_path / "m.csv").write_text(MEASURED)
-    assert run(tmp_path, "kuka", *files) == 2
-    said = capsys.readouterr().err
+    pytest.importorskip("example_robot_data")
+    said = complaint(capsys, tmp_path, "kuka", *files, *ROBOT, robot=False)
     assert "gone.dat: there is no such file" in said or "a place tells no posture" in said
 
 
 def test_another_chain_than_six_axes_names_its_columns(tmp_path, capsys):
-    (tmp_path / "robot.urdf").write_text(URDF)
-    assert load_robot(URDF, "tool").n == 4
-    (tmp_path / "a.dat").write_text(kuka_dat("E6AXIS"))
-    (tmp_path / "m.csv").write_text(MEASURED)
-    (tmp_path / "m.toml").write_text(
-        '[robot]\nurdf = "robot.urdf"\ntool_frame = "tool"\n[columns]\njoints = ["A6", "A1", "E1", "A2"]\n'
-    )
-    given = ["a.dat", "m.csv", "--mapping", "m.toml"]
-    files = [str(tmp_path / each) if (tmp_path / each).exists() else each for each in given]
-    assert cli.main(["import", "kuka", *files, "-o", str(tmp_path / "made")]) == 0
-    np.testing.assert_allclose(np.rad2deg(read_campaign(tmp_path / "made").q[:, 3]), AXES[:, 1], atol=1e-9)
+    mapping = '[columns]\njoints = ["A6", "A1", "E1", "A2"]\n'
+    put(tmp_path, a__dat=kuka_dat("E6AXIS"), m__csv=MEASURED, m__toml=mapping)
+    campaign, _ = imported(capsys, tmp_path, "kuka", "a.dat", "m.csv", "--mapping", "m.toml")
+    assert campaign.robot.n == 4
+    np.testing.assert_allclose(np.rad2deg(campaign.q[:, 3]), AXES[:, 1], atol=1e-9)
