@@ -34,8 +34,8 @@ tool_frame = "tool"
 reference_temperature = 22.5
 [measurements]
 file = "measurements.csv"
-angle_unit = "{angle}"
-length_unit = "{length}"
+angle_unit = "deg"
+length_unit = "mm"
 [frames]
 base = "unknown"
 tool = "known"
@@ -58,10 +58,10 @@ ROWS = """turn,lift,slide,roll,x,y,z
 """
 
 
-def put(folder: Path, table: str | bytes = ROWS, *, angle: str = "deg", length: str = "mm") -> Path:
+def put(folder: Path, table: str | bytes = ROWS, toml: str = TOML) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / "robot.urdf").write_text(URDF)
-    (folder / "campaign.toml").write_text(TOML.format(angle=angle, length=length))
+    (folder / "campaign.toml").write_text(toml)
     (folder / "measurements.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
     return folder
 
@@ -125,10 +125,7 @@ PLAIN = """turn,lift,slide,roll,x,y,z,time,note
 
 def read(folder: Path, table: str | bytes = PLAIN, toml: str = PLAIN_TOML) -> Campaign:
     """The plain campaign, or what it is with another table or campaign.toml."""
-    (folder / "robot.urdf").write_text(URDF)
-    (folder / "campaign.toml").write_text(toml)
-    (folder / "measurements.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
-    return read_campaign(folder)
+    return read_campaign(put(folder, table, toml))
 
 
 def refusal(folder: Path, table: str | bytes = PLAIN, toml: str = PLAIN_TOML) -> CampaignError:
