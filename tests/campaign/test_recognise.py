@@ -98,7 +98,7 @@ def test_every_column_has_one_part(tmp_path: Path) -> None:
     table = read_table(put(tmp_path / "c", FULL) / "measurements.csv")
     robot = load_robot(URDF, "tool")
     columns = recognise(table, robot, measured=True)
-    posed = [name for group in (("x", "y", "z"), *columns.groups) for name in group]
+    posed = [name for group in columns.groups for name in group]
     parts = [*robot.joint_names, *posed, *columns.covariates, *columns.extra, *columns.labels]
     assert sorted(parts) == sorted(table.columns)
     assert ("qw", "qx", "qy", "qz") in columns.groups

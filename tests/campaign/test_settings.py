@@ -12,7 +12,7 @@ from campaign.files import URDF, full
 from thermal_robot.campaign import Settings, Units, names, unit_of
 from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
 from thermal_robot.campaign.settings import as_vector
-from thermal_robot.campaign.units import covariate_scale
+from thermal_robot.campaign.units import scale_of
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 
@@ -104,7 +104,7 @@ FACTORS = {"deg": math.pi / 180, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0
 def test_the_scale_is_the_ratio_of_the_two_units(robot: Robot, units: Units) -> None:
     for column in full().covariates:
         word = unit_of(column, robot, units).partition("/")[0]
-        assert covariate_scale(column, robot, units) == pytest.approx(FACTORS.get(word, 1.0), rel=1e-15)
+        assert scale_of(column, robot, units) == pytest.approx(FACTORS.get(word, 1.0), rel=1e-15)
 
 
 def test_a_joints_scale_is_that_of_its_kind() -> None:

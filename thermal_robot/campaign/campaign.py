@@ -24,7 +24,7 @@ from thermal_robot.campaign.checked import (
 from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
-from thermal_robot.campaign.units import Units, covariate_scale
+from thermal_robot.campaign.units import Units, scale_of
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot, load_robot
@@ -62,7 +62,7 @@ _KINDS: dict[str, Kind] = {
     "about": kinds.ABOUT,
 }
 """What each part may be that is no array."""
-_WIDE = {"q": 0, "position": 3, "orientation": 4, "simulated_position": 3, "simulated_orientation": 4}
+_WIDE = {"q": 0, **{key: len(group) for key, group in names.POSES.items()}}
 """Figures in a row of each (N, k) array; of the commands as many as the chain has joints."""
 _PER_SAMPLE = (*_WIDE, "noise_of_rows", "rows")
 _BY_NAME = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_, "travelled": np.float64}
@@ -268,23 +268,21 @@ class Campaign:
         import pandas as pd
 
         robot, units, several = self.robot, self.units, self.targets
-        scales = [units.joint_scale(kind) for kind in robot.joint_types]
-        columns: dict[str, Array] = dict(zip(robot.joint_names, (self.q / scales).T, strict=True))
+        held: dict[str, Array] = dict(zip(robot.joint_names, self.q.T, strict=True))
         if several is not None:
             for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
-                columns |= dict(zip(names.axes_of(number), points / units.length_scale, strict=True))
-        for group, values, scale in (
-            (names.POSITION, None if several else self.position, units.length_scale),
-            (names.ORIENTATION, None if several else self.orientation, 1.0),
-            (names.SIMULATED_POSITION, self.simulated_position, units.length_scale),
-            (names.SIMULATED_ORIENTATION, self.simulated_orientation, 1.0),
-        ):
-            if values is not None:
-                columns |= dict(zip(group, values.T / scale, strict=True))
-        columns |= {name: v / names.reading_scale(name, units.length_scale) for name, v in self.readings.items()}
-        if self.noise_of_rows is not None:
-            columns[names.NOISE] = self.noise_of_rows / units.length_scale
-        columns |= {name: v / covariate_scale(name, robot, units) for name, v in self.covariates.items()}
+                held |= dict(zip(names.axes_of(number), points, strict=True))
+        for key, group in names.POSES.items():
+            values = getattr(self, key)
+            # several targets tell a pose, which was not measured
+            if values is not None and (several is None or group not in (names.POSITION, names.ORIENTATION)):
+                held |= dict(zip(group, values.T, strict=True))
+        columns = {name: values / scale_of(name, robot, units) for name, values in held.items()}
+        length = units.length_scale
+        columns |= {name: values / names.reading_scale(name, length) for name, values in self.readings.items()}
+        held = {} if self.noise_of_rows is None else {names.NOISE: self.noise_of_rows}
+        held |= self.covariates
+        columns |= {name: values / scale_of(name, robot, units) for name, values in held.items()}
         labels = {name: labels.astype(object) for name, labels in self.labels.items()}
         shown = pd.DataFrame({**columns, **labels}, index=pd.Index(self.rows, name="row"))
         shown.attrs = {"angle_unit": self.units.angle, "length_unit": self.units.length}

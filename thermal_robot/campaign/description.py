@@ -12,7 +12,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.settings import SAME_CONFIGURATION
 from thermal_robot.campaign.targets import of_a_point
-from thermal_robot.campaign.units import covariate_scale, unit_of
+from thermal_robot.campaign.units import scale_of, unit_of
 from thermal_robot.percents import percent
 from thermal_robot.tables import html_table
 
@@ -120,7 +120,7 @@ def _covariates(campaign: Any) -> Iterator[Sequence[str]]:
             whole = len(columns) == robot.n > 1
             of = f"all {robot.n} joints" if whole else ", ".join(split_name(column)[1] for column in columns)
             of += ", from the order of rows" if set(columns) <= set(campaign.derived) else ""
-        values = np.concatenate([campaign.covariates[c] / covariate_scale(c, robot, units) for c in columns])
+        values = np.concatenate([campaign.covariates[c] / scale_of(c, robot, units) for c in columns])
         gaps = sum(int(campaign.missing[column].sum()) for column in columns if column in campaign.missing)
         spread = _range(values.min(), values.max()) if np.ptp(values) > 0 else f"{values[0]:.6g}, does not vary"
         yield quantity, of, spread, unit, f"{gaps} filled" if gaps else "none"

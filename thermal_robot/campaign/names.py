@@ -9,6 +9,13 @@ POSITION = ("x", "y", "z")
 ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
+POSES = {
+    "position": POSITION,
+    "orientation": ORIENTATION,
+    "simulated_position": SIMULATED_POSITION,
+    "simulated_orientation": SIMULATED_ORIENTATION,
+}
+"""Columns of each part of a pose that a campaign holds."""
 LABELS = ("session", "pose", "path")
 KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "position": (POSITION, ()),

@@ -31,7 +31,7 @@ from thermal_robot.campaign.settings import MOVES, SAME_CONFIGURATION, STANDARD_
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.campaign.targets import FEWEST, Posed, posed, propagated_sigma, telling
 from thermal_robot.campaign.turning import arrivals
-from thermal_robot.campaign.units import SI, Units, covariate_scale
+from thermal_robot.campaign.units import SI, Units, scale_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
@@ -59,13 +59,10 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     q = _commands(table, robot, units)
     covariates, missing, gaps = _covariates(table, columns, robot, units, q)
     settings, columns = framed(settings, columns)
-    plain = measured and not told and columns.kinds in ((), ("controller",))
-    poses: dict[str, Any] = {"position": _vectors(table, names.POSITION, units) if plain else None}
+    poses: dict[str, Any] = {
+        key: _pose(table, group, units) for key, group in names.POSES.items() if group in columns.groups
+    }
     poses["readings"], labels = readings(table, columns, settings)
-    turns = (("orientation", names.ORIENTATION), ("simulated_orientation", names.SIMULATED_ORIENTATION))
-    poses |= {key: _quaternions(table, group) if group in columns.groups else None for key, group in turns}
-    simulated = names.SIMULATED_POSITION in columns.groups
-    poses["simulated_position"] = _vectors(table, names.SIMULATED_POSITION, units) if simulated else None
     poses |= {"position": told.position, "orientation": told.orientation} if told else {}
     campaign = Campaign(
         name,
@@ -100,7 +97,7 @@ def arrived(campaign: Campaign) -> Campaign:
 def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
     """Return what is declared of the frames where it follows from what was measured, and the columns that are read."""
     if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
-        groups = (*columns.groups, names.ORIENTATION)
+        groups = (names.POSITION, names.ORIENTATION, *columns.groups)
         return replace(settings, base_known=True, tool_known=True), replace(columns, groups=groups)
     # nothing but an instrument says where the base stands: without one it stands where the URDF has it
     alone = bool(columns.kinds) and not {"position", "pose"} & {*columns.kinds}
@@ -169,7 +166,7 @@ def _covariates(
         if column == "order" and _restarts(values, commands):
             values = np.arange(float(len(values)))
             warnings.append("column 'order' starts anew within the table: rows count as measured in the table's order")
-        covariates[column] = values * covariate_scale(column, robot, units)
+        covariates[column] = values * scale_of(column, robot, units)
     return covariates, missing, warnings
 
 
@@ -182,16 +179,13 @@ def _restarts(order: Array, commands: Array) -> bool:
     return bool((commands[same] != commands[0]).any())
 
 
-def _vectors(table: Table, group: Sequence[str], units: Units) -> Array:
-    """Vectors (N, 3), m."""
-    return np.column_stack([table.numbers(column) for column in group]) * units.length_scale
-
-
-def _quaternions(table: Table, group: Sequence[str]) -> Array:
-    """Return the unit quaternions (N, 4) wxyz."""
-    quaternions = np.column_stack([table.numbers(column) for column in group])
-    check_quaternions(table.file, group[0], quaternions, table.rows)
-    return np.asarray(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
+def _pose(table: Table, group: Sequence[str], units: Units) -> Array:
+    """Vectors (N, 3), m, or unit quaternions (N, 4) wxyz."""
+    figures = np.column_stack([table.numbers(column) for column in group])
+    if len(group) == len(names.POSITION):
+        return figures * units.length_scale
+    check_quaternions(table.file, group[0], figures, table.rows)
+    return np.asarray(figures / np.linalg.norm(figures, axis=1, keepdims=True))
 
 
 def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:

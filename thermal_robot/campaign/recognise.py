@@ -197,7 +197,7 @@ class Columns:
     covariates: tuple[str, ...]  # those that the format defines, except empty ones
     extra: tuple[str, ...]  # numeric columns that the format does not define
     labels: tuple[str, ...]  # ``session``, ``pose`` and ``path`` where present
-    groups: tuple[tuple[str, ...], ...]  # of orientation, simulated position and orientation those that are there
+    groups: tuple[tuple[str, ...], ...]  # of position and orientation, measured and simulated, those that are there
     has_noise: bool  # whether the noise of each row is there
     targets: tuple[int, ...]  # numbers of several targets of one pose, in their order; empty where there is one
     warnings: tuple[str, ...]  # columns left out, and names that look like typing errors
@@ -222,12 +222,12 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
     kinds = _kinds(table, kind) if measured else ()
     plain = measured and not kinds
     targets, warnings = _targets(table, robot) if plain else ((), [])
+    asked = [names.SIMULATED_POSITION, names.SIMULATED_ORIENTATION]
     if plain and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
+        asked = [*names.POSES.values()]
     for own in kinds:
         _require(table, [c for group in names.KINDS[own] for c in group], f"rows of the kind {own!r} need it")
-    turned = [names.ORIENTATION] if plain and not targets else []
-    asked = (*turned, names.SIMULATED_POSITION, names.SIMULATED_ORIENTATION)
     groups = tuple(group for group in asked if _whole_group(table, group))
     if names.SIMULATED_ORIENTATION in groups and names.SIMULATED_POSITION not in groups:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")

@@ -90,7 +90,7 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
     return _OF_A_JOINT.get(quantity, "").format(units.joint_unit(kinds[place]))
 
 
-def covariate_scale(column: str, robot: Robot, units: Units) -> float:
-    """SI factor of a covariate's column; 1 where it is in SI, in °C, or dimensionless."""
+def scale_of(column: str, robot: Robot, units: Units) -> float:
+    """SI factor of a column of a robot's table; 1 where it is in SI, in °C, or dimensionless."""
     word = unit_of(column, robot, units).partition("/")[0]
     return (ANGLE_UNITS | LENGTH_UNITS).get(word, 1.0)
