@@ -17,6 +17,7 @@ from thermal_robot.schema import LARGEST
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""
+ROTATION_TOLERANCE = 0.01  # By how much the product of a matrix with its transpose may differ from 1: two decimals do
 LARGEST_COMMAND = 1e6  # rad or m: 160 000 turns, which leave ten digits for the angle
 
 Rows: TypeAlias = "NDArray[np.int64]"
@@ -42,6 +43,12 @@ def without_rounding(values: Array) -> Array:
 def no_orientation(quaternions: Array) -> int | None:
     """Row of the first of (N, 4) quaternions that is not normalised; ``None`` without one."""
     return first_true(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE)
+
+
+def no_rotation(matrices: Array) -> int | None:
+    """Index of the first of (N, 3, 3) matrices that is no rotation, to two decimals; ``None`` without one."""
+    away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    return first_true((away > ROTATION_TOLERANCE) | (np.linalg.det(matrices) < 0.0))
 
 
 def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:

@@ -112,7 +112,7 @@ def write_commands(
     """
     frame = replace(commands, orientation=None).to_frame().drop(columns=list(derived), errors="ignore")
     measured = names.POSITION if commands.orientation is None else names.MEASURED
-    noted = [name for name in frame if names.split_name(name)[0] == "temperature"] if recorded else []
+    noted = [name for name in frame if names.split_name(str(name))[0] == "temperature"] if recorded else []
     frame = frame.assign(**dict.fromkeys((*noted, *measured), ""))
     _write(Path(path), frame.to_csv, lineterminator="\n", float_format="%.9g")
 

@@ -63,6 +63,28 @@ def test_a_hand_eye_set_is_a_campaign_of_poses(robot, q, tmp_path, mount, rows_f
     assert np.abs(gap).max() < 1e-6
 
 
+SAMPLE = {"effector_wrt_world": np.eye(4).ravel().tolist(), "object_wrt_sensor": np.eye(4).ravel().tolist()}
+
+
+@pytest.mark.parametrize(
+    ("values", "samples", "said"),
+    [
+        ([[0.0] * 6, [0.0]], [SAMPLE] * 2, r"joints\.yaml, joint_values\[1\]: .* expected a list of 6 values"),
+        ([["a"] * 6], [SAMPLE], r"joint_values\[0\]\[0\]: is 'a', expected a finite number"),
+        ([[0.0] * 6], [SAMPLE] * 2, "found 1 joint states, 2 samples"),
+        ([[0.0] * 6], [{**SAMPLE, "object_wrt_sensor": [0.0] * 16}], r"\[0\]\.object_wrt_sensor: is no pose"),
+        ([[0.0] * 6], [{**SAMPLE, "effector_wrt_world": [np.nan] * 16}], r"\[0\]\.effector_wrt_world: is no pose"),
+        ([[0.0] * 6] * 3, [SAMPLE] * 3, "do not tell whether the camera is on the hand"),
+    ],
+)
+def test_a_hand_eye_set_that_cannot_be_used_is_refused(robot, tmp_path, values, samples, said):
+    states = {"joint_names": list(robot.joint_names), "joint_values": values}
+    (tmp_path / "joints.yaml").write_text(yaml.safe_dump(states))
+    (tmp_path / "samples.yaml").write_text(yaml.safe_dump(samples))
+    with pytest.raises(CampaignError, match=said):
+        import_files("moveit", [tmp_path / "joints.yaml", tmp_path / "samples.yaml"], tmp_path, planned(ROBOT))
+
+
 def test_corners_of_images_make_a_campaign_of_pixels(robot, q, tmp_path):
     lens, points = 800.0, np.array([[x, y, 0.0] for x in (0.0, 0.1) for y in (0.0, 0.05)])
     camera = exp6(np.array([0.0, 0.0, 3.0, np.pi, 0.0, 0.0]))

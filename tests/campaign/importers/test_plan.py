@@ -71,7 +71,13 @@ def test_what_is_not_stated_is_asked_for():
 
 TABLE = Table(
     "f.csv",
-    {"a": ["1", "", "3"], "b": np.array([10.0, 20.0, 30.0]), "c": ["p", "q", ""], "t": ["7 s", "9 s", ""]},
+    {
+        "a": ["1", "", "3"],
+        "b": np.arange(10.0, 31.0, 10.0),
+        "c": ["p", "q", ""],
+        "t": ["7 s", "9 s", ""],
+        "e": [""] * 3,
+    },
     np.array([2, 3, 4]),
     1,
 )
@@ -88,6 +94,7 @@ TABLE = Table(
         ({"count": True}, [0, 1, 2]),
         ({"column": "b", "since_first": True}, [0, 10, 20]),
         ({"column": "t", "time": "%S s"}, [0, 2, np.nan]),
+        ({"column": "e", "since_first": True}, [np.nan] * 3),
     ],
 )
 def test_numbers(given, expected):
@@ -98,10 +105,11 @@ def test_texts():
     assert column_kind("c", "").text(TABLE) == ["p", "q", ""]
     assert column_kind({"sum": ["a", "c"]}, "").text(TABLE) == ["1 p", " q", "3 "]
     assert column_kind({"value": "run 1"}, "").text(TABLE) == ["run 1"] * 3
+    assert column_kind({"count": True}, "").text(TABLE) == ["0", "1", "2"]
 
 
 def test_what_is_not_there():
-    for source in ("d", 5):
+    for source in ("d", 6):
         with pytest.raises(CampaignError, match=f"f.csv, row 1, column '{source}': there is no such column"):
             column_kind(source, "").numbers(TABLE)
     with pytest.raises(CampaignError, match="row 2, column 'c': text where a number should be; found 'p'"):

@@ -30,13 +30,16 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.campaign.checked import first_beyond, no_rotation
 from thermal_robot.campaign.document import read_yaml
-from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, column_name, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import ORIENTATION, POSITION
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import align, log3, rotation_to_quaternion
+from thermal_robot.schema import fitted, matrix, text
+from thermal_robot.schema import listed as list_of
 
 _HAND, _EYE = "effector_wrt_world", "object_wrt_sensor"
 _LEAST_TURN = 0.05  # rad: the axis of a smaller turn is lost in what a camera sees of it
@@ -49,7 +52,12 @@ def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
     except (TypeError, KeyError, ValueError) as error:
         raise CampaignError(file, f"samples lack {key}", expected="sixteen figures of a 4 × 4 matrix") from error
     upright = np.allclose(found[:, 3], [0.0, 0.0, 0.0, 1.0])
-    return found if upright else np.asarray(found.transpose(0, 2, 1))
+    found = found if upright else found.transpose(0, 2, 1)
+    wrong = first_beyond(found.reshape(-1, 16))
+    wrong = no_rotation(found[:, :3, :3]) if wrong is None else wrong
+    if wrong is not None:
+        raise CampaignError(file, "is no pose", key=f"[{wrong}].{key}", expected="a rotation and a place")
+    return found
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -60,12 +68,15 @@ def _apart(one: Array, other: Array) -> float:
     return float(np.linalg.norm(one @ turn.T - other) / np.linalg.norm(other))
 
 
-def on_the_hand(hand: Array, eye: Array) -> bool:
+def _on_the_hand(file: str, hand: Array, eye: Array) -> bool:
     """Tell whether the camera moves with the hand, from poses (N, 4, 4) of both: see the module's text."""
     hand, eye = hand[:, :3, :3], eye[:, :3, :3]
     seen = log3(eye[1:] @ eye[:-1].transpose(0, 2, 1))
     moved = log3(hand[1:].transpose(0, 2, 1) @ hand[:-1]), log3(hand[1:] @ hand[:-1].transpose(0, 2, 1))
     large = np.linalg.norm(seen, axis=1) > _LEAST_TURN
+    if not large.any():
+        expected = f"poses that turn the camera by more than {_LEAST_TURN:g} rad"
+        raise CampaignError(file, "samples do not tell whether the camera is on the hand", expected=expected)
     with_it, before_it = (_apart(own[large], seen[large]) for own in moved)
     return with_it < before_it
 
@@ -79,14 +90,15 @@ def _moveit(files: Sequence[Path], plan: Plan) -> Source:
         expected = "joint states (joint_names, joint_values) and samples (a list), both as MoveIt saves them"
         raise CampaignError(str(files[0]), "these are no such files", expected=expected)
     (name, own), (file, listed) = states, samples
-    values = np.array(own["joint_values"], dtype=float)
-    if values.shape != (len(listed), len(own["joint_names"])):
+    joints = fitted(list_of(text("the name of a joint")), own["joint_names"], name, "joint_names")
+    values = fitted(matrix((None, len(joints))), own["joint_values"], name, "joint_values")
+    if len(values) != len(listed):
         found, expected = f"{len(values)} joint states, {len(listed)} samples", "as many of both, in the same order"
         raise CampaignError(name, "does not belong to the samples", found=found, expected=expected)
     hand, eye = _poses(file, listed, _HAND), _poses(file, listed, _EYE)
-    mounted = on_the_hand(hand, eye)
+    mounted = _on_the_hand(file, hand, eye)
     seen = np.linalg.inv(eye) if mounted else eye
-    columns: dict[str, Cells] = dict(zip(map(str, own["joint_names"]), values.T, strict=True))
+    columns: dict[str, Cells] = dict(zip(joints, values.T, strict=True))
     columns |= dict(zip(POSITION, seen[:, :3, 3].T, strict=True))
     columns |= dict(zip(ORIENTATION, rotation_to_quaternion(seen[:, :3, :3]).T, strict=True))
     units: dict[str, dict[str, Any]] = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
@@ -102,7 +114,7 @@ def _corners(files: Sequence[Path], plan: Plan) -> Source:
     if "camera" not in corners.columns and len(cameras) != 1:
         expected = "[camera.NAME] with fx, fy, cx, cy and mount in the file of --mapping, or a column camera"
         raise CampaignError(str(files[0]), "it is not clear which camera saw this", expected=expected)
-    both, notes = joined(corners, states, "image")
+    both, notes = joined(corners, states, column_name(corners, "image"))
     columns: dict[str, Any] = {"u": "u", "v": "v"}
     columns |= {f"board.{axis}": axis.upper() for axis in "xyz" if axis.upper() in both.columns}
     if "camera" not in both.columns:

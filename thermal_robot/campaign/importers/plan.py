@@ -18,13 +18,13 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.checked import first_true, no_orientation
+from thermal_robot.campaign.checked import first_true, no_orientation, no_rotation
 from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
 from thermal_robot.campaign.recognise import bare, defined, headings, size
-from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector
+from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector, given
 from thermal_robot.campaign.table import SPACE, Cells, Layout, Table
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, unit_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
@@ -52,19 +52,22 @@ class Column:
     def numbers(self, table: Table) -> Array:
         """Numbers (N,), NaN where a cell is empty; text and times of another pattern are refused."""
         rows = len(table.rows)
+        if isinstance(self.value, str):
+            problem, found = "text where a number should be", repr(self.value)
+            raise CampaignError(table.file, problem, found=found, expected="a number")
         if self.count or self.value is not None:
-            return np.arange(float(rows)) if self.count else np.full(rows, float(self.value or 0.0))
+            return np.arange(float(rows)) if self.count else np.full(rows, self.value)
         values = np.zeros(rows)
         for source in self.sources:
-            name = found(table, source)
+            name = column_name(table, source)
             values += self._instants(table, name) if self.time else table.numbers(name, gaps=True)
         values = values * self.scale + self.offset
-        return values - np.nanmin(values) if self.since_first or self.time else values
+        return values - np.fmin.reduce(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
         """Return the unit in the header of its source; ``None`` for a sum, or with another scale than a sign."""
         plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
-        return bare(found(table, self.sources[0])).unit if plain else None
+        return bare(column_name(table, self.sources[0])).unit if plain else None
 
     def complete(self, table: Table, name: str = "") -> Array:
         """Numbers (N,) without gaps; ``name`` is the campaign's column, for the message."""
@@ -78,9 +81,10 @@ class Column:
 
     def text(self, table: Table) -> list[str]:
         """Texts (N,); those of several sources joined by a blank."""
-        if self.value is not None:
-            return [str(self.value)] * len(table.rows)
-        return [" ".join(row) for row in zip(*(table.text(found(table, each)) for each in self.sources), strict=True)]
+        if self.count or self.value is not None:
+            return [str(k) if self.count else str(self.value) for k in range(len(table.rows))]
+        cells = (table.text(column_name(table, each)) for each in self.sources)
+        return [" ".join(row) for row in zip(*cells, strict=True)]
 
     def _instants(self, table: Table, name: str) -> Array:
         """Time stamps (N,) in s since an epoch."""
@@ -96,7 +100,7 @@ class Column:
         return seconds
 
 
-def found(table: Table, source: str | int) -> str:
+def column_name(table: Table, source: str | int) -> str:
     """Name of a table column, by its name or number; an unknown one is refused."""
     names = list(table.columns)
     if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
@@ -135,11 +139,11 @@ def column_kind(value: Any, path: str) -> Column:
     """Validate a column's source: a name, a number, or an inline table."""
     if not isinstance(value, Mapping):
         return Column((_SOURCE(value, path),))
-    given = record(_FIELDS, may_lack=_FIELDS)(value, path)
-    if len([key for key in _ORIGINS if key in given]) != 1:
+    stated = record(_FIELDS, may_lack=_FIELDS)(value, path)
+    if len([key for key in _ORIGINS if key in stated]) != 1:
         raise MisfitError(path, value, f"one of the keys {', '.join(_ORIGINS)}")
-    sources = (given.pop("column"),) if "column" in given else given.pop("sum", ())
-    return Column(sources, **given)
+    sources = (stated.pop("column"),) if "column" in stated else stated.pop("sum", ())
+    return Column(sources, **stated)
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
@@ -157,7 +161,6 @@ _SEQUENCES = tuple(
     "".join(axes) for letters in ("XYZ", "xyz") for axes in itertools.product(letters, repeat=3)
     if axes[0] != axes[1] != axes[2]
 )  # fmt: skip
-_TURNED = 0.01  # By how much the product of a matrix with its transpose may differ from 1: figures with two decimals do
 
 
 @dataclass(frozen=True)
@@ -192,9 +195,7 @@ class Orientation:
             turned = Rotation.from_rotvec(figures)
         else:
             matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
-            away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _TURNED
-            away |= np.linalg.det(matrices) < 0
-            self._refuse(table, first_true(away), "a matrix that is no rotation", figures)
+            self._refuse(table, no_rotation(matrices), "a matrix that is no rotation", figures)
             turned = Rotation.from_matrix(matrices)
         return np.asarray((turned.inv() if self.inverse else turned).as_quat(scalar_first=True))
 
@@ -307,9 +308,9 @@ class Plan:
         return Settings.stated(self.sections, urdf="", **ends)
 
 
-def planned(sections: Mapping[str, Mapping[str, Any]]) -> Plan:
-    """Return the plan that a format brings along, written as a mapping is."""
-    return Plan("", fitted_sections(KINDS, sections))
+def planned(sections: Mapping[str, Mapping[str, Any]], file: str = "import") -> Plan:
+    """Return the plan that a format brings along, written as a mapping is; errors name the ``file`` it is from."""
+    return Plan("", given(file, "", sections, lambda stated, _: fitted_sections(KINDS, stated)))
 
 
 def read_mapping(path: Path) -> Plan:
@@ -377,7 +378,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     if orientation is not None:
         cells.update(zip(names.ORIENTATION, orientation.quaternions(table).T, strict=True))
         used += orientation.columns
-    taken = {found(table, source) for column in used for source in column.sources}
+    taken = {column_name(table, source) for column in used for source in column.sources}
     spare = [name for name in table.columns if name not in taken]
     if spare:
         notes.append(f"columns left out: {listed(spare)}")

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, column_name, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.table import LARGEST_TABLE, Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
@@ -160,7 +160,7 @@ def _named(measured: Table, points: Sequence[str], stated: str | None) -> tuple[
     Of KUKA's point P1 the variable is XP1, and capitals and small letters are the same.
     """
     best, called = "", list(points)
-    for column in [stated] if stated else measured.columns:
+    for column in [column_name(measured, stated)] if stated else measured.columns:
         spelled = {name.upper(): name for name in measured.text(column) if name}
         names = [spelled.get(point, spelled.get(point.removeprefix("X"), point)) for point in points]
         if len({*names} & {*spelled.values()}) > len({*called} & {*(measured.text(best) if best else ())}):

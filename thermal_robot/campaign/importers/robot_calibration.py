@@ -86,6 +86,8 @@ def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> di
     row = _positions(file, index, state, ("name", "position"))
     seen = {each["sensor_name"]: each.get("features") or [] for each in _observations(sample)}
     features = seen.get(sensor, [])
+    if not isinstance(features, list):
+        raise _odd(file, index, features, "a list of features")
     if len(features) < feature:
         return row
     point = features[feature - 1].get("point") if isinstance(features[feature - 1], dict) else None
@@ -96,7 +98,8 @@ def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> di
 
 def _observations(sample: Any) -> list[Any]:
     found = sample.get("observations") if isinstance(sample, dict) else None
-    return [each for each in found or [] if isinstance(each, dict) and isinstance(each.get("sensor_name"), str)]
+    found = found if isinstance(found, list) else []
+    return [each for each in found if isinstance(each, dict) and isinstance(each.get("sensor_name"), str)]
 
 
 def _only_sensor(file: str, documents: Sequence[Any]) -> str:
@@ -138,7 +141,7 @@ def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
         notes.append(f"marker 1 of {len(markers)} taken; [columns] in the mapping takes another")
     if "phix1" in table.columns and not plan.sections.get("orientation"):
         notes.append("phix1 phiy1 phiz1 left out: angles or a rotation vector? [orientation] in the mapping says")
-    return Source(table, planned(sections), tuple(notes))
+    return Source(table, planned(sections, str(files[-1])), tuple(notes))
 
 
 def _configured(file: Path) -> dict[str, dict[str, Any]]:

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, found, planned
+from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, column_name, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import PLAIN, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
@@ -144,7 +144,7 @@ def _read_table(files: Sequence[Path], plan: Plan) -> Source:
     if len(files) == 1:
         return Source(table, Plan())
     key = plan.get("table", "key")
-    both, notes = joined(table, commands(files[1], plan), "" if key is None else found(table, key))
+    both, notes = joined(table, commands(files[1], plan), "" if key is None else column_name(table, key))
     return Source(both, Plan(), notes)
 
 
@@ -164,7 +164,8 @@ def _read_points(files: Sequence[Path], plan: Plan) -> Source:
     """Read points and commands, joined by name, or without names row by row."""
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
     table = _called(read_table(files[0], plan.layout() if laid_out else _laid_out(files[0])), plan)
-    key, targets = plan.get("table", "key") or _NAMES[-1], plan.get("table", "targets")
+    stated, targets = plan.get("table", "key"), plan.get("table", "targets")
+    key = column_name(table, stated) if stated else _NAMES[-1]
     columns, told = {axis: axis for axis in _AXES}, []
     if targets:
         (table, note), columns = grouped(table, key, targets), {}
@@ -223,7 +224,8 @@ def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
     """
     import pandas as pd
 
-    lines = pd.DataFrame({"pose": table.text(found(table, key)), "called": table.text(found(table, targets))})
+    poses, called = (table.text(column_name(table, each)) for each in (key, targets))
+    lines = pd.DataFrame({"pose": poses, "called": called})
     order = list(lines["called"].unique())
     if len(order) < 2:
         problem, expected = "holds a single target of each pose", "names of several targets, or no [table] targets"
