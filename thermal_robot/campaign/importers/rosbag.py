@@ -22,6 +22,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -322,11 +323,11 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
 ENDINGS = (".bag", ".mcap", ".db3")
 JOINT_STATES = ("sensor_msgs/msg/JointState",)
 _TARGETS = {
-    "geometry_msgs/msg/PoseStamped": "pose",
-    "geometry_msgs/msg/TransformStamped": "transform",
-    "geometry_msgs/msg/PointStamped": "point",
+    "geometry_msgs/msg/PoseStamped": ("pose.position", "pose.orientation"),
+    "geometry_msgs/msg/TransformStamped": ("transform.translation", "transform.rotation"),
+    "geometry_msgs/msg/PointStamped": ("point",),
 }
-"""Types of messages with a place, and the field that holds it."""
+"""Types of messages with a place, and the fields that hold it and a turn."""
 WITH_ROSBAGS = 'pip install "thermal-robot[ros]"'
 
 
@@ -401,11 +402,9 @@ def _joint_stream(file: str, messages: Sequence[Any], joints: Sequence[str]) -> 
 def _target_stream(file: str, messages: Sequence[Any]) -> Stream | None:
     times, rows = [], []
     for stamp, message, kind in messages:
-        held = getattr(message, _TARGETS[kind])
-        place = next((getattr(held, name) for name in ("position", "translation") if hasattr(held, name)), held)
-        turn = next((getattr(held, name) for name in ("orientation", "rotation") if hasattr(held, name)), None)
+        place, *turns = (attrgetter(path)(message) for path in _TARGETS[kind])
         times.append(instant(stamp, message))
-        rows.append([place.x, place.y, place.z, *([turn.w, turn.x, turn.y, turn.z] if turn else [])])
+        rows.append([place.x, place.y, place.z, *(getattr(turn, axis) for turn in turns for axis in "wxyz")])
     whole = names.MEASURED[: len(rows[0])] if rows else ()
     return stream(file, np.array(times), np.array(rows, dtype=float), whole) if rows else None
 
