@@ -266,8 +266,9 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
 
 def without_library(file: str, ending: str) -> CampaignError:
     """Error of a file whose ending needs a library that is not installed."""
-    extra, library = ("parquet", "pyarrow") if ending in PARQUET else ("excel", WORKBOOKS[ending])
-    problem = f"{'Parquet files' if ending in PARQUET else 'workbooks'} need {library}, which is not installed"
+    extra, problem = "parquet", "Parquet files need pyarrow, which is not installed"
+    if ending in WORKBOOKS:
+        extra, problem = "excel", f"workbooks need {WORKBOOKS[ending]}, which is not installed"
     return CampaignError(file, problem, expected=f'pip install "thermal-robot[{extra}]", or the table as CSV')
 
 
