@@ -27,8 +27,8 @@ from threadpoolctl import threadpool_limits
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.read import more_rows
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.read import more_rows
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis import settings as own_settings
 from thermal_robot.diagnosis.sequential import (
