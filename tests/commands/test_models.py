@@ -16,6 +16,7 @@ from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.commands.robot_files import OUTPUTS
 from thermal_robot.correction import calibrated
 from thermal_robot.effects import JointOffset
+from thermal_robot.effects.law import Discovered
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
@@ -113,6 +114,21 @@ def test_predict_tells_a_session_that_the_model_has_not_seen(run, folder, diagno
         written = pd.read_csv(tmp_path / "p.csv", keep_default_na=False)
         assert written["outside"].str.contains("session").all() == bool(said)
         assert (written["std.x"] > 1.0).all() == bool(said)  # mm
+
+
+def test_predict_tells_that_a_law_of_the_campaigns_rows_ends_with_it(run, folder, diagnosed, tmp_path):
+    model = CorrectedModel.load(diagnosed.model)
+    step = Discovered(kind="joint", place="joint_3", quantity="order", shape="step", marks=(40.0,), span=119.0)
+    rows = ["predict", tmp_path / "model.json", folder / "fresh.csv", "-o", tmp_path / "p.csv"]
+    written = []
+    for early in (0.0, 5e-3):  # what it was before the step is nothing to samples
+        replace(model, effects=(*model.effects, (step, np.array([early, 1e-3])))).save(tmp_path / "model.json")
+        status, _, told = run(*rows)
+        assert (status, "a law follows the order of the campaign's rows" in told) == (0, True)
+        written.append(pd.read_csv(tmp_path / "p.csv")[PLACE])
+    pd.testing.assert_frame_equal(*written)
+    model.save(tmp_path / "model.json")
+    assert run(*rows)[::2] == (0, "")
 
 
 def test_commands_take_the_place_of_joint_positions(run, folder, diagnosed, stdin, tmp_path):

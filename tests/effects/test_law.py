@@ -207,6 +207,21 @@ def test_what_is_predicted_without_a_clock_comes_after_the_campaign(rv_m2):
     np.testing.assert_array_equal(law.values(observe(commands)), 9.0)
 
 
+@pytest.mark.parametrize("shape", ["ramp", "product"])
+def test_a_second_quantity_that_is_the_order_of_rows_ends_with_the_campaign(rv_m2, shape):
+    """What is predicted does not depend on where a sample stands in its file."""
+    law = Discovered(place="joint_2", quantity="joint_1", shape=shape, by="order", by_span=9.0, span=3.0)
+    commands = commanded(rv_m2)
+    heights = np.full(len(checked(law, observe(commands))), 1e-4)
+    forward, backward = (commands.take(rows) for rows in (np.arange(SAMPLES), np.arange(SAMPLES)[::-1]))
+    backward = replace(backward, rows=commands.rows)
+    there, again = (moved(observe(own), law, heights) for own in (forward, backward))
+    np.testing.assert_array_equal(there, again[::-1])
+    last = moved(observe(replace(commands, position=np.zeros((SAMPLES, 3)))), law, heights)
+    np.testing.assert_array_equal(there[-1], last[-1])  # as in the campaign's last row
+    assert np.abs(there[0] - last[0]).max() > 1e-5
+
+
 def test_it_is_missing_reads_and_is_drawn_against_what_it_follows(rich, rv_m2):
     bare = observe(commanded(rv_m2))
     constant = replace(STEP, shape="constant", quantity="none", marks=())

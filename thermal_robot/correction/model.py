@@ -32,6 +32,7 @@ from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import depends_on, displacement
+from thermal_robot.effects.law import Discovered
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import (
@@ -501,6 +502,18 @@ class CorrectedModel:
             return False
         first, last = self.last_order
         return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
+
+    @property
+    def follows_rows(self) -> bool:
+        """Whether a law follows the order of the campaign's rows where no column told it: samples come after them.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.follows_rows
+        False
+        """
+        laws = (effect for effect, _ in self.effects if isinstance(effect, Discovered))
+        return "order" not in self.needs and any("order" in (law.quantity, law.by) for law in laws)
 
     def samples(self, table: str | Path | pd.DataFrame | Table) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.

@@ -109,7 +109,7 @@ class Discovered(Fading):
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Columns that the campaign lacks for the law, or for the effect that it modulates."""
         lacking: tuple[str, ...] = () if self.values(observations) is not None else (self.quantity,)
-        if self.by and quantity(observations, self.by) is None:
+        if self.by and self._read(observations, self.by) is None:
             lacking += (self.by,)
         return lacking + (gate.missing(self.modulated, observations) if self.modulated else ())
 
@@ -127,7 +127,7 @@ class Discovered(Fading):
         first = self._first(observations)
         if self.shape != "product" or first is None:
             return first
-        second = quantity(observations, self.by)
+        second = self._read(observations, self.by)
         return None if second is None else first * second
 
     def _first(self, observations: Observations) -> Array | None:
@@ -138,9 +138,15 @@ class Discovered(Fading):
             number = {label: float(k) for k, label in enumerate(self.labels)}
             rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
             return np.array([number.get(label, np.nan) for label in rows])
-        if self.quantity == "order" and self.quantity not in observations.covariates and not campaign.measured:
-            return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
-        return quantity(observations, self.quantity)
+        return self._read(observations, self.quantity)
+
+    def _read(self, observations: Observations, name: str) -> Array | None:
+        """Values (N,) of a quantity; of the order of rows that are to be predicted without one, its end."""
+        campaign = observations.campaign
+        if name == "order" and name not in observations.covariates and not campaign.measured:
+            ends = (self.origin, self.span) if name == self.quantity else (self.by_origin, self.by_span)
+            return np.full(campaign.samples, sum(ends))  # after the campaign
+        return quantity(observations, name)
 
     def _followed(self, observations: Observations) -> Array | None:
         """Argument of the shape at the rows; ``None`` where the campaign lacks it."""
@@ -195,7 +201,7 @@ class Discovered(Fading):
         At an unknown label they are the mean over the known ones.
         """
         values, two = self._followed(observations), bool(self.by) and self.shape != "product"
-        second = quantity(observations, self.by) if two else None
+        second = self._read(observations, self.by) if two else None
         if values is None or (two and second is None):
             return None
         if ranges := self._ranges:
@@ -225,7 +231,7 @@ class Discovered(Fading):
         first, values = self._first(observations), self.values(observations)
         if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
             return []
-        second = quantity(observations, self.by) if self.by else None
+        second = self._read(observations, self.by) if self.by else None
         if second is None or values is None:
             return [(self.quantity, first)]
         if self.shape == "product":
