@@ -81,6 +81,17 @@ def test_nobody_knows_whence_the_first_row_of_a_session_came():
     assert came([0.0, 1.0], time=[5.0, 5.0]) is None
 
 
+def test_nobody_knows_whence_a_row_came_whose_predecessor_was_struck():
+    path = [0.0, 2.0, 1.0, 1.0, 3.0, 0.0]
+    assert came(path, order=[1, 2, 3, 5, 6, 9]) == [0.0, 1.0, -1.0, 0.0, 1.0, 0.0]
+    assert came(path, order=[10, 20, 30, 50, 60, 90]) == [0.0, 1.0, -1.0, 0.0, 1.0, 0.0]
+    # with a clock beside it, and in the order of that clock
+    assert came(path, time=[5, 4, 3, 2, 1, 0], order=[6, 5, 3, 2, 1, 0]) == [-1.0, 0.0, -1.0, -1.0, 1.0, 0.0]
+    # no counter of rows, but a clock of its own
+    for clock in ([0, 41, 100, 180, 300, 420], [0.0, 1.5, 2.0, 9.0, 9.5, 30.0]):
+        assert came(path, order=clock) == [0.0, 1.0, -1.0, -1.0, 1.0, -1.0]
+
+
 def strains(path):
     path = np.array(path, dtype=float)[:, None]
     found = since_turns(path, ("elbow",), {"order": np.arange(float(len(path)))}, None)

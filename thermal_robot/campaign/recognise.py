@@ -218,7 +218,11 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
     chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
     more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
-    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
+    _require(
+        table,
+        robot.joint_names,
+        f"every movable joint of the chain from {chain} needs a column, one that stays where it is, too{more}",
+    )
     kinds = _kinds(table, kind) if measured else ()
     plain = measured and not kinds
     targets, warnings = _targets(table, robot) if plain else ((), [])

@@ -61,11 +61,12 @@ def arrivals(
     """Directions of approach, (N,) by ``approach.<joint>``, from the order of rows.
 
     +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
-    keeps the side that it had. 0 at the first row of a session, where nothing is known. It holds for a robot that goes
-    straight from pose to pose. The arguments are those of :func:`since_turns`.
+    keeps the side that it had. 0 where nothing is known: at the first row of a session, and where ``order`` counts
+    rows that are not there (:func:`_whole`). It holds for a robot that goes straight from pose to pose. The arguments
+    are those of :func:`since_turns`.
     """
-    side = np.zeros_like(q)
-    runs = list(_runs(covariates, sessions, len(q)))
+    side, order = np.zeros_like(q), covariates.get("order")
+    runs = [part for run in _runs(covariates, sessions, len(q)) for part in _whole(run, order)]
     for rows in runs:
         side[rows] = np.sign(np.apply_along_axis(_since_turn, 0, q[rows]))
     return {f"approach.{name}": side[:, j] for j, name in enumerate(names)} if runs else {}
@@ -86,6 +87,20 @@ def _runs(
     for run in np.unique(sessions) if sessions is not None else [None]:
         rows = np.arange(samples) if sessions is None else np.flatnonzero(sessions == run)
         yield rows[np.argsort(clock[rows], kind="stable")]
+
+
+def _whole(run: NDArray[np.int64], order: Array | None) -> list[NDArray[np.int64]]:
+    """Parts of a run, rows in order, between which poses are missing: where a counter of rows leaves out a number.
+
+    An order counts if its numbers are whole and its smallest step is the commonest, as of a counter of which rows were
+    struck; a time in seconds has steps of any size.
+    """
+    if order is None or len(run) < 2 or (order != np.round(order)).any():
+        return [run]
+    steps, often = np.unique(np.diff(np.unique(order)), return_counts=True)
+    if not len(steps) or often[0] < often.max():
+        return [run]
+    return np.split(run, np.flatnonzero(np.diff(order[run]) > steps[0]) + 1)
 
 
 def strained(joint: str, slip: float) -> str:

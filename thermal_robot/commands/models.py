@@ -72,10 +72,7 @@ def _tell_unseen(options: argparse.Namespace, model: CorrectedModel, samples: Ca
     if model.counts_anew(samples):
         note(f"order in {file} counts its own rows; predicted as after the campaign", options.loudness)
     if model.follows_rows:
-        note(
-            "a law follows the order of the campaign's rows, which has no column order; predicted as after the campaign",
-            options.loudness,
-        )
+        note("a law follows the order of the campaign's rows; predicted as after the campaign", options.loudness)
     left = model.spread.outside(samples, model.effects) if model.spread else ()
     for label, levels in model.spread.levels.items() if model.spread else ():
         if not any(label in names for names in left):
