@@ -35,7 +35,7 @@ def bristles(q):
     return state
 
 
-def log(more=0.0, coulomb=0.0, offset=0.0, hum=0.0):
+def log(more=0.0, coulomb=0.0, offset=0.0, hum=0.0, viscous=0.0):
     """Eight motions; the last link's products of inertia are larger by ``more``, kg·m², unlike any drive."""
     model = pin.buildModelFromXML(ARM.urdf)
     numbers = model.inertias[2].toDynamicParameters()
@@ -47,6 +47,7 @@ def log(more=0.0, coulomb=0.0, offset=0.0, hum=0.0):
         q, v, a = (waves(motion, time, k) for k in range(3))
         tau = np.array([pin.rnea(model, data, *each).copy() for each in zip(q, v, a, strict=True)])
         tau[:, 0] += coulomb * bristles(q[:, 0]) + hum * np.sin(2.0 * np.pi * 31.0 * time)
+        tau[:, 0] += viscous * v[:, 0]
         tau[:, 1] += offset
         tau += draw.normal(0.0, 0.01, tau.shape)
         columns = {f"{kind}.joint_{j + 1}": one[:, j] for kind, one in (("q", q), ("tau", tau)) for j in range(2)}
@@ -88,3 +89,11 @@ def test_the_height_of_the_tool_has_the_derivative_that_is_said():
     for j in range(2):
         moved = q + 1e-5 * (np.arange(2) == j)
         np.testing.assert_allclose((model._heights(moved)[0] - height) / 1e-5, slope[:, j], atol=1e-5)
+
+
+def test_the_drag_of_a_strong_gear_is_found_whose_torque_limit_nobody_stated():
+    """An industrial arm's: 20 N·m·s/rad, where a hobby servo of 3 N·m would stall; all of the gap but noise goes."""
+    strong = diagnose_motion(log(viscous=20.0))
+    assert "viscous" in strong.verdict
+    assert strong.parameters.loc["viscous"]["value"].iloc[0] == pytest.approx(20.0, rel=0.02)
+    assert strong.held_out.shrinkage > 0.99

@@ -44,10 +44,16 @@ class TorqueModel(JointModel):
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
         self.parameters = self._parameters()
 
+    def _limits(self) -> list[float]:
+        """Torque limits by joint, N·m, by which sizes are expected: as stated, else no less than the masses leave."""
+        left = np.abs(self._measured - self._loads.torque[0])
+        most = np.where(np.isfinite(left), left, 0.0).max(axis=0)
+        stated = [self.log.servos.get(name, Servo()).limit for name in self.log.joints]
+        return [own or max(settings.TORQUE_LIMIT, float(gap)) for own, gap in zip(stated, most, strict=True)]
+
     def _parameters(self) -> tuple[Parameter, ...]:
-        found = []
-        for j, name in enumerate(self.log.joints):
-            limit = self.log.servos.get(name, Servo()).limit or settings.TORQUE_LIMIT
+        found, limits = [], self._limits()
+        for j, (name, limit) in enumerate(zip(self.log.joints, limits, strict=True)):
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for name, label, unit, size, spread, positive in (
                 ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),

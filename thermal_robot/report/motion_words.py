@@ -51,7 +51,7 @@ def _wordings(d: MotionDiagnosis) -> Iterator[str]:
         for most, places, rivals in product((_MOST, 2, 1), (True, False), (True, False)):
             causes = _causes(d, found, most, places, rivals)
             for far in _how_far(d):
-                yield f"The joints miss the {_model(d)} by {size}: {causes} ({_sure(d)}); {far}."
+                yield f"The joints miss the {_model(d).removeprefix('the ')} by {size}: {causes} ({_sure(d)}); {far}."
 
 
 def _model(d: MotionDiagnosis) -> str:
@@ -117,7 +117,9 @@ def details(d: MotionDiagnosis) -> Iterator[str]:
     if hidden:
         yield f"Told, but not shown, since no joint moves by twice its noise or the stated tolerance: {listed(hidden)}."
     if d.few and d.shown:
-        yield f"There are {len(d.log.motions)} motions: ± is weak below eight, as readings of one motion share errors."
+        count = len(d.log.motions)
+        here = "There is 1 motion" if count == 1 else f"There are {count} motions"
+        yield f"{here}: ± is weak below eight, as readings of one motion share errors."
 
 
 def always(d: MotionDiagnosis) -> Iterator[str]:
