@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import MOST_WORDS, capitalised, listed, weighty
+from thermal_robot.report.words import MOST_WORDS, capitalised, listed, sure, weighty
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
@@ -19,7 +19,6 @@ NO_USE = "has no meaning for this log"
 """What is said of an effect that is not testable and that no column would make so."""
 _MOST = 3  # causes that a headline names; the others are counted
 _MAJORITY = 0.5  # of an effect's share: the joint that holds more is named
-_SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 _ONE_SIGN = 0.02  # of a joint's readings: a load that has the other sign in fewer has one sign
 _MOST_KINDS = 4  # of motion that are named in a sentence
 
@@ -51,7 +50,8 @@ def _wordings(d: MotionDiagnosis) -> Iterator[str]:
         for most, places, rivals in product((_MOST, 2, 1), (True, False), (True, False)):
             causes = _causes(d, found, most, places, rivals)
             for far in _how_far(d):
-                yield f"The joints miss the {_model(d).removeprefix('the ')} by {size}: {causes} ({_sure(d)}); {far}."
+                told = f"{causes} ({sure(d.probability)}); {far}"
+                yield f"The joints miss the {_model(d).removeprefix('the ')} by {size}: {told}."
 
 
 def _model(d: MotionDiagnosis) -> str:
@@ -59,10 +59,6 @@ def _model(d: MotionDiagnosis) -> str:
     if d.unit == "N·m":
         return "the torques of their masses"
     return "simulated servos" if d.stated else "command"
-
-
-def _sure(d: MotionDiagnosis) -> str:
-    return f"{units.percent(d.probability, 0)} sure" if d.probability < _SURE else "more than 99 % sure"
 
 
 def _causes(d: MotionDiagnosis, found: Sequence[Finding], most: int, places: bool, rivals: bool) -> str:

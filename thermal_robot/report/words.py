@@ -26,7 +26,7 @@ _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.95  # of what all causes together explain: the fewest that hold it are named, the others counted
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
-_SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
+_SURE = 0.005  # a probability so near to 0 or 1 would be rounded to it, which is never claimed
 _OR = ", or "  # between what is wrong with a table and what may be instead
 _NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
@@ -69,14 +69,15 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         gap = diagnosis.gap
         rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
         names = listed([_name(diagnosis, f) for f in causes(diagnosis, random=True)])
-        yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
+        how_sure = sure(diagnosis.probability)
+        yield f"The gap of {size} is scatter: {names} ({how_sure}){rest}; no correction removes scatter."
     else:
         first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
         worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
         for most, beside in product(first, rivals):
             names = _causes(diagnosis, found, most, beside)
             for told in _how_far(diagnosis, remaining, len(found) > 1):
-                yield f"{worse}{the} gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
+                yield f"{worse}{the} gap of {size} comes from {names} ({sure(diagnosis.probability)}); {told}."
 
 
 def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
@@ -151,9 +152,18 @@ def _another_model(model: AnotherModel) -> str:
     return f"Robot and table do not describe the same motion: {what}. Is it another model of the family?{known}"
 
 
-def _sure(diagnosis: Diagnosis) -> str:
-    probability = diagnosis.probability
-    return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
+def sure(probability: float) -> str:
+    """Say a probability in per cent, never as 0 or 100.
+
+    Examples
+    --------
+    >>> from thermal_robot.report.words import sure
+    >>> sure(0.0004), sure(0.84), sure(0.9999)
+    ('less than 1 % sure', '84 % sure', 'more than 99 % sure')
+    """
+    if min(probability, 1.0 - probability) > _SURE:
+        return f"{units.percent(probability, 0)} sure"
+    return f"{'less than 1' if probability < 0.5 else 'more than 99'} % sure"
 
 
 def _causes(diagnosis: Diagnosis, found: Sequence[Finding], most: int, beside: bool) -> str:
