@@ -99,7 +99,7 @@ def library() -> dict[str, Effect]:
 
 @cache
 def _installed() -> tuple[EntryPoint, ...]:
-    """Entry points of installed packages, read once: a twentieth of a small diagnosis each time."""
+    """Entry points of installed packages, read once: a hundredth of a small diagnosis each time."""
     return tuple(entry_points(group="thermal_robot.effects"))
 
 
