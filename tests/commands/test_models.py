@@ -127,6 +127,9 @@ def test_predict_tells_that_a_law_of_the_campaigns_rows_ends_with_it(run, folder
         assert (status, "a law follows the order of the campaign's rows" in told) == (0, True)
         written.append(pd.read_csv(tmp_path / "p.csv")[PLACE])
     pd.testing.assert_frame_equal(*written)
+    counted = pd.read_csv(folder / "fresh.csv")
+    counted.assign(order=np.arange(len(counted))).to_csv(tmp_path / "counted.csv", index=False)
+    assert run(*rows[:2], tmp_path / "counted.csv", *rows[3:])[::2] == (0, "")
     model.save(tmp_path / "model.json")
     assert run(*rows)[::2] == (0, "")
 

@@ -71,7 +71,7 @@ def _tell_unseen(options: argparse.Namespace, model: CorrectedModel, samples: Ca
     """Note where the order of rows counts anew, or a session is unknown to the model."""
     if model.counts_anew(samples):
         note(f"order in {file} counts its own rows; predicted as after the campaign", options.loudness)
-    if model.follows_rows:
+    if model.follows_rows(samples):
         note("a law follows the order of the campaign's rows; predicted as after the campaign", options.loudness)
     left = model.spread.outside(samples, model.effects) if model.spread else ()
     for label, levels in model.spread.levels.items() if model.spread else ():

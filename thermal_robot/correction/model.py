@@ -503,17 +503,16 @@ class CorrectedModel:
         first, last = self.last_order
         return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
 
-    @property
-    def follows_rows(self) -> bool:
-        """Whether a law follows the order of the campaign's rows where no column told it: samples come after them.
+    def follows_rows(self, samples: Campaign) -> bool:
+        """Whether a law follows the order of the campaign's rows, and samples without ``order`` come after them.
 
         Examples
         --------
-        >>> tr.diagnose(tr.demo_campaign()).model.follows_rows
+        >>> tr.diagnose(tr.demo_campaign()).model.follows_rows(tr.demo_campaign())
         False
         """
         laws = (effect for effect, _ in self.effects if isinstance(effect, Discovered))
-        return "order" not in self.needs and any("order" in (law.quantity, law.by) for law in laws)
+        return "order" not in samples.covariates and any("order" in (law.quantity, law.by) for law in laws)
 
     def samples(self, table: str | Path | pd.DataFrame | Table) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.
