@@ -47,19 +47,21 @@ def _foretold(campaign: Campaign) -> str:
     if not campaign.measured or not campaign.samples:
         return describe(campaign)
     kept, notes = counted(campaign)
-    said, lacking = [("rows that count", f"{kept.samples} of {campaign.samples}")], dict[str, list[str]]()
+    said = [("rows that count", f"{kept.samples} of {campaign.samples}")]
+    misfit = None
     try:
         require_enough(kept)
         misfit = mismatch(kept)
     except EstimationError as error:
         said.append(("none is possible", str(error)))
-        misfit = None
     if misfit:
         said.append(("no effect", next(misfit_sentences(misfit, kept.reach))))
-    for effect, asked in () if misfit else _needs(kept):
-        if asked:
-            lacking.setdefault(asked, []).append(effect.name)
-    said += [("not testable", f"{', '.join(names)}: add {asked}") for asked, names in lacking.items()]
+    else:
+        lacking: dict[str, list[str]] = {}
+        for effect, asked in _needs(kept):
+            if asked:
+                lacking.setdefault(asked, []).append(effect.name)
+        said += [("not testable", f"{', '.join(names)}: add {asked}") for asked, names in lacking.items()]
     block = "\n".join(["What a diagnosis would say first", *aligned(iter(said))])
     return f"{describe(replace(campaign, warnings=(*campaign.warnings, *notes)))}\n\n{block}"
 

@@ -382,10 +382,10 @@ def wanted(
         if any(needs.get(name) == ("pose",) for name in group):
             return Wanted("repeats", "pose", apart=group[:2])
         return _pose(fit, group) or Wanted("range", apart=group[:2])
-    if laws.flagged or left.flagged:  # a law that says it all leaves nothing else to ask than the column that names it
-        missing = found if left.flagged else ()
-        column = next((c for rest in (laws, left) if rest.flagged and (c := _column(fit, missing, rest))), None)
-        return column or (Wanted("repeats") if left.flagged else None)
+    if left.flagged:
+        return _column(fit, found, laws) or _column(fit, found, left) or Wanted("repeats")
+    if laws.flagged:
+        return _column(fit, (), laws)  # laws say it all: a column may still tell what they are
     return _pose(fit, ()) if probability < settings.DECIDED else None
 
 
