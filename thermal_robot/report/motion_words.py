@@ -50,14 +50,13 @@ def _wordings(d: MotionDiagnosis) -> Iterator[str]:
         for most, places, rivals in product((_MOST, 2, 1), (True, False), (True, False)):
             causes = _causes(d, found, most, places, rivals)
             for far in _how_far(d):
-                told = f"{causes} ({sure(d.probability)}); {far}"
-                yield f"The joints miss the {_model(d).removeprefix('the ')} by {size}: {told}."
+                yield f"The joints miss the {_model(d)} by {size}: {causes} ({sure(d.probability)}); {far}."
 
 
 def _model(d: MotionDiagnosis) -> str:
-    """Say against what the joints are held."""
+    """Return the reference of the joints, without its article."""
     if d.unit == "N·m":
-        return "the torques of their masses"
+        return "torques of their masses"
     return "simulated servos" if d.stated else "command"
 
 
