@@ -176,7 +176,7 @@ def test_each_robot_is_as_probable_as_any_other(arms):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [SHORT, pytest.param(FULL, marks=pytest.mark.slow)], ids=["short", "full"])
+@pytest.mark.parametrize("size", [SHORT, FULL], ids=["short", "full"])
 def test_whoever_asks_for_several_campaigns_has_the_same_single_ones(arms, size):
     alone, together = ({k: n for k, n in size.items() if (k in SEVERAL) is several} for several in (False, True))
     cases = plan(9, size, arms)

@@ -130,7 +130,7 @@ def repeated(campaign, times, seed, noise=20e-6):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stated", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stated", [False, True])
 def test_repeated_commands_without_a_fault_leave_nothing_unexplained(clean, stated):
     campaigns = [repeated(clean, 2, seed) for seed in range(4)]
     found = [diagnose(c if stated else replace(c, noise_position=None)) for c in campaigns]

@@ -111,9 +111,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "ending", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGKILL], ids=["interrupted", "killed"]
-)
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
 def test_a_run_that_is_stopped_continues(fleet, fleet_folder, tmp_path, ending):
     script = tmp_path / "run.py"
     script.write_text(RUN)

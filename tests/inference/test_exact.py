@@ -168,7 +168,7 @@ def evidence(explanation, seen, effect):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])
-@pytest.mark.parametrize("ratio", [30.0, pytest.param(3.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ratio", [30.0, 3.0])
 def test_no_constant_of_a_fine_grid_is_much_better(kind, constant, attribute, ratio):
     for seed in range(2):
         seen, explanation = explained(lagging("panda", seed, kind, constant, ratio), (kind,))
