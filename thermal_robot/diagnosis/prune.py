@@ -49,7 +49,8 @@ def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) ->
     scanned = candidates(fit, number, events(fit))
     waved = {law: as_ripple(law, fit) for law in scanned}
     laws = tuple(law for law in scanned if waved[law] is None)
-    ripples = tuple(dict.fromkeys(ripple for ripple in (_ripple(fit), *waved.values()) if ripple is not None))
+    shown = (ripple for ripple in (_ripple(fit), *waved.values()) if ripple is not None)
+    ripples = tuple(dict.fromkeys(ripple for ripple in shown if not alike(ripple, ripple_of(fit))))
     offered: dict[str, tuple[Effect, ...]] = {f"{PREFIX}{number}": laws} if laws else {}
     bases = [held]
     if ripples:
@@ -65,11 +66,10 @@ def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) ->
 
 
 def _ripple(fit: Fit) -> JointRipple | None:
-    """Ripple that a fit shows, if it is a candidate and differs from the one in the fit."""
+    """Ripple that a fit shows, if it is a candidate."""
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
-    found = waves(fit)
-    return None if not found.orders or alike(found, ripple_of(fit)) else found
+    return found if (found := waves(fit)).orders else None
 
 
 def attributed_to_laws(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
