@@ -14,11 +14,12 @@ from thermal_robot.diagnosis import prune as word
 from thermal_robot.diagnosis.prune import (
     DensityGain,
     HeldOutTest,
-    determined,
     held_out_tests,
     odds_in_place,
     pruned,
     selected_with_scatter,
+    undetermined,
+    unsupported,
 )
 from thermal_robot.diagnosis.values import Refused
 from thermal_robot.effects import choose
@@ -189,12 +190,12 @@ def test_what_stays_obeys_the_rule_and_is_not_asked_again(rv_m2, seed):
     left, refused = pruned(beside, lambda _: None)
     assert "backlash" in names(left)
     assert not set(refused) & set(names(left))
-    table, odds, sure = held_out_tests(left), odds_in_place(left), determined(left)
+    table, odds = held_out_tests(left), odds_in_place(left)
     for effect, _ in left.effects:
         assert not table[effect.name].harms
         assert table[effect.name].helps or not effect.name.startswith("discovered.")
         assert odds[effect.name] >= settings.NAMING_ODDS
-        assert effect.name in sure
+    assert not undetermined(left)
     assert pruned(left, lambda _: None) == (left, {})
 
 
@@ -204,10 +205,14 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     known = fit(data, choose(("thermal_elongation",), (), ()))
     item = block(known.corrected, choose(("geometric",), (), ())[0])
     unseen = forced(known, replace(item, sizes=1e-3 * NOISE / np.sqrt((item.columns**2).mean(axis=(0, 1))) / 50.0))
-    assert determined(unseen) == {"thermal_elongation"}
-    good = DensityGain("time", 0.2, 5.0, (1.0, 9.0))
-    said = {name: HeldOutTest(good, good) for name in names(unseen)}
-    monkeypatch.setattr(word, "held_out_tests", lambda own: {name: said[name] for name in names(own)})
+    nothing = {"geometric": Refused(settings.PRIOR_PROBABILITY)}
+    assert undetermined(unseen) == nothing
+    poor, good = DensityGain("time", 0.2, 5.0, (-1.0, 9.0)), DensityGain("time", 0.2, 5.0, (1.0, 9.0))
+    for gain, lost in ((poor, nothing), (good, {})):
+        said = {name: HeldOutTest(gain, gain) for name in names(unseen)}
+        monkeypatch.setattr(word, "held_out_tests", lambda own, said=said: {name: said[name] for name in names(own)})
+        # where structure leaves it undetermined, a significant gain of rows held out keeps it
+        assert unsupported(unseen, unseen) == lost
     stages = []
     left, refused = pruned(unseen, stages.append)
     assert stages[0] == "nothing determines geometric"

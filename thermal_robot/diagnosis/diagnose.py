@@ -17,7 +17,7 @@ from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_checks import counted, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, mismatch
-from thermal_robot.diagnosis.prune import concluded, forward_selection, pruned, selected_with_scatter
+from thermal_robot.diagnosis.prune import concluded, forward_selection, pruned, selected_with_scatter, unsupported
 from thermal_robot.diagnosis.residual_tests import analyse_residual
 from thermal_robot.diagnosis.result import Diagnosis, with_summary
 from thermal_robot.diagnosis.uncertainty import inflated_for_structure
@@ -171,13 +171,17 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
             break
         fit = wider
     fit, refused = pruned(fit, progress)
-    chance = random_gap(fit)
-    if chance.explains_size:
-        return selected_with_scatter(fit, chance, refused, progress)
-    left = analyse_residual(fit, progress)
-    if left.unexplained.flagged:
-        fit = inflated_for_structure(fit)
-    return concluded(fit, left, chance, refused)
+    while True:
+        chance = random_gap(fit)
+        if chance.explains_size:
+            return selected_with_scatter(fit, chance, refused, progress)
+        left = analyse_residual(fit, progress)
+        wider = inflated_for_structure(fit) if left.unexplained.flagged else fit
+        lost = unsupported(fit, wider)
+        if not lost:
+            return concluded(wider, left, chance, refused)
+        fit, others = pruned(fit, progress, lost)
+        refused |= others
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:

@@ -233,21 +233,23 @@ def _density_gain(scheme: str, left: Array, without: Array, block: NDArray[np.in
     return DensityGain(scheme, share, nats, (nats - half, nats + half))
 
 
-def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+def pruned(
+    fit: Fit, progress: Callable[[str], None], lost: Mapping[str, Refused] | None = None
+) -> tuple[Fit, dict[str, Refused]]:
     """Backward elimination by cross-validation until every remaining term obeys one rule.
 
     The rule: posterior odds of at least nine against nothing in its place, a held-out density that is not lower (of a
     law, but no event: significantly higher), and at least one determined direction. All significantly harmful terms are
     removed at once, as they may compensate each other; the others one at a time, the smallest held-out gain first. Also
-    returns the removed effects by name.
+    returns the removed effects by name. Terms that are ``lost`` are removed first.
     """
     refused: dict[str, Refused] = {}
-    exact = True
+    exact, out = True, lost or {}
     while True:
-        out = _failing(fit, progress) if fit.effects else {}
+        out = out or (_failing(fit, progress) if fit.effects else {})
         if out:
             refused |= {name: why for name, why in out.items() if not name.startswith(PREFIX)}
-            fit, exact = less(fit, *out), False
+            fit, exact, out = less(fit, *out), False, {}
         elif exact:
             return fit, refused
         else:
@@ -260,19 +262,18 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
         return harmful
-    odds, sure = odds_in_place(fit), determined(fit)
+    odds, blind = odds_in_place(fit), undetermined(fit)
     laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
     poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
-    out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}
+    out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name in blind}
     if not out:
         return {}
     worst = min(out, key=lambda name: table[name].blocked.nats)
-    why = "rows held out refuse" if worst in poor else "in question:" if worst in sure else "nothing determines"
+    why = "rows held out refuse" if worst in poor else "nothing determines" if worst in blind else "in question:"
     progress(f"{why} {worst}")
     if worst in poor:
         return {worst: _refused(table[worst])}
-    # of one that nothing determines no more is known than before the data
-    return {worst: Refused(min(fit.probability(worst), 1.0 if worst in sure else settings.PRIOR_PROBABILITY))}
+    return {worst: blind.get(worst, Refused(fit.probability(worst)))}
 
 
 def odds_in_place(fit: Fit) -> dict[str, float]:
@@ -286,18 +287,30 @@ def odds_in_place(fit: Fit) -> dict[str, float]:
     return {name: min(own, settings.NAMING_ODDS**2 * told.get(name, 1.0)) for name, own in odds.items()}
 
 
-def determined(fit: Fit) -> set[str]:
-    """Effects and laws of a fit of which the data determine at least one direction.
+def undetermined(fit: Fit) -> dict[str, Refused]:
+    """Effects and laws of a fit of which the data determine no direction, with their probability before the data.
 
     Determined means that the posterior standard deviation is below half the prior's along some principal axis.
     """
-    e, found = fit.explanation, set()
+    e, seen = fit.explanation, set()
     for b in e.best.blocks:
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
         least = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))[0]
         if least < settings.DETERMINED**2:
-            found.add(fit.families[b])
-    return found
+            seen.add(fit.families[b])
+    lost = sorted(fit.names_of(e.best) - seen)
+    return {name: Refused(min(fit.probability(name), settings.PRIOR_PROBABILITY)) for name in lost}
+
+
+def unsupported(fit: Fit, inflated: Fit) -> dict[str, Refused]:
+    """Effects and laws of a fit that structure in the residual may mimic, with their probability before the data.
+
+    The covariance that is ``inflated`` for structure leaves all their directions undetermined, and their held-out
+    density is not significantly higher.
+    """
+    lost = undetermined(inflated)
+    table = held_out_tests(fit) if lost else {}
+    return {name: why for name, why in lost.items() if not table[name].helps}
 
 
 def _refused(judged: HeldOutTest) -> Refused:
