@@ -66,12 +66,22 @@ def test_backlash_is_named_where_only_the_side_counts():
 @pytest.mark.parametrize("name", ["ur10", pytest.param("panda", marks=pytest.mark.slow)])
 def test_weights_that_nobody_wrote_down_are_free(name, tmp_path):
     arm = load_arm(name)
-    campaign, _, (fresh, place) = simulate(arm, ["joint_compliance"], seed=8, ratio=(5.0, 6.0), samples=150, fresh=60)
+    campaign, truth, (fresh, place) = simulate(
+        arm, ["joint_compliance"], seed=8, ratio=(5.0, 6.0), samples=150, fresh=60
+    )
     bare = without_masses(arm)
     found = diagnose(replace(campaign, robot=bare))
     assert found.verdict == ("joint_compliance",)
     effect = found.model.effects[0][0]
     assert effect.joints
+    # no weight means anything by itself; a joint's wind-up over the campaign is that of its compliance and torque
+    turned = {part.place: (part.value, part.std) for part in found.effects[0].size}
+    torque, stated = np.ptp(observe(campaign).torque, axis=0), truth["parts"]["joint_compliance"]["values"]
+    really = {joint: stated[f"compliance, {joint}"] * t for joint, t in zip(arm.joint_names, torque, strict=True)}
+    assert set(turned) == {joint for joint, t in zip(arm.joint_names, torque, strict=True) if t > 0.1}
+    assert all(abs(value - really[joint]) < 4.0 * std for joint, (value, std) in turned.items())
+    largest = max(turned, key=lambda joint: turned[joint])
+    assert turned[largest][0] == pytest.approx(max(really.values()), rel=0.1)
     fresh = replace(fresh, robot=bare)
     predicted = found.model.prediction(fresh)[0]
     assert np.sqrt(((predicted - place) ** 2).mean()) < 1.0 * NOISE

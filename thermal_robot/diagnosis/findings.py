@@ -14,7 +14,6 @@ from thermal_robot.diagnosis.values import Estimate, Finding, Location, Refused,
 from thermal_robot.effects import FRAMES, Effect, Parameter, gate, named, random_effects
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_words import called, event, in_joints, sizes, usually
-from thermal_robot.effects.position import Waves
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.inference import settings
@@ -221,7 +220,9 @@ def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
     law, _ = fit.effects[e.best.blocks.index(block)]
     parameters, spread = e.linear.blocks[block].parameters, e.values[block][1]
     if not isinstance(law, Discovered):
-        return {"size": in_joints(parameters, values, spread)} if isinstance(law, Waves) else {}
+        # a joint with one parameter errs by that; of several the sum counts, which is better determined
+        several = len({parameter.place for parameter in parameters}) < len(parameters)
+        return {"size": in_joints(parameters, values, spread)} if several else {}
     size = sizes(law, fit.nominal, values, spread)
     short, whole = event(law, fit.nominal, size)
     return {

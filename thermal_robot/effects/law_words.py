@@ -72,10 +72,10 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
 
 
 def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
-    """Peak-to-peak value of the waves in each joint, over the measured rows.
+    """Peak-to-peak value of an effect in each joint, over the measured rows.
 
-    Waves of a joint with a limited range are correlated; their sum is better determined. Values (K,) and covariance are
-    SI; largest first, none of a place that does not err in its joint alone.
+    Waves of a joint with a limited range, and shapes of a load, are correlated; their sum is better determined. Values (K,) and covariance are
+    SI; largest first, none of a place that does not err in its joint alone, or not at all.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):
@@ -85,6 +85,8 @@ def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array)
             continue
         rows = np.column_stack(np.broadcast_arrays(*(response.values for (response,) in responses)))
         moved = rows @ np.asarray(values, dtype=float)[own]
+        if not np.ptp(moved):
+            continue
         weight = rows[int(moved.argmax())] - rows[int(moved.argmin())]
         std = sqrt(max(float(weight @ covariance[np.ix_(own, own)] @ weight), 0.0))
         found.append(Size("peak to peak", float(np.ptp(moved)), std, parameters[own[0]].unit, place))
