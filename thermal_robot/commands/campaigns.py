@@ -50,8 +50,9 @@ def _foretold(campaign: Campaign) -> str:
     said = [("rows that count", f"{kept.samples} of {campaign.samples}")]
     misfit = None
     try:
-        require_enough(kept)
         misfit = mismatch(kept)
+        if misfit is None:  # the order of a diagnosis
+            require_enough(kept)
     except EstimationError as error:
         said.append(("none is possible", str(error)))
     if misfit:
