@@ -1,5 +1,7 @@
 """The torque channel: friction, second moments and bias found in torques that Pinocchio computes of another arm."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pinocchio as pin
@@ -10,6 +12,7 @@ pytest.importorskip("numba", reason="the extra fast is not installed")
 from thermal_robot.blind.motions.arm import TOOL, draw_arm
 from thermal_robot.motion import motion_from_table
 from thermal_robot.motion.diagnose import diagnose_motion
+from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.torque import _prandtl
 from thermal_robot.robot import load_robot
@@ -97,3 +100,17 @@ def test_the_drag_of_a_strong_gear_is_found_whose_torque_limit_nobody_stated():
     assert "viscous" in strong.verdict
     assert strong.parameters.loc["viscous"]["value"].iloc[0] == pytest.approx(20.0, rel=0.02)
     assert strong.held_out.shrinkage > 0.99
+
+
+def test_a_torque_of_the_other_sign_is_turned_round():
+    """Whatever the offset; friction, which opposes the motion, turns with it."""
+    sound = log(coulomb=COULOMB, offset=OFFSET)
+    assert not [fault for fault in find_faults(sound).faults if fault.what == "sign"]
+    values = np.array([1.0, -1.0])
+    turned = [replace(m, torque=replace(m.torque, values=m.torque.values * values)) for m in sound.motions]
+    undone = find_faults(replace(sound, motions=tuple(turned)))
+    (fault,) = [fault for fault in undone.faults if fault.what == "sign"]
+    assert fault.joint == "joint_2"
+    assert fault.size == pytest.approx(-1.0, abs=max(0.05, 4.0 * fault.sigma))
+    for motion, other in zip(undone.log.motions, sound.motions, strict=True):
+        np.testing.assert_array_equal(motion.torque.values, other.torque.values)

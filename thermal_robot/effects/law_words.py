@@ -74,8 +74,8 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
 def in_joints(parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
     """Peak-to-peak value of an effect in each joint, over the measured rows.
 
-    Waves of a joint with a limited range, and shapes of a load, are correlated; their sum is better determined. Values (K,) and covariance are
-    SI; largest first, none of a place that does not err in its joint alone, or not at all.
+    Waves of a joint with a limited range, and shapes of a load, are correlated; their sum is better determined. Values
+    (K,) and covariance are SI; largest first, none of a place that does not err in its joint alone, or not at all.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):

@@ -23,6 +23,7 @@ from thermal_robot.motion.settings import (
     CLEAR,
     FOLLOWS,
     FROZEN,
+    LEAST_AGAINST,
     LIKE,
     LONGEST_LAG,
     OTHER_GAIN,
@@ -31,6 +32,7 @@ from thermal_robot.motion.settings import (
     UNEQUAL,
     WINDOW,
 )
+from thermal_robot.motion.torque import TorqueModel
 
 _STEP_TAIL = 0.999  # quantile of an encoder's steps that a jump exceeds
 _JUMP = 3.0  # times that
@@ -100,7 +102,7 @@ def find_faults(log: MotionLog) -> Sound:
     """
     faults: list[Fault] = []
     lost: set[str] = set()
-    for check in (_jitter, _clock, _swaps, _signs, _stale, _shifts, _gains, _speeds):
+    for check in (_jitter, _clock, _swaps, _signs, _stale, _shifts, _gains, _speeds, _loads):
         log, found, unusable = check(log)
         faults += [fault for fault in found if fault.joint not in lost]
         lost |= unusable
@@ -263,6 +265,18 @@ def _speeds(log: MotionLog) -> _Checked:
     ]
     factor = np.where(foreign, np.nan, np.where(other, scale, 1.0))
     return _changed(log, {"velocity": lambda values: values * factor}), faults, set()
+
+
+def _loads(log: MotionLog) -> _Checked:
+    """Compare the signs of recorded torques and of those that the URDF's masses need along the measured motion."""
+    if not log.robot.has_masses or any(motion.torque is None for motion in log.motions):
+        return log, [], set()
+    found, error = TorqueModel(log).signs()
+    turned = (found < -CLEAR * error) & (found < LEAST_AGAINST)
+    told = "tau.{0} is {1:.3f} ± {2:.3f} of the torque that the URDF's masses need: of the other sign, turned round"
+    named = [(log.joints[j], float(found[j]), float(error[j])) for j in np.flatnonzero(turned)]
+    faults = [Fault(each[0], "sign", each[1], each[2], told.format(*each)) for each in named]
+    return _changed(log, {"torque": lambda values: values * np.where(turned, -1.0, 1.0)}), faults, set()
 
 
 def _scale_of_speeds(log: MotionLog) -> tuple[Array, Array]:

@@ -341,8 +341,10 @@ def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tu
     if not any("q" in quantities for quantities in named.values()):
         raise CampaignError(files, "no joint's position is recorded", expected="columns q.<joint>, or [channels]")
     if torques and not both:
-        problem = "no command is recorded: of an arm that was guided by hand an external force is the cause"
-        raise CampaignError(files, problem, expected="columns cmd.<joint>, or tau.<joint>")
+        problem = "no command is recorded, and no torque: nothing says what the joints should have done"
+        raise CampaignError(
+            files, problem, expected="columns cmd.<joint>, or tau.<joint>: a current times its constant"
+        )
     if not both:
         found = f"{listed(named)}; the robot has {listed(robot.joint_names)}"
         raise CampaignError(files, "no joint has command and position", found=found, expected="both")

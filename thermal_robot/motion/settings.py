@@ -25,6 +25,8 @@ NO_LAG = 2e-3
 simulated ones; a controller that lags by less knows the velocity beforehand."""
 CLEAR = 3.0
 """Standard errors from which on a fault is told: one log in 400 by chance."""
+LEAST_AGAINST = -0.5
+"""Slope of recorded over needed torque below which the sign is the other one: nearer to −1 than to 0."""
 FEWEST_CLUSTERS = 8
 """Motions below which each is parted for the scatter between them: fewer give no standard error worth the name."""
 WINDOW = 1.0

@@ -18,7 +18,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
-from thermal_robot.motion.following import at, usual_step
+from thermal_robot.motion.following import at, slope, usual_step
 from thermal_robot.motion.log import Channel, MotionLog, Servo
 from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
@@ -146,6 +146,19 @@ class TorqueModel(JointModel):
         """(N,) number of the cluster of each reading of a joint."""
         return self.cluster_of(self._motion[self._used[joint]])
 
+    def signs(self) -> tuple[Array, Array]:
+        """Regression of the measured torques on the rigid-body model's: slope (J,) and its standard error.
+
+        Offsets do not count: of both, what a motion has in the mean is subtracted.
+        """
+        cluster, found = self.cluster_of(self._motion), []
+        there = np.isfinite(self._measured)
+        for values in (self._loads.torque[0], self._measured):
+            values, count = np.where(there, values, 0.0), np.maximum(_sums(self._motion, there), 1.0)
+            found.append(np.where(there, values - (_sums(self._motion, values) / count)[self._motion], 0.0))
+        told, measured = found
+        return slope(_sums(cluster, told**2), _sums(cluster, told * measured))
+
     def noise(self, joint: int) -> float:
         """One sigma of a joint's smoothed torque, N·m."""
         return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
@@ -170,6 +183,11 @@ class TorqueModel(JointModel):
             "measured": measured, "nominal": measured - left[0], "simulated": measured - left[1],
             "load": self._loads.torque[0, rows, joint],
         }  # fmt: skip
+
+
+def _sums(labels: NDArray[np.int64], values: Array) -> Array:
+    """(labels, J) sums of the rows (N, J) of each label."""
+    return np.stack([np.bincount(labels, column) for column in values.T], axis=1)
 
 
 def _sampled(position: Channel, torque: Channel) -> tuple[Array, ...]:
