@@ -142,3 +142,21 @@ def test_rows_count_by_their_own_noise():
     own = Target.of(gap * relative, design * relative[:, :, None], relative=relative).score(law * relative[:, :, None])
     assert own.gain == pytest.approx(even.gain, rel=1e-9)
     assert own.p_value == pytest.approx(even.p_value, rel=1e-9)
+
+
+def test_what_a_design_nearly_contains_gains_no_more_than_the_exact_residual_allows():
+    """Functions that a design contains but for a small part: their Gram matrix is a difference of large numbers."""
+    rng = np.random.default_rng(5)
+    seen = 0
+    for k in range(300):
+        gap, design, further = drawn(rng)
+        moves, functions, other = further[:, :, :1], rng.normal(size=(ROWS, 2)), rng.normal(size=(ROWS, 2))
+        design = np.concatenate([design, moves * functions[:, None, :]], axis=2)
+        gap += 2e-5 * moves[:, :, 0] * other[:, 1:]  # what one direction explains
+        other[:, 1] = other[:, 0] + 10.0 ** rng.uniform(-3.0, -2.0) * other[:, 1]
+        law, target = functions + 10.0 ** rng.uniform(-6.0, -3.0) * other, plain(gap, design)
+        (gain,) = target.statistics(moves).gains([law])
+        exact = max(target.score(moves * law[:, None, columns]).gain for columns in ([0], [1], [0, 1]))
+        assert gain <= 1.2 * max(exact, 0.0) + 1.0, k
+        seen += np.isfinite(gain)
+    assert 100 < seen < 300

@@ -87,7 +87,7 @@ class _Sums:
         (_, d, r), runs = self.size, len(sums)
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
-        explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
+        explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole), len(self.products))
         return bic_gain(total, explained, rank, freedom)
 
     def best(self, runs: Runs) -> Runs:

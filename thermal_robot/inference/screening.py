@@ -212,15 +212,18 @@ class PlaceStatistics:
         inside = seen.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
         gram = whole - inside.transpose(0, 2, 1) @ inside
         vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
-        explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole))
+        explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole), rows)
         return bic_gain(self.total, explained, rank, self.freedom)
 
 
-def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
-    """Explained sums of squares (C,) and ranks, from Gram matrices (C, K, K), (C, K) and squared lengths (C, K)."""
+def explained_by(gram: Array, vector: Array, whole: Array, rows: int) -> tuple[Array, Array]:
+    """Explained sums of squares (C,) and ranks, from Gram matrices (C, K, K), (C, K) and squared lengths (C, K).
+
+    Errors of sums over ``rows`` grow with the square root of their number (Higham, *Accuracy and Stability*, 2002).
+    """
     own = np.einsum("cii->ci", gram)
-    # what is left of an exact alias of the design is rounding, no column
-    kept = own > settings.ALIAS**2 * whole
+    # what is left of an alias of the design is a difference of large numbers: rounding has to lie below the tolerance
+    kept = own > np.sqrt(rows) * np.finfo(float).eps / settings.LAW_FLOOR * whole
     length = np.where(kept, np.sqrt(np.where(kept, own, 1.0)), np.inf)
     value, axes = np.linalg.eigh(gram / (length[:, :, None] * length[:, None, :]))
     seen = value > settings.LAW_FLOOR * np.maximum(value.max(axis=1, initial=1.0), 1.0)[:, None]
