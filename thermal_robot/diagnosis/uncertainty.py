@@ -96,10 +96,15 @@ def _independent(model: Model) -> Array:
 
 
 def _sandwich(e: Explanation, kernel: Kernel, columns: Array, tight: Array) -> Array:
-    """Sandwich covariance (K, K) A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K), prior precisions Λ⁻¹ (K,)."""
+    """Sandwich covariance (K, K) A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K), prior precisions Λ⁻¹ (K,).
+
+    The discrepancy in V is at most as large, rms, as all that is left: its likelihood is of what parameters leave, and
+    says nothing of directions that they take (Plumlee, *Journal of the American Statistical Association* 112, 2017).
+    """
     variance = e.best.noise**2
+    tau = min(e.discrepancy.tau, e.best.noise / e.discrepancy.noise)
     spectrum = SmoothKernel.of(kernel.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
-    alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
+    alike = spectrum.spread(tau, columns * (e.discrepancy.noise / variance))
     inner = _posterior(columns.T @ columns / variance, tight)
     return _symmetric(inner @ (alike + np.diag(tight)) @ inner)
 
