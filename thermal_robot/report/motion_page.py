@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import motion_plots as plots
 from thermal_robot.report import motion_words as words
 from thermal_robot.report import units
 from thermal_robot.report.page import render
-from thermal_robot.report.words import STATUS, displayed_status, needs, one_sigma
+from thermal_robot.report.words import STATUS, displayed_status, one_sigma
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
@@ -25,10 +25,8 @@ def motion_html(
     ----------
     diagnosis
         The result.
-    generated
-        When it was made, for the footer; nothing is said where absent, so that equal diagnoses give equal pages.
-    files
-        Names of the files that the diagnosis was made from, with the SHA-256 of each, for the footer.
+    generated, files
+        As for :func:`~thermal_robot.report.page.html`.
     """
     title = f"Motion of {diagnosis.log.name or diagnosis.log.robot.name}"
     return render("motion.html", _shown(diagnosis), title=title, generated=generated, files=files)
@@ -47,14 +45,9 @@ def _shown(d: MotionDiagnosis) -> dict[str, Any]:
         "drawn": plots,
         "numbers": _numbers(d),
         "gaps": {"label": "Rms gap of each joint", "heads": heads, "rows": rows},
-        "effects": list(_effects(d)),
+        "effects": [_effect(d, one) for one in words.effects(d)],
         "one_sigma": one_sigma(d),
     }
-
-
-def _needs(d: MotionDiagnosis, finding: Finding) -> str:
-    told = needs(finding, list(d.joints))
-    return f"needs {told}" if told else words.NO_USE
 
 
 def _numbers(d: MotionDiagnosis) -> list[tuple[str, str, str, list[str]]]:
@@ -70,19 +63,10 @@ def _numbers(d: MotionDiagnosis) -> list[tuple[str, str, str, list[str]]]:
     ]
 
 
-def _effects(d: MotionDiagnosis) -> Iterator[dict[str, Any]]:
-    """Yield each effect as it stands in the table, what is told first."""
-    shown = {one.name for one in d.shown}
-    for status, heading in STATUS.items():
-        for one in d.effects:
-            told = status in ("found", "confounded")
-            if displayed_status(one) != status or (told and one.name not in shown):
-                continue
-            yield _effect(d, one, heading, told)
-
-
-def _effect(d: MotionDiagnosis, one: Finding, heading: str, told: bool) -> dict[str, Any]:
+def _effect(d: MotionDiagnosis, one: Finding) -> dict[str, Any]:
     """Return the template fields of one effect for the table of all effects."""
+    status = displayed_status(one)
+    told = status in words.TOLD
     means, moves = words.MEANS.get(one.name, ""), words.places(d, one.name) if told else ""
     rivals = f"These data cannot tell it from {', '.join(one.confounded_with)}." if one.confounded_with else ""
     known = words.parameters(d, one.name) if told else []
@@ -90,8 +74,8 @@ def _effect(d: MotionDiagnosis, one: Finding, heading: str, told: bool) -> dict[
         "name": one.name,
         "quiet": not told,
         "open": told and bool(known or means),
-        "needs": _needs(d, one) if one.status == "not_testable" else None,
-        "status": heading,
+        "needs": words.needed(d, one) if one.status == "not_testable" else None,
+        "status": STATUS[status],
         "probability": units.probability(one.probability),
         "share": units.percent(one.shrinkage) if told else "",
         "before": list(filter(None, (means, rivals))),

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import MOST_WORDS, capitalised, listed, sure, weighty
+from thermal_robot.report.words import by_status, capitalised, fitting, listed, needs, sure, verdict, weighty
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
     from thermal_robot.motion.result import MotionDiagnosis
 
-NO_USE = "has no meaning for this log"
-"""What is said of an effect that is not testable and that no column would make so."""
+TOLD = ("found", "confounded")
+"""Statuses of effects of which more is told."""
 _MOST = 3  # causes that a headline names; the others are counted
 _MAJORITY = 0.5  # of an effect's share: the joint that holds more is named
 _ONE_SIGN = 0.02  # of a joint's readings: a load that has the other sign in fewer has one sign
@@ -29,11 +29,7 @@ def motion_headline(diagnosis: MotionDiagnosis) -> str:
     It names the fewest causes that hold 95 % of what is explained, at most three, with the joint where one holds most,
     and counts the others. Of what there is to say the fullest wording is taken that fits.
     """
-    text = ""
-    for text in _wordings(diagnosis):
-        if len(text.split()) <= MOST_WORDS:
-            return text
-    return " ".join(text.split()[:MOST_WORDS]).rstrip(".,;:") + "."
+    return fitting(_wordings(diagnosis))
 
 
 def _wordings(d: MotionDiagnosis) -> Iterator[str]:
@@ -228,6 +224,18 @@ MEANS = {
 """What an effect means, and where it goes in a simulator."""
 
 
+def effects(d: MotionDiagnosis) -> list[Finding]:
+    """Return the effects in the order of display; of those that were found, the ones that are visible."""
+    shown = {one.name for one in d.shown}
+    return [one for one in by_status(d) if one.name in shown or one.status not in TOLD]
+
+
+def needed(d: MotionDiagnosis, finding: Finding) -> str:
+    """Say which columns would make an effect testable, if any would."""
+    told = needs(finding, list(d.joints))
+    return f"needs {told}" if told else "has no meaning for this log"
+
+
 def parameters(d: MotionDiagnosis, effect: str) -> list[tuple[str, str]]:
     """Return the parameters of an effect where it is visible, in units for reading: name and value ± std."""
     known = d.physical(effect)
@@ -247,19 +255,13 @@ def facts(d: MotionDiagnosis) -> dict[str, str]:
     seconds = sum(float(m.position.time[-1] - m.position.time[0]) for m in d.log.motions)
     name = f"{d.log.name}: " if d.log.name else ""
     told = {
-        "Verdict": _verdict(d),
+        "Verdict": verdict(d, ", ".join(d.verdict)),
         "Motion": f"{name}robot {d.log.robot.name}, {len(d.log.motions)} motions of {len(d.joints)} joints, "
         f"{seconds:.0f} s, {readings} readings of each joint",
     }
     if d.left_out:
         told["Left out"] = f"by request: {', '.join(d.left_out)}"
     return told
-
-
-def _verdict(d: MotionDiagnosis) -> str:
-    names = ", ".join(d.verdict) or "no effect"
-    said = f"{names}; probability of exactly this explanation {units.probability(d.probability)}"
-    return said + ("; a remainder stays unexplained" if d.unexplained.flagged else "")
 
 
 def how_measured(d: MotionDiagnosis) -> str:

@@ -288,10 +288,8 @@ def comparison_html(comparison: Plain, generated: str | None = None, files: Mapp
     ----------
     comparison
         Of the format ``thermal-robot/comparison/1``.
-    generated
-        When it was made, for the footer; nothing is said where absent.
-    files
-        Names of the files that it was made from, with the SHA-256 of each, for the footer.
+    generated, files
+        As for :func:`html`.
     """
     shown = {
         "kicker": "What the same robot shares between campaigns, and what changed",
@@ -368,10 +366,8 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     ----------
     wear
         The result.
-    generated
-        When it was made, for the footer; nothing is said where absent, so that equal results give equal pages.
-    files
-        Names of the files that it was made from, with the SHA-256 of each, for the footer.
+    generated, files
+        As for :func:`html`.
     """
     said = f"Campaigns scatter {wear.scatter:.2f} times as much as their deviations say."
     kicker = "What moves, at once or steadily, and when it crosses a limit"

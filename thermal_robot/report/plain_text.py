@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -95,16 +95,21 @@ def _bounds(bounds: tuple[float, float] | None) -> str:
 def _which(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max([len(f.name) for f in diagnosis.effects], default=0)
     yield f"    {'':{wide}}{'probability':>13}   share of the gap, on rows held out (95 %)"
+    yield from by_heading(diagnosis.effects, lambda finding, status: _effect(finding, status, wide, diagnosis))
+    if told := words.one_sigma(diagnosis):
+        yield wrap(told)
+
+
+def by_heading(effects: Sequence[Finding], told: Callable[[Finding, str], Iterable[str]]) -> Iterator[str]:
+    """Yield what is told of each effect of a status, below its heading."""
     for status, heading in words.STATUS.items():
-        group = [f for f in diagnosis.effects if words.displayed_status(f) == status]
+        group = [one for one in effects if words.displayed_status(one) == status]
         if group:
             yield f"  {heading}"
         elif status == "found":
             yield "  found: none"
-        for finding in group:
-            yield from _effect(finding, status, wide, diagnosis)
-    if told := words.one_sigma(diagnosis):
-        yield wrap(told)
+        for one in group:
+            yield from told(one, status)
 
 
 def _effect(finding: Finding, status: str, wide: int, diagnosis: Diagnosis) -> Iterator[str]:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from thermal_robot.report import motion_words as words
 from thermal_robot.report import units
-from thermal_robot.report.plain_text import bar, wrap
-from thermal_robot.report.words import STATUS, about_in_line, displayed_status, listed, one_sigma
-from thermal_robot.report.words import needs as needed
+from thermal_robot.report.plain_text import bar, by_heading, wrap
+from thermal_robot.report.words import about_in_line, listed, one_sigma
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
@@ -69,28 +68,17 @@ def _how_far(d: MotionDiagnosis) -> Iterator[str]:
 def _which(d: MotionDiagnosis) -> Iterator[str]:
     wide = max(len(one.name) for one in d.effects)
     yield f"    {'':{wide}}{'probability':>13}    share   of the gap, in motions held out"
-    shown = {one.name for one in d.shown}
-    for status, heading in STATUS.items():
-        group = [one for one in d.effects if displayed_status(one) == status]
-        if status in ("found", "confounded"):
-            group = [one for one in group if one.name in shown]
-        if group:
-            yield f"  {heading}"
-        elif status == "found":
-            yield "  found: none"
-        for one in group:
-            yield from _effect(d, one, status, wide)
+    yield from by_heading(words.effects(d), lambda one, status: _effect(d, one, status, wide))
     if told := one_sigma(d):
         yield wrap(told)
 
 
 def _effect(d: MotionDiagnosis, finding: Finding, status: str, wide: int) -> Iterator[str]:
     if status == "not_testable":
-        needs = needed(finding, list(d.joints))
-        yield wrap(f"needs {needs}" if needs else words.NO_USE, f"    {finding.name:{wide}}{'':13}   ")
+        yield wrap(words.needed(d, finding), f"    {finding.name:{wide}}{'':13}   ")
         return
     line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}"
-    if status not in ("found", "confounded"):
+    if status not in words.TOLD:
         yield line
         return
     yield f"{line}  {units.percent(finding.shrinkage):>7}   {bar(finding.shrinkage or 0.0)}".rstrip()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -39,8 +39,13 @@ def headline(diagnosis: Diagnosis) -> str:
     It names at most three causes, the largest shares first, and counts the others. The fullest wording that fits is
     taken; the rest is left to :mod:`thermal_robot.report.words`.
     """
+    return fitting(_wordings(diagnosis))
+
+
+def fitting(wordings: Iterable[str]) -> str:
+    """Return the first wording that a headline has room for, else the beginning of the last."""
     text = ""
-    for text in _wordings(diagnosis):
+    for text in wordings:
         if len(text.split()) <= MOST_WORDS:
             return text
     return " ".join(text.split()[:MOST_WORDS]).rstrip(".,;:") + "."
@@ -295,7 +300,7 @@ def displayed_status(finding: Finding) -> str:
     return "in_question" if doubtful else finding.status
 
 
-def by_status(diagnosis: Diagnosis) -> list[Finding]:
+def by_status(diagnosis: Diagnosis | MotionDiagnosis) -> list[Finding]:
     """Return the findings in the order of display: found first, untestable last."""
     return [f for status in STATUS for f in diagnosis.effects if displayed_status(f) == status]
 
@@ -351,8 +356,9 @@ def facts(diagnosis: Diagnosis) -> dict[str, str]:
     name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
     rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
     campaign = f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
-    told = {"Verdict": _verdict(diagnosis), "Campaign": campaign}
+    told = {"Verdict": "none: robot and table do not belong together", "Campaign": campaign}
     if diagnosis.usable:
+        told["Verdict"] = verdict(diagnosis, in_words(diagnosis.verdict))
         aside = f"as outliers: {_rows(diagnosis.outliers)} of the file (its header is row 1)"
         told["Set aside"] = aside if diagnosis.outliers else "no row"
         told |= {"Rows used": rows_used(diagnosis), "Left out": _left_out(diagnosis)}
@@ -406,12 +412,9 @@ def turned(diagnosis: Diagnosis) -> list[str]:
     return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
-def _verdict(diagnosis: Diagnosis) -> str:
+def verdict(diagnosis: Diagnosis | MotionDiagnosis, names: str) -> str:
     """Explanation and its posterior probability in words."""
-    if not diagnosis.usable:
-        return "none: robot and table do not belong together"
-    names = in_words(diagnosis.verdict) or "no effect"
-    said = f"{names}; probability of exactly this explanation {units.probability(diagnosis.probability)}"
+    said = f"{names or 'no effect'}; probability of exactly this explanation {units.probability(diagnosis.probability)}"
     return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
 
 
