@@ -238,45 +238,44 @@ def _delay(actuator: Any, step: float, cause: Cause, written: Written) -> None:
 
 def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
     """Add the payload that was found to the body, or to the body of the site, of the tool frame."""
-    mass, tool = found.values.get(("payload", ""), 0.0), found.log.robot.tool_frame
-    if ("contact", "") in found.values:
-        written.kept.append(f"contact: {_CANNOT['contact']}")
-    if mass <= 0.0:
-        if mass < 0.0:
-            written.kept.append(_less(mass))
+    tool, (mass, at) = found.log.robot.tool_frame, _payload(found, written)
+    if not mass:
         return
     bodies, sites = ({one.name: one for one in own} for own in (spec.bodies, spec.sites))
     if tool not in bodies and tool not in sites:
         written.kept.append(f"payload: the MJCF has neither body nor site {tool!r}")
         return
-    at = np.zeros(3) if found.log.payload is None else found.log.payload[1]
     place = {} if tool in bodies else {"pos": sites[tool].pos, "quat": sites[tool].quat}
     body = (bodies.get(tool) or sites[tool].parent).add_body(name=f"{tool} payload", **place)
     body.explicitinertial, body.mass, body.ipos, body.inertia = True, mass, at, [_POINT] * 3
     written.held.append(f"payload at {tool}: {mass:.4g} kg")
 
 
-def _less(mass: float) -> str:
-    return f"payload: {-mass:.4g} kg less than the masses say; which of them, no log of one load tells"
+def _payload(found: MotionDiagnosis, written: Written) -> tuple[float, Array]:
+    """Payload to be added, kg, and its centre in the tool frame, m; what is no load at the tool is told as kept."""
+    mass = found.values.get(("payload", ""), 0.0)
+    if ("contact", "") in found.values:
+        written.kept.append(f"contact: {_CANNOT['contact']}")
+    if mass < 0.0:
+        said = f"payload: {-mass:.4g} kg less than the masses say; which of them, no log of one load tells"
+        written.kept.append(said)
+    return max(mass, 0.0), np.zeros(3) if found.log.payload is None else np.asarray(found.log.payload[1])
 
 
-def motion_urdf(found: MotionDiagnosis, urdf: str | None = None) -> Written:
-    """Joint friction, damping, effort and position limits, and the payload written into a URDF (``<dynamics>``).
+def motion_urdf(found: MotionDiagnosis) -> Written:
+    """Joint friction, damping, limits and the payload written into the URDF of the log's robot (``<dynamics>``).
 
     Parameters
     ----------
     found
         Of :func:`~thermal_robot.motion.diagnose.diagnose_motion`.
-    urdf
-        Text of the user's URDF; that of the log's robot where left out.
 
     Raises
     ------
     CampaignError
         If the URDF lacks a joint of the log.
     """
-    text = found.log.robot.urdf if urdf is None else urdf
-    root, written = tree(text), Written()
+    root, written = tree(found.log.robot.urdf), Written()
     joints = {joint.get("name"): joint for joint in root.iterfind("joint")}
     for cause in causes(found):
         if cause.name not in joints:
@@ -291,7 +290,7 @@ def motion_urdf(found: MotionDiagnosis, urdf: str | None = None) -> Written:
         _tell_kept(cause, written, _CANNOT | _OF_THE_SERVO)
     _mass_of_link(root, found, written)
     notes = ["Written by thermal_robot from a diagnosis of motions:", *written.held, "Not written:", *written.kept]
-    written.text = text_of(root, text, notes)
+    written.text = text_of(root, found.log.robot.urdf, notes)
     return written
 
 
@@ -310,14 +309,10 @@ def _attribute(
 
 def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
     """Add the payload that was found as a link behind the tool frame."""
-    mass, tool = found.values.get(("payload", ""), 0.0), found.log.robot.tool_frame
-    if ("contact", "") in found.values:
-        written.kept.append(f"contact: {_CANNOT['contact']}")
-    if mass < 0.0:
-        written.kept.append(_less(mass))
-    if mass <= 0.0:
+    tool, (mass, at) = found.log.robot.tool_frame, _payload(found, written)
+    if not mass:
         return
-    name, at = f"{tool}_payload", np.zeros(3) if found.log.payload is None else found.log.payload[1]
+    name = f"{tool}_payload"
     link = etree.SubElement(root, "link", name=name)
     inertial = etree.SubElement(link, "inertial")
     etree.SubElement(inertial, "origin", xyz=_numbers(at), rpy="0 0 0")
