@@ -38,15 +38,14 @@ def mujoco_or_error() -> Any:
     return mujoco
 
 
-def compiled(mjcf: str | Path) -> Any:
-    """Compile an MJCF, a file or its text, to a ``mujoco.MjModel``."""
+def compiled(mjcf: str | Path) -> tuple[str, Any, Path | None]:
+    """Name of an MJCF, given by its path or as its text, its ``mujoco.MjModel``, and its file if it has one."""
     mujoco = mujoco_or_error()
+    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
+    name, model = str(path or "the MJCF"), mujoco.MjModel
     try:
-        if isinstance(mjcf, Path):
-            return mujoco.MjModel.from_xml_path(str(mjcf))
-        return mujoco.MjModel.from_xml_string(mjcf)
+        return name, model.from_xml_path(str(path)) if path else model.from_xml_string(mjcf), path
     except (ValueError, mujoco.FatalError) as error:
-        name = str(mjcf) if isinstance(mjcf, Path) else "the MJCF"
         raise CampaignError(name, "MuJoCo does not take it", found=" ".join(str(error).split())) from None
 
 
@@ -325,8 +324,7 @@ def _moving(robot: Robot) -> list[str]:
 
 def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
     """Name of an MJCF, its ``mujoco.MjModel`` and its file; it must have the robot's joints."""
-    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
-    name, model = str(path or "the MJCF"), compiled(path or mjcf)
+    name, model, path = compiled(mjcf)
     for joint in _moving(robot):
         if known(model, "joint", joint) is None:
             own = ", ".join(model.joint(j).name or "(unnamed)" for j in range(model.njnt)) or "no joint"

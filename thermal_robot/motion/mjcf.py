@@ -27,7 +27,7 @@ _FAR = 1e3  # m: limit of a joint that slides without one
 def _model(file: Path) -> Any:
     if not file.is_file():
         raise CampaignError(str(file), "there is no such file", expected="the robot's MJCF")
-    return compiled(file)
+    return compiled(file)[1]
 
 
 def gravity_of_mjcf(file: Path) -> tuple[float, float, float]:

@@ -113,14 +113,13 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
     Joints that are not in the log are held at zero.
     """
     mujoco = mujoco_or_error()
-    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
-    model = compiled(path or str(mjcf))
+    file, model, _ = compiled(mjcf)
     numbers = [known(model, "joint", name) for name in log.joints]
     servos = [_servo(model, number) for number in numbers]
     for name, number, servo in zip(log.joints, numbers, servos, strict=True):
         if number is None or servo is None:
             problem = f"has no {'joint' if number is None else 'position actuator of joint'} {name!r}"
-            raise CampaignError(str(path or "the MJCF"), problem)
+            raise CampaignError(file, problem)
     at = np.array([model.jnt_qposadr[number] for number in numbers])
     own = {int(model.jnt_dofadr[number]) for number in numbers}
     held = [d for d in range(model.nv) if d not in own]

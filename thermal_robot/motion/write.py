@@ -127,14 +127,13 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
         If MuJoCo is not installed or does not take the model, or if that lacks a joint of the log.
     """
     mujoco = mujoco_or_error()
-    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
-    compiled(path or str(mjcf))  # refused in words
+    name, _, path = compiled(mjcf)  # refused in words
     spec = mujoco.MjSpec.from_file(str(path)) if path else mujoco.MjSpec.from_string(str(mjcf))
     written, joints = Written(), {joint.name: joint for joint in spec.joints}
     for cause in causes(found):
         if cause.name not in joints:
             own = ", ".join(joints) or "no joint"
-            raise CampaignError(str(path or "the MJCF"), f"has no joint {cause.name!r}", found=own)
+            raise CampaignError(name, f"has no joint {cause.name!r}", found=own)
         _into_joint(joints[cause.name], cause, written)
         if cause.torque("coulomb") is not None:
             stick(spec, joints[cause.name])
