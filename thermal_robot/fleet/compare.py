@@ -104,16 +104,6 @@ def compare(
         sure it is.
     EffectError, EstimationError
         As :func:`~thermal_robot.diagnose`.
-
-    Examples
-    --------
-    >>> import thermal_robot as tr
-    >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
-    >>> monday = tr.simulate(robot, rows=40, noise=2e-5, seed=1)
-    >>> friday = tr.simulate(robot, {"joint_offset": {"joint_3": 1e-3}}, rows=40, noise=2e-5, seed=2)
-    >>> found = tr.compare(monday, friday, names=["monday", "friday"])
-    >>> [(change.effect, change.place, change.since) for change in found.changes]
-    [('joint_offset', 'joint_3', 'friday')]
     """
     expected = "campaigns, their diagnoses, models, or paths of campaigns and models"
     for campaign in campaigns:
