@@ -75,7 +75,6 @@ def test_quantities_are_levels_or_smooth_with_knots_apart():
     assert of_quantity(Discovered(), np.arange(6.0)).shape == "levels"
     many = of_quantity(Discovered(), np.arange(7.0))
     assert (many.shape, len(many.marks), many.origin, many.span) == ("smooth", 5, 0.0, 6.0)
-    assert len(of_quantity(Discovered(), np.arange(20.0), knots=9).marks) == 9
 
 
 def names(found):

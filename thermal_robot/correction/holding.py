@@ -23,7 +23,6 @@ from thermal_robot.percents import percent
 from thermal_robot.prediction import FileGap
 
 PLACEMENTS, ZEROS, TICKS = "placements", "zeros", "ticks"
-HOLDINGS = (PLACEMENTS, ZEROS, TICKS)
 """What a file can hold."""
 TICK = 2.0 * np.pi / 4096.0
 """rad: a step of the 12-bit encoders of Feetech's STS and Dynamixel's X servos."""
@@ -70,7 +69,7 @@ class Applied:
 
 
 def applied(model: CorrectedModel, min_sigma: float | None = None) -> dict[str, Applied]:
-    """Return what a file of each of :data:`HOLDINGS` applies of a model, at the temperature of its lengths.
+    """Return what a file of placements, zeros or ticks applies of a model, at the temperature of its lengths.
 
     Empty where the model has no constant part then.
     """

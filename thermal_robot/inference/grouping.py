@@ -76,8 +76,8 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     return labels
 
 
-def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
-    """Label (N,), 0..B−1, of one of at most ``count`` blocks of consecutive measurements: folds, jackknife groups.
+def blocks(campaign: Campaign) -> Labels:
+    """Label (N,), 0..B−1, of blocks of consecutive measurements, ``settings.BLOCKS`` at most: folds, jackknife groups.
 
     Near-repeats stay together.
     """
@@ -90,7 +90,7 @@ def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
     order = np.argsort(middle, kind="stable")
     ahead = np.empty(len(order))
     ahead[order] = np.cumsum(sizes[order]) - sizes[order]
-    count = min(count, len(order))
+    count = min(settings.BLOCKS, len(order))
     block = np.minimum(ahead * count // campaign.samples, count - 1).astype(np.int64)[cluster]
     return np.unique(block, return_inverse=True)[1].astype(np.int64)
 

@@ -295,16 +295,16 @@ def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
 
 
-def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
+def of_quantity(law: Discovered, values: Array) -> Discovered:
     """Law with knots at the quantity's quantiles, or with its levels where it has few values."""
     levels = np.unique(values)
     low, high = float(values.min()), float(values.max())
     if len(levels) <= settings.FEW_LEVELS:
         return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
-    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, knots))
-    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / knots:
+    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, settings.KNOTS))
+    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / settings.KNOTS:
         # most values lie in one spot: a spline between knots there would be free to do anything
-        marks = np.linspace(low, high, knots)
+        marks = np.linspace(low, high, settings.KNOTS)
     return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
 
 
