@@ -23,6 +23,7 @@ from thermal_robot.kinematics import (
     chain_frames,
     frame_jacobians,
     gravity_torques,
+    homogeneous,
     placement_sensitivities,
     quaternion_to_rotation,
     segment_loads,
@@ -64,9 +65,7 @@ class Frames:
     @classmethod
     def declared(cls, campaign: Campaign) -> Frames:
         """Frames as the campaign declares them: identity base, target without rotation."""
-        tool = np.eye(4)
-        tool[:3, 3] = campaign.target
-        return cls(np.eye(4), tool)
+        return cls(np.eye(4), homogeneous(np.eye(3), campaign.target))
 
 
 @dataclass(frozen=True, eq=False)

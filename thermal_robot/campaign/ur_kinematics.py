@@ -18,6 +18,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.document import read_yaml
 from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import homogeneous
 from thermal_robot.kinematics.urdf import rewritten
 from thermal_robot.robot import Robot, load_robot
 
@@ -62,10 +63,8 @@ def with_kinematics(robot: Robot, file: str | Path) -> Robot:
     origins = {}
     for link, k in elements(robot, str(file)).items():
         pose = _pose(held.get(link) if isinstance(held, Mapping) else None, str(file), link)
-        nominal = np.eye(4)
-        nominal[:3, :3], nominal[:3, 3] = robot.chain.rotations[k], robot.chain.translations[k]
-        away = np.linalg.norm(pose[:3, 3] - nominal[:3, 3])
-        turned = np.linalg.norm(pose[:3, :3] - nominal[:3, :3]) / np.sqrt(2.0)
+        away = np.linalg.norm(pose[:3, 3] - robot.chain.translations[k])
+        turned = np.linalg.norm(pose[:3, :3] - robot.chain.rotations[k]) / np.sqrt(2.0)
         if away > FARTHEST or turned > MOST_TURNED:
             raise CampaignError(
                 str(file),
@@ -91,6 +90,4 @@ def _pose(given: Any, file: str, link: str) -> Array:
     if not np.isfinite(figures).all():
         expected = f"{', '.join(FIGURES)} under kinematics: {link}"
         raise CampaignError(file, "is no kinematics.yaml", key=f"kinematics.{link}", expected=expected)
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3]
-    return pose
+    return homogeneous(Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3])

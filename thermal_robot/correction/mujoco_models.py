@@ -18,7 +18,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction.robot_files import Calibrated, calibrated_urdf, target_link
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.kinematics import homogeneous, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.kinematics.model import PRISMATIC, mimics
 from thermal_robot.kinematics.urdf import text_of, tree, unsound
 from thermal_robot.robot import Robot
@@ -117,9 +117,7 @@ def moved(model: Any, data: Any, positions: Mapping[str, float]) -> None:
 
 def pose_of(placed: Any) -> Array:
     """World pose (4, 4), m, of a body or a site of a ``mujoco.MjData``."""
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = placed.xmat.reshape(3, 3), placed.xpos
-    return pose
+    return homogeneous(placed.xmat.reshape(3, 3), placed.xpos)
 
 
 def known(model: Any, kind: str, name: str) -> int | None:
@@ -215,8 +213,7 @@ class _Patched:
     def place(self) -> None:
         """Set the poses of joint bodies and tool frame, and add the target."""
         chain, placed = self.robot.robot.chain, self.robot.placements
-        nominal = np.tile(np.eye(4), (len(placed), 1, 1))
-        nominal[:, :3, :3], nominal[:, :3, 3] = chain.rotations, chain.translations
+        nominal = chain.placements
         at, before, after, last = self.base, np.eye(4), np.eye(4), 0
         for k, name in enumerate(chain.names):
             at, before, after = at @ nominal[k], before @ nominal[k], after @ placed[k]
@@ -264,8 +261,8 @@ class _Patched:
         if np.array_equal(change, np.eye(4)):
             return
         parent = pose_of(self.data.body(int(self.model.body_parentid[body])))
-        inside, own = np.linalg.inv(parent) @ pose_of(self.data.body(body)), np.eye(4)
-        own[:3, :3], own[:3, 3] = quaternion_to_rotation(self.model.body_quat[body]), self.model.body_pos[body]
+        inside = np.linalg.inv(parent) @ pose_of(self.data.body(body))
+        own = homogeneous(quaternion_to_rotation(self.model.body_quat[body]), self.model.body_pos[body])
         _set_pose(self._tag(joint, body), inside @ change @ np.linalg.inv(inside) @ own)
 
     def _tag(self, joint: str, body: int) -> Any:
@@ -383,8 +380,7 @@ def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
 
 def _target(name: str, model: Any, campaign: Campaign) -> tuple[str, int, Array]:
     """Kind and index of the element that carries the target, and the target's pose (4, 4) on it."""
-    declared = np.eye(4)
-    declared[:3, 3] = campaign.target
+    declared = homogeneous(np.eye(3), campaign.target)
     tool = campaign.robot.tool_frame
     for link, pose in ((target_link(tool), np.eye(4)), (tool, declared)):
         for kind in ("site", "body"):

@@ -30,7 +30,7 @@ from thermal_robot.correction.holding import FORMATS, PLACEMENTS, expectation
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.effects import settings
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import Displacement, exp3, exp6, rotation_to_quaternion, rotation_to_rpy
+from thermal_robot.kinematics import Displacement, exp3, exp6, homogeneous, rotation_to_quaternion, rotation_to_rpy
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.kinematics.urdf import rewritten, xyz_rpy
 from thermal_robot.prediction import FileGap
@@ -103,8 +103,7 @@ class Calibrated:
     def placements(self) -> Array:
         """Poses (K, 4, 4) of the chain's elements in their parent links: P exp(ξ) exp(axis · zero offset)."""
         chain, segments = self.robot.chain, np.asarray(self.displacement.segment)
-        placed = np.tile(np.eye(4), (len(chain.names), 1, 1))
-        placed[:, :3, :3], placed[:, :3, 3] = chain.rotations, chain.translations
+        placed = chain.placements
         for s, k in enumerate(chain.placed):
             placed[k] = placed[k] @ exp6(segments[s])
         for j, k in enumerate(chain.movable):
@@ -318,9 +317,7 @@ def ur_kinematics(robot: Calibrated) -> str:
             origins[joints[k]] = np.linalg.solve(nominal, real)
             nominal, real = np.eye(4), np.eye(4)
             continue
-        own = np.eye(4)
-        own[:3, :3], own[:3, 3] = chain.rotations[k], chain.translations[k]
-        nominal = nominal @ own
+        nominal = nominal @ chain.placements[k]
     notes = robot.notes("ur_kinematics")
     if not np.allclose(nominal, real, rtol=0, atol=1e-9):
         notes.append("Frames behind the last joint are displaced as well, which only a URDF holds.")
@@ -365,9 +362,7 @@ def joint_parameters(robot: Calibrated) -> str:
     for k, (name, pose) in enumerate(zip(chain.names, robot.placements, strict=True)):
         if name not in moved:
             continue
-        nominal = np.eye(4)
-        nominal[:3, :3], nominal[:3, 3] = chain.rotations[k], chain.translations[k]
-        change = pose @ np.linalg.inv(nominal)
+        change = pose @ np.linalg.inv(chain.placements[k])
         held = {"parent": links[k], "child": links[k + 1]}
         joints[name] = {**held, **_pos_quat(pose), **_pos_quat(change, "change_")}
     told = {"schema": JOINT_PARAMETERS, "notes": robot.notes("joints"), "joints": joints}
@@ -494,10 +489,8 @@ def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Ar
 
 def link(theta: float, d: float, a: float, alpha: float, beta: float) -> Array:
     """Denavit-Hartenberg-Hayati transform (4, 4) between consecutive axes: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
-    pose, turned = np.eye(4), _turned(2, theta)
-    pose[:3, 3] = turned @ np.array([a, 0.0, d])
-    pose[:3, :3] = turned @ _turned(0, alpha) @ _turned(1, beta)
-    return pose
+    turned = _turned(2, theta)
+    return homogeneous(turned @ _turned(0, alpha) @ _turned(1, beta), turned @ np.array([a, 0.0, d]))
 
 
 def _turned(axis: int, angle: float) -> Array:
@@ -507,13 +500,10 @@ def _turned(axis: int, angle: float) -> Array:
 
 def _first(point: Array, axis: Array) -> Array:
     """Frame (4, 4) on the first axis, z along it, at the point nearest to the root frame's origin."""
-    frame = np.eye(4)
     along = np.eye(3)[0] if abs(axis[0]) < 1.0 - NEARLY_PARALLEL else np.eye(3)[1]
     x = along - (along @ axis) * axis
     x /= np.linalg.norm(x)
-    frame[:3, :3] = np.column_stack([x, np.cross(axis, x), axis])
-    frame[:3, 3] = point - (point @ axis) * axis
-    return frame
+    return homogeneous(np.column_stack([x, np.cross(axis, x), axis]), point - (point @ axis) * axis)
 
 
 def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:

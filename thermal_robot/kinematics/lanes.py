@@ -173,9 +173,8 @@ def _made(chain: Chain) -> Arm:
     kinds, joint = np.full(elements, FIXED), np.full(elements, -1)
     joint[chain.movable] = np.arange(len(chain.movable))
     turns, back = np.tile([0, 1], (elements, 1)), np.eye(4)
-    place, aligned = np.tile(np.eye(4), (2, elements, 1, 1))
+    place, aligned = chain.placements, np.tile(np.eye(4), (elements, 1, 1))
     for k in range(elements):
-        place[k, :3, :3], place[k, :3, 3] = chain.rotations[k], chain.translations[k]
         place[k], back = back @ place[k], np.eye(4)
         if chain.kinds[k] == PRISMATIC:
             kinds[k] = SLIDES

@@ -26,6 +26,13 @@ def skew(vectors: ArrayLike) -> Array:
     return out
 
 
+def homogeneous(rotations: ArrayLike, translations: ArrayLike) -> Array:
+    """Homogeneous matrices (..., 4, 4) of rotations (..., 3, 3) and translations (..., 3), m."""
+    motions = np.zeros((*np.shape(translations)[:-1], 4, 4))
+    motions[..., :3, :3], motions[..., :3, 3], motions[..., 3, 3] = rotations, translations, 1.0
+    return motions
+
+
 def exp3(vectors: ArrayLike) -> Array:
     """Exponential map of SO(3): rotation matrix of each rotation vector (Rodrigues' formula).
 
@@ -64,12 +71,8 @@ def exp6(twists: ArrayLike) -> Array:
     first, second, third = _rodrigues_coefficients(angular)
     turn = skew(angular)
     turn_twice = turn @ turn
-    motion = np.zeros((*xi.shape[:-1], 4, 4))
-    motion[..., :3, :3] = np.eye(3) + first * turn + second * turn_twice
     left_jacobian = np.eye(3) + second * turn + third * turn_twice
-    motion[..., :3, 3] = (left_jacobian @ linear[..., None])[..., 0]
-    motion[..., 3, 3] = 1.0
-    return motion
+    return homogeneous(np.eye(3) + first * turn + second * turn_twice, (left_jacobian @ linear[..., None])[..., 0])
 
 
 def log3(rotations: ArrayLike) -> Array:
@@ -193,11 +196,8 @@ def align(source: Array, target: Array, weights: Array) -> Array:
     u, _, vt = np.linalg.svd((target - to_mean).swapaxes(-1, -2) @ ((source - from_mean) * share[..., None]))
     upright = np.ones(u.shape[:-1])
     upright[..., 2] = np.linalg.det(u) * np.linalg.det(vt)
-    motion = np.zeros((*u.shape[:-2], 4, 4))
-    motion[..., :3, :3] = turn = (u * upright[..., None, :]) @ vt
-    motion[..., :3, 3] = (to_mean.swapaxes(-1, -2) - turn @ from_mean.swapaxes(-1, -2))[..., 0]
-    motion[..., 3, 3] = 1.0
-    return motion
+    turn = (u * upright[..., None, :]) @ vt
+    return homogeneous(turn, (to_mean.swapaxes(-1, -2) - turn @ from_mean.swapaxes(-1, -2))[..., 0])
 
 
 def sines_and_cosines(angles: Array, sines: Array, cosines: Array) -> None:

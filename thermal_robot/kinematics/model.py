@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.lie import homogeneous
 from thermal_robot.kinematics.urdf import nearest, parse_urdf, read
 
 
@@ -286,6 +287,11 @@ class Chain:
 
     def __post_init__(self) -> None:
         _freeze(*vars(self).values())
+
+    @property
+    def placements(self) -> Array:
+        """Homogeneous matrices (K, 4, 4) of the elements in the frames of their parent links."""
+        return homogeneous(self.rotations, self.translations)
 
 
 def build_chain_model(

@@ -15,8 +15,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import quaternion_to_rotation
-from thermal_robot.kinematics.lie import exp3
+from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
 from thermal_robot.kinematics.urdf import xyz_rpy
 from thermal_robot.motion.log import Servo
 
@@ -106,7 +105,7 @@ def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: d
         if model.jnt_type[joint] == _BALL:
             raise CampaignError(file, f"joint {model.joint(joint).name!r} is a ball", expected="hinges and slides")
         link = own if joint == joints[-1] else f"{own} before joint {joint + 1}"
-        pose = pose @ _shift(model.jnt_pos[joint] - anchor)
+        pose = pose @ homogeneous(np.eye(3), model.jnt_pos[joint] - anchor)
         anchor = np.array(model.jnt_pos[joint])
         _moving(robot, model, joint, (before, link), pose)
         before, pose = link, np.eye(4)
@@ -120,11 +119,9 @@ def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: d
 def _moving(robot: Any, model: Any, joint: int, between: tuple[str, str], pose: Array) -> None:
     axis, zero = np.array(model.jnt_axis[joint]), float(model.qpos0[model.jnt_qposadr[joint]])
     slides, limited = model.jnt_type[joint] == _SLIDE, bool(model.jnt_limited[joint])
-    back = _shift(-zero * axis) if slides else np.eye(4)
-    if not slides:
-        back[:3, :3] = exp3(-zero * axis)
+    turn, shift = (np.eye(3), -zero * axis) if slides else (exp3(-zero * axis), np.zeros(3))
     kind = "prismatic" if slides else "revolute" if limited else "continuous"
-    element = _joint(robot, model.joint(joint).name or f"joint {joint}", kind, between, pose @ back)
+    element = _joint(robot, model.joint(joint).name or f"joint {joint}", kind, between, pose @ homogeneous(turn, shift))
     ElementTree.SubElement(element, "axis", xyz=_digits(axis))
     low, high = model.jnt_range[joint] if limited else (-_FAR, _FAR)
     if kind != "continuous":
@@ -159,15 +156,7 @@ def _origin(element: Any, pose: Array) -> None:
 
 
 def _pose(place: Array, quaternion: Array) -> Array:
-    pose = _shift(place)
-    pose[:3, :3] = quaternion_to_rotation(quaternion)
-    return pose
-
-
-def _shift(by: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, 3] = by
-    return pose
+    return homogeneous(quaternion_to_rotation(quaternion), place)
 
 
 def _digits(values: Array) -> str:

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import exp6
+from thermal_robot.kinematics import exp6, homogeneous
 from thermal_robot.observables import settings
 from thermal_robot.observables.observable import Artefact, Observable, Seen
 
@@ -163,10 +163,7 @@ def _rays(pixels: Array, lens: Array) -> Array:
 def _rigid(linear: Array, shift: Array) -> Array:
     """(4, 4) the rotation next to a linear map, with a shift."""
     u, _, vt = np.linalg.svd(linear)
-    pose = np.eye(4)
-    pose[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    pose[:3, 3] = shift
-    return pose
+    return homogeneous(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt, shift)
 
 
 def _board(origins: Array, rays: Array, points: Array) -> Array:
@@ -188,15 +185,12 @@ def _camera(points: Array, rays: Array) -> Array:
     """(4, 4) pose of a camera that sees points along rays of its frame, both (n, 3): direct linear transformation."""
     middle = points.mean(axis=0)
     size = float(np.abs(points - middle).max())
-    homogeneous = np.column_stack([(points - middle) / size, np.ones(len(points))])
+    projective = np.column_stack([(points - middle) / size, np.ones(len(points))])
     skew = np.cross(np.eye(3)[None], rays[:, None, :]).transpose(0, 2, 1)  # e_k × ray, column k
-    design = np.einsum("nij,nk->nijk", skew, homogeneous).reshape(-1, 12)
+    design = np.einsum("nij,nk->nijk", skew, projective).reshape(-1, 12)
     found = np.linalg.svd(design)[2][-1].reshape(3, 4)
     found *= np.sign(np.linalg.det(found[:, :3])) * np.cbrt(
         1.0 / max(abs(np.linalg.det(found[:, :3])), settings.LEAST_VOLUME)
     )
     inverse = _rigid(found[:, :3], found[:, 3] * size)
-    pose = np.eye(4)
-    pose[:3, :3] = inverse[:3, :3].T
-    pose[:3, 3] = middle - inverse[:3, :3].T @ inverse[:3, 3]
-    return pose
+    return homogeneous(inverse[:3, :3].T, middle - inverse[:3, :3].T @ inverse[:3, 3])
