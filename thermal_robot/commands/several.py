@@ -23,17 +23,13 @@ def compare(options: argparse.Namespace) -> None:
     motion = [declares_motion(Path(one)) for one in options.campaigns]
     if any(motion) and options.report:
         raise CampaignError("compare", "there is no page of motion compared", column="--report", expected="--json")
-    if all(motion):
-        require_free((options.json,), [file for one in options.campaigns for file in files_of(one)])
-        with stages(options.loudness) as progress:
-            told = compare(*options.campaigns, only=options.only, without=options.without, progress=progress)
-        return deliver(options, [(options.json, told.to_json)], str(told), told.summary)
-    files = [file for one in options.campaigns for file in ([Path(one)] if is_model(one) else read_from(one))]
+    inputs = files_of if all(motion) else lambda one: [Path(one)] if is_model(one) else read_from(one)
+    files = [file for one in options.campaigns for file in inputs(one)]
     require_free((options.json, options.report), files)
     with stages(options.loudness) as progress:
         found = compare(*options.campaigns, only=options.only, without=options.without, progress=progress)
     page = as_page(options.report, comparison_html, found.to_dict(), files)
-    return deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
+    deliver(options, [(options.json, found.to_json), page], str(found), found.summary)
 
 
 def wear(options: argparse.Namespace) -> None:

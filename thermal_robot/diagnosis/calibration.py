@@ -21,7 +21,7 @@ from thermal_robot.diagnosis.residual_tests import ResidualAnalysis, analyse_res
 from thermal_robot.diagnosis.uncertainty import inflated_for_structure
 from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
-from thermal_robot.errors import CampaignError, EffectError, require
+from thermal_robot.errors import EffectError, require
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit_named
 from thermal_robot.observables import components
@@ -205,8 +205,6 @@ def calibrate(
         campaign = read_campaign(campaign)
     if campaign.priors:
         check_priors(campaign, {*library(), *(effect.name for effect in chosen)})
-    if not campaign.measured or not campaign.samples:
-        raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
         fit = fit_named(with_corrected_signs(campaign), chosen, progress)

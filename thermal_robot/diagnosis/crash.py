@@ -27,7 +27,7 @@ from thermal_robot.diagnosis.data_faults.misfit import mismatch
 from thermal_robot.diagnosis.diagnose import solvable
 from thermal_robot.diagnosis.values import Misfit, jsonable
 from thermal_robot.effects import Geometric, JointOffset, gate
-from thermal_robot.errors import CampaignError, require
+from thermal_robot.errors import require
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import evidence
@@ -156,8 +156,6 @@ def after_crash(campaign: Campaign | str | Path, *, progress: Callable[[str], No
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    if not campaign.measured or not campaign.samples:
-        raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, _ = usable(campaign)
     with threadpool_limits(1), solvable(campaign):
         misfit = mismatch(campaign, progress)

@@ -30,6 +30,7 @@ from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import spread
 from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import Effect, Parameter, choose, gate
+from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
@@ -112,7 +113,12 @@ def _lagging_runs(readings: Readings, far: Flags, near: float, frames: BaseAndTa
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out copied rows, marks of missing values, and orientations that the simulator lacks, with notes."""
+    """Leave out copied rows, marks of missing values, and orientations that the simulator lacks, with notes.
+
+    :class:`CampaignError` where nothing was measured.
+    """
+    if not campaign.measured or not campaign.samples:
+        raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     notes = []
     simulated = campaign.simulated_position is not None and campaign.simulated_orientation is None
     if campaign.orientation is not None and simulated:
