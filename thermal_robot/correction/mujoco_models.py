@@ -104,7 +104,7 @@ def _with_all_digits(root: Any, model: Any) -> None:
 
 
 def digits(values: Any) -> str:
-    """Format numbers for MJCF, with all digits."""
+    """Format numbers for MJCF and URDF, with all digits."""
     return " ".join(repr(float(value)) for value in values)
 
 

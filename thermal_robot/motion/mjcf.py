@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error
+from thermal_robot.correction.mujoco_models import compiled, digits, mujoco_or_error
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
 from thermal_robot.kinematics.urdf import xyz_rpy
@@ -122,7 +122,7 @@ def _moving(robot: Any, model: Any, joint: int, between: tuple[str, str], pose: 
     turn, shift = (np.eye(3), -zero * axis) if slides else (exp3(-zero * axis), np.zeros(3))
     kind = "prismatic" if slides else "revolute" if limited else "continuous"
     element = _joint(robot, model.joint(joint).name or f"joint {joint}", kind, between, pose @ homogeneous(turn, shift))
-    ElementTree.SubElement(element, "axis", xyz=_digits(axis))
+    ElementTree.SubElement(element, "axis", xyz=digits(axis))
     low, high = model.jnt_range[joint] if limited else (-_FAR, _FAR)
     if kind != "continuous":
         ElementTree.SubElement(
@@ -157,7 +157,3 @@ def _origin(element: Any, pose: Array) -> None:
 
 def _pose(place: Array, quaternion: Array) -> Array:
     return homogeneous(quaternion_to_rotation(quaternion), place)
-
-
-def _digits(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)

@@ -18,7 +18,7 @@ import numpy as np
 from lxml import etree
 
 from thermal_robot.arrays import Array
-from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error, set_damping
+from thermal_robot.correction.mujoco_models import compiled, digits, mujoco_or_error, set_damping
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.urdf import text_of, tree
 from thermal_robot.motion import settings
@@ -314,7 +314,7 @@ def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
     name = f"{tool}_payload"
     link = etree.SubElement(root, "link", name=name)
     inertial = etree.SubElement(link, "inertial")
-    etree.SubElement(inertial, "origin", xyz=_numbers(at), rpy="0 0 0")
+    etree.SubElement(inertial, "origin", xyz=digits(at), rpy="0 0 0")
     etree.SubElement(inertial, "mass", value=repr(float(mass)))
     across = dict.fromkeys(("ixy", "ixz", "iyz"), "0")
     etree.SubElement(inertial, "inertia", **dict.fromkeys(("ixx", "iyy", "izz"), repr(_POINT)), **across)
@@ -322,7 +322,3 @@ def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
     etree.SubElement(joint, "parent", link=tool)
     etree.SubElement(joint, "child", link=name)
     written.held.append(f"payload at {tool}: {mass:.4g} kg")
-
-
-def _numbers(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)
