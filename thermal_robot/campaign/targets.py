@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import align, rotation_to_quaternion
+from thermal_robot.kinematics import align, point_jacobian, rotation_to_quaternion
 
 Mask = NDArray[np.bool_]
 
@@ -136,10 +136,7 @@ def _places(points: Array, seen: Mask) -> Array:
 
 def _spread(places: Array, seen: Mask) -> Array:
     """Propagated standard deviation, (N, 6) of :class:`Targets`; of the place the root mean square over its axes."""
-    jacobian = np.zeros((len(places), 3, 6))
-    jacobian[:, :, :3] = np.eye(3)
-    # the k-th axis of the turn moves a target by e_k × s
-    jacobian[:, :, 3:] = np.cross(np.eye(3)[None], places[:, None]).transpose(0, 2, 1)
+    jacobian = point_jacobian(places)
     each = jacobian.transpose(0, 2, 1) @ jacobian
     variance = np.linalg.inv(np.einsum("nk,kab->nab", seen.astype(float), each)).diagonal(axis1=1, axis2=2).copy()
     variance[:, :3] = variance[:, :3].mean(axis=1, keepdims=True)

@@ -12,6 +12,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.fit import Fit
+from thermal_robot.kinematics import point_jacobian
 
 
 def unseen(fit: Fit) -> Iterator[str]:
@@ -30,7 +31,7 @@ def unseen(fit: Fit) -> Iterator[str]:
         left = np.linalg.norm(without(equations_of(columns[:, :measures]), basis), axis=0)
         return [k for k in range(len(size)) if left[k] <= settings.ALIAS * size[k]]
 
-    twists = np.linalg.norm(_base_moves(fit), axis=(0, 1))
+    twists = np.linalg.norm(point_jacobian(seen.position), axis=(0, 1))
     if campaign.base_known and hidden(seen.base_sensitivity, twists):
         yield (
             "nothing but the arm says where its root stands: place and direction of the base are not observable, and "
@@ -46,12 +47,3 @@ def unseen(fit: Fit) -> Iterator[str]:
             "no length was measured: the scale of the robot is not observable, and lengths hold relative to those of "
             "the URDF; a known distance of two sockets, or a draw wire, would tell it"
         )
-
-
-def _base_moves(fit: Fit) -> Array:
-    """Return the derivative (N, 3, 6) of the target's place by a twist of the base, whether a row sees it or not."""
-    point = fit.nominal.position
-    moved = np.zeros((len(point), 3, 6))
-    moved[:, :, :3] = np.eye(3)
-    moved[:, :, 3:] = np.cross(np.eye(3)[None], point[:, None, :]).transpose(0, 2, 1)
-    return moved

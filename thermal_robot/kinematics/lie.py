@@ -33,6 +33,15 @@ def homogeneous(rotations: ArrayLike, translations: ArrayLike) -> Array:
     return motions
 
 
+def point_jacobian(points: ArrayLike) -> Array:
+    """Jacobian (..., 3, 6) of points (..., 3) by a twist of what carries them, at its origin, linear first."""
+    p = np.asarray(points, dtype=float)
+    moved = np.zeros((*p.shape, 6))
+    moved[..., :3] = np.eye(3)
+    moved[..., 3:] = np.cross(np.eye(3), p[..., None, :]).swapaxes(-1, -2)
+    return moved
+
+
 def exp3(vectors: ArrayLike) -> Array:
     """Exponential map of SO(3): rotation matrix of each rotation vector (Rodrigues' formula).
 

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import exp6, homogeneous
+from thermal_robot.kinematics import exp6, homogeneous, point_jacobian
 from thermal_robot.observables import settings
 from thermal_robot.observables.observable import Artefact, Observable, Seen
 
@@ -137,9 +137,7 @@ class Pixel(Observable):
         own: View = artefacts[name]
         points, turn = self._points(seen), seen.base[:3, :3].T @ own.pose[:3, :3]
         lever = np.where(sign[:, None] < 0.0, points, inside)
-        twist = np.zeros((len(points), 3, 6))
-        twist[:, :, :3] = np.eye(3)
-        twist[:, :, 3:] = np.cross(np.eye(3)[None], lever[:, None]).transpose(0, 2, 1)
+        twist = point_jacobian(lever)
         # the board carries its points; of a camera that moves they move the other way
         carried = axes.transpose(0, 2, 1) @ (turn @ twist)
         columns = self._across(inside, axes, far, np.where(sign[:, None, None] < 0.0, carried, -twist))
