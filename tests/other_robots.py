@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from thermal_robot.effects import gate, named
-from thermal_robot.kinematics import exp3
+from thermal_robot.kinematics import exp3, homogeneous
 from thermal_robot.observations import observe
 from thermal_robot.robot import joint_range, load_robot
 from thermal_robot.simulation import simulate
@@ -25,10 +25,8 @@ def lengthened(robot, factors):
 
 def somewhere(rng, lever=0.15):
     """A base anywhere, and a target about so far from the tool frame."""
-    base, tool = np.eye(4), np.eye(4)
-    base[:3, :3], base[:3, 3] = exp3(rng.normal(size=3)), rng.normal(size=3)
-    tool[:3, 3] = lever / np.sqrt(3) * rng.normal(size=3)
-    return base, tool
+    base = homogeneous(exp3(rng.normal(size=3)), rng.normal(size=3))
+    return base, homogeneous(np.eye(3), lever / np.sqrt(3) * rng.normal(size=3))
 
 
 def measured(robot, seed, rows=60, measures="position", lever=0.15, share=1.0, **sizes):

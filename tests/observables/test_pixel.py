@@ -12,6 +12,7 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.registration import moved, register
+from thermal_robot.kinematics import homogeneous, quaternion_to_rotation
 from thermal_robot.observations import observe
 
 FX, CX, CY = 900.0, 640.0, 480.0
@@ -31,10 +32,7 @@ def looking(eyes, at):
     ahead = (at - eyes) / np.linalg.norm(at - eyes, axis=1, keepdims=True)
     right = np.cross(np.array([0.1, 0.2, 1.0]), ahead)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    poses = np.tile(np.eye(4), (len(eyes), 1, 1))
-    poses[:, :3, :3] = np.stack([right, np.cross(ahead, right), ahead], axis=2)
-    poses[:, :3, 3] = eyes
-    return poses
+    return homogeneous(np.stack([right, np.cross(ahead, right), ahead], axis=2), eyes)
 
 
 def seen_by(mount, robot, noise=0.0, poses=40, seed=0):
@@ -42,14 +40,10 @@ def seen_by(mount, robot, noise=0.0, poses=40, seed=0):
     rng = np.random.default_rng(seed)
     named = dict(zip(robot.joint_names, TRUE, strict=True))
     true = tr.simulate(robot, {"joint_offset": named}, rows=poses, measures="pose", tool=EYE, base=np.eye(4), seed=seed)
-    from thermal_robot.kinematics import quaternion_to_rotation
-
-    target = np.tile(np.eye(4), (poses, 1, 1))
-    target[:, :3, :3], target[:, :3, 3] = quaternion_to_rotation(true.orientation), true.position
+    target = homogeneous(quaternion_to_rotation(true.orientation), true.position)
     if mount == "hand":
         # a board for every pose would be another campaign: the arm is led round one, by postures that see it
-        board = np.eye(4)
-        board[:3, 3] = [0.6, 0.3, -0.2]
+        board = homogeneous(np.eye(3), [0.6, 0.3, -0.2])
         points = np.tile(CORNERS @ board[:3, :3].T + board[:3, 3], (poses, 1, 1))
         inside = np.einsum("nji,nkj->nki", target[:, :3, :3], points - target[:, None, :3, 3])
     else:

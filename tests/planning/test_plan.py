@@ -12,7 +12,7 @@ from thermal_robot.campaign import Units
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.effects import library
 from thermal_robot.effects.apply import displacement
-from thermal_robot.kinematics import exp3
+from thermal_robot.kinematics import exp3, homogeneous
 from thermal_robot.observations import Frames
 from thermal_robot.planning import plan, text, write_plan
 from thermal_robot.planning.plan import FRAMES, Columns, expectations
@@ -243,10 +243,7 @@ DRAWS = 150
 
 def moved(twist):
     """A small motion (6,), m and rad."""
-    pose = np.eye(4)
-    pose[:3, :3] = exp3(np.asarray(twist[3:])[None])[0]
-    pose[:3, 3] = twist[:3]
-    return pose
+    return homogeneous(exp3(twist[3:]), twist[:3])
 
 
 def places(commands, effect, values, base, tool):

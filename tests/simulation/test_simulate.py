@@ -23,7 +23,7 @@ from thermal_robot import (
     write_campaign,
 )
 from thermal_robot.effects import Drift, Effect, JointRipple, Parameter, at_joint, library
-from thermal_robot.kinematics import exp6, quaternion_to_rotation
+from thermal_robot.kinematics import exp6, homogeneous, quaternion_to_rotation
 from thermal_robot.observations import Frames, observe
 from thermal_robot.planning import plan
 from thermal_robot.simulation import schedule
@@ -35,10 +35,7 @@ UPPER = 0.5  # m, of the planar arm
 
 
 def poses_of(campaign):
-    pose = np.tile(np.eye(4), (campaign.samples, 1, 1))
-    pose[:, :3, :3] = quaternion_to_rotation(campaign.orientation)
-    pose[:, :3, 3] = campaign.position
-    return pose
+    return homogeneous(quaternion_to_rotation(campaign.orientation), campaign.position)
 
 
 def recorded(robot, rows=30):
