@@ -70,6 +70,17 @@ def test_independent_noise_leaves_deviations_nearly_as_they_are(rv_m2):
     assert np.median(times) < 1.3
 
 
+def test_a_discrepancy_counts_no_more_than_what_is_left(rv_m2):
+    """Its likelihood may take it for a thousand times as large: in what the effects take it is not seen."""
+    known = fit(warped(rv_m2, 0, 2e-4), [JointGain()])
+    e = known.explanation
+    assert e.discrepancy.kernel is not None
+    grown = [replace(e, discrepancy=replace(e.discrepancy, tau=times * e.discrepancy.tau)) for times in (1e2, 1e4)]
+    stds = [told(inflated_for_structure(replace(known, explanation=each)))[1] for each in (e, *grown)]
+    assert stds[1] == pytest.approx(stds[2], rel=1e-9)
+    assert told(known)[1] < stds[0] <= stds[1] * (1.0 + 1e-9)
+
+
 def test_no_axis_becomes_wider_than_its_prior(rv_m2):
     known = fit(simulate(rv_m2, ["geometric"], seed=3)[0], choose(("geometric",)))
     (b,) = known.explanation.best.blocks
