@@ -15,14 +15,17 @@ import numpy as np
 from thermal_robot.campaign import Campaign, Units, write_campaign
 from thermal_robot.effects import library
 from thermal_robot.effects.apply import displacement
-from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation, rotation_to_quaternion, tool_poses
+from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot
 
 
 def random_motion(rng, reach):
     """A rigid motion that a tracker's place may be: any direction, a few metres away."""
-    return homogeneous(quaternion_to_rotation(rng.normal(size=4)), rng.uniform(-reach, reach, 3))
+    pose = np.eye(4)
+    pose[:3, :3] = quaternion_to_rotation(rng.normal(size=(1, 4)))[0]
+    pose[:3, 3] = rng.uniform(-reach, reach, 3)
+    return pose
 
 
 def commands(robot, samples, rng, share=0.75):
