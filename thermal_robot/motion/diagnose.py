@@ -20,7 +20,7 @@ from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import SHARED, JointModel, ServoModel
 from thermal_robot.motion.moves import moves
-from thermal_robot.motion.refuse import fed_forward
+from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
 from thermal_robot.motion.torque import TorqueModel
@@ -65,8 +65,7 @@ def diagnose_motion(
         told = "; ".join(fault.told for fault in sound.faults)
         raise CampaignError(log.name, f"no joint of the log can be used: {told}", expected="a log without such faults")
     log = sound.log.with_joints(sound.joints)
-    torques = all(motion.torque is not None for motion in log.motions)
-    kind = TorqueModel if torques and (not log.commanded or fed_forward(log)) else ServoModel
+    kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = np.array([one.effect in kept for one in model.parameters])
     choice = select(model, allowed, progress)

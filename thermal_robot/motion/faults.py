@@ -19,6 +19,7 @@ from thermal_robot.motion import clocks
 from thermal_robot.motion.columns import UNITS
 from thermal_robot.motion.following import Correlation, at, clusters, parts, slope, usual_step
 from thermal_robot.motion.log import Channel, Motion, MotionLog, with_channels
+from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.settings import (
     CLEAR,
     FOLLOWS,
@@ -269,14 +270,15 @@ def _speeds(log: MotionLog) -> _Checked:
 
 def _loads(log: MotionLog) -> _Checked:
     """Compare the signs of recorded torques and of those that the URDF's masses need along the measured motion."""
-    if not log.robot.has_masses or any(motion.torque is None for motion in log.motions):
+    if not (log.robot.has_masses and explains_torques(log)):
         return log, [], set()
     found, error = TorqueModel(log).signs()
     turned = (found < -CLEAR * error) & (found < LEAST_AGAINST)
     told = "tau.{0} is {1:.3f} ± {2:.3f} of the torque that the URDF's masses need: of the other sign, turned round"
     named = [(log.joints[j], float(found[j]), float(error[j])) for j in np.flatnonzero(turned)]
     faults = [Fault(each[0], "sign", each[1], each[2], told.format(*each)) for each in named]
-    return _changed(log, {"torque": lambda values: values * np.where(turned, -1.0, 1.0)}), faults, set()
+    scales = {"torque": lambda values: values * np.where(turned, -1.0, 1.0)}
+    return (_changed(log, scales) if turned.any() else log), faults, set()
 
 
 def _scale_of_speeds(log: MotionLog) -> tuple[Array, Array]:

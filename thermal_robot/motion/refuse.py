@@ -60,6 +60,11 @@ def _copied(motion: Motion) -> bool:
     return bool(moved.any() and same[:, moved].all())
 
 
+def explains_torques(log: MotionLog) -> bool:
+    """Whether recorded torques are explained, and no servo: without a command, or where its feed-forward is unknown."""
+    return all(motion.torque is not None for motion in log.motions) and (not log.commanded or fed_forward(log))
+
+
 def fed_forward(log: MotionLog) -> bool:
     """Whether every joint that moves, and whose servo is not stated, follows its command without a lag."""
     lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
