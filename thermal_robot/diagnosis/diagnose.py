@@ -92,8 +92,6 @@ def diagnose(
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
 
-    if not campaign.measured or not campaign.samples:
-        raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = counted(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
