@@ -203,42 +203,23 @@ def scattering(places, seed, rows=60, tau=6.0, present=()):
     return ModelSearch(replace(linear, gap=gap), whitening, offered, PRIOR)
 
 
-@pytest.mark.parametrize("places", [SCATTERED, SCATTERED[:1]], ids=["two joints", "one joint"])
-def test_joints_that_scatter_are_told_whether_one_or_two(places):
+@pytest.mark.parametrize("present", [(), (1,)], ids=["alone", "beside an effect"])
+def test_a_joint_that_scatters_is_told(present):
     for seed in range(5):
-        models = scattering(places, seed)
+        models = scattering(SCATTERED[:1], seed, present=present)
         hyper, best = models.run()
-        assert set(models.kernels[hyper[0]].name.split(", ")[1:]) == set(places)
-        assert models.kernels[hyper[0]].several == (len(places) > 1)
-        assert best.blocks == ()
+        assert models.kernels[hyper[0]].name == "poses, joint_2"
+        assert best.blocks == present
         assert belief(models) > 0.999
-        # what was put together is no kernel to start with: single ones are
-        assert not any(kernel.several for kernel in models.plausible_kernels(best))
-        assert {f"poses, {name}" for name in places} <= {kernel.name for kernel in models.plausible_kernels(best)}
 
 
-def test_joints_that_scatter_are_told_beside_an_effect():
-    """They are put together beside the best combination and beside none, once each, and no trial is kept."""
-    for seed in range(5):
-        models = scattering(SCATTERED, seed, present=(1,))
-        hyper, best = models.run()
-        assert set(models.kernels[hyper[0]].name.split(", ")[1:]) == set(SCATTERED)
-        assert best.blocks == (1,)
-        joined = [kernel for kernel in models.kernels if kernel.several]
-        assert 1 <= len(joined) <= 2 * (settings.SCATTERING - 1)
-        assert len(models.kernels) == 5 + len(joined)
-        asked = {r[0] for r in (*models.searches, *(r for r, _ in models._log_evidences))}
-        assert asked <= {-1, *range(len(models.kernels))}
-
-
-def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
-    """Beside one joint and beside two, but for a constant each: against the gap's density."""
+def test_an_evidence_beside_a_joint_that_scatters_is_that_of_its_covariance():
+    """But for a constant: against the gap's density."""
     models = scattering(SCATTERED, 2, rows=30, present=(1,))
-    hyper, _ = models.run()
-    assert models.kernels[hyper[0]].several
+    models.run()
     one = models.kernels.index(next(kernel for kernel in models.kernels if kernel.name == "poses, joint_2"))
     off = []
-    for number, tau in (hyper, (one, 1.0), (one, 8.0)):
+    for number, tau in ((one, 1.0), (one, 8.0)):
         kernel = replace(models.kernels[number], functions=np.eye(30))
         beside = tau**2 * inside(kernel, models.whitening)
         own = [less_density(models, (number, tau), blocks, beside) for blocks in CHOSEN]
@@ -247,7 +228,7 @@ def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
 
 
 def test_joints_are_as_probable_however_often_blocks_are_left_out():
-    """Weaker than the noise, so that one joint, the other and both are in question."""
+    """Weaker than the noise, so that one joint and the other are in question."""
     models, odds = scattering(SCATTERED, 1, tau=0.7, present=(1,)), []
     models.run()
     for _ in range(3):

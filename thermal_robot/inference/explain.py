@@ -22,10 +22,8 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.kernels import (
     DesignMatrix,
-    GroupKernel,
     Kernel,
     KernelCovariance,
-    SmoothKernel,
     decomposed,
 )
 from thermal_robot.inference.problem import (
@@ -56,7 +54,7 @@ class ModelSearch:
 
     linear: Linear
     whitening: Whitening
-    kernels: list[Kernel]
+    kernels: Sequence[Kernel]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
     among: int = 0
@@ -79,23 +77,22 @@ class ModelSearch:
         self._log_evidences: dict[tuple[Hyperparameters, tuple[int, ...]], float] = {}
         self._combinations: dict[tuple[int, tuple[int, ...]], Combination] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
-        self._joints_tried = False
         self._out: frozenset[int] = frozenset()
         self._amplitudes: dict[int, float] = {}
-        given, self.kernels = self.kernels, []
-        self._spectra: list[SmoothKernel | GroupKernel] = []
-        self._projections: list[list[Array] | None] = []
         self._last: tuple[object, list[Array]] = None, []
-        for kernel in given:
-            self._add_kernel(kernel, float(np.log(share / max(self.among, len(given)))))
+        self._spectra = [decomposed(kernel.over(w.relative), w.weights, w.noise) for kernel in self.kernels]
+        # products with all columns are kept, but not those of per-pose kernels, which have too many
+        both = zip(self.kernels, self._spectra, strict=True)
+        self._projections = [None if kernel.grouped else spectrum.along(self._stack) for kernel, spectrum in both]
+        for number in range(len(self.kernels)):
+            each = float(np.log(share / max(self.among, len(self.kernels)))) - float(np.log(len(settings.TAUS)))
+            self._priors |= {(number, tau): each for tau in settings.TAUS}
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
     def without(self, out: frozenset[int]) -> ModelSearch:
         """Copy of the search without some blocks; evaluations of the others stay in the memo."""
         found = copy(self)
-        found.kernels, found._joints_tried = list(self.kernels), any(kernel.several for kernel in self.kernels)
-        found._spectra, found._projections = list(self._spectra), list(self._projections)
-        found._priors, found._amplitudes = dict(self._priors), dict(self._amplitudes)
+        found._amplitudes = dict(self._amplitudes)
         found._log_evidences = {key: log for key, log in self._log_evidences.items() if not out & set(key[1])}
         found._combinations = {key: own for key, own in self._combinations.items() if not out & set(key[1])}
         found._out = self._out | out
@@ -110,20 +107,6 @@ class ModelSearch:
         found = copy(self)
         found.stack, found._stack = None, replace(self._stack, different=())
         return found
-
-    def _add_kernel(self, kernel: Kernel, log_prior: float) -> int:
-        """Add a kernel, whose prior is divided among its amplitudes; return its number.
-
-        Products with all columns are cached, but not for per-pose kernels, which have too many.
-        """
-        self.kernels.append(kernel)
-        w = self.whitening
-        spectrum = decomposed(kernel.over(w.relative), w.weights, w.noise)
-        self._spectra.append(spectrum)
-        self._projections.append(None if kernel.grouped else spectrum.along(self._stack))
-        number, each = len(self.kernels) - 1, log_prior - float(np.log(len(settings.TAUS)))
-        self._priors |= {(number, tau): each for tau in settings.TAUS}
-        return number
 
     @staticmethod
     def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
@@ -175,25 +158,11 @@ class ModelSearch:
             found = [(*self._best_amplitude(k, blocks), blocks) for k in range(len(self.kernels)) for blocks in tried]
             seeds = []
             other = max(found, key=lambda item: item[1], default=(hyper, -np.inf, ()))
-            nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(hyper, best)
+            nearby = self._climbed(other, best) or self._beside_others(best)
             nearby = nearby or (self._larger_moves(hyper, best) if detours else None)
             if nearby is None:
                 return hyper, best
             hyper, best = nearby
-
-    def _several_joints(self, hyper: Hyperparameters, best: Combination) -> tuple[Hyperparameters, Combination] | None:
-        """Extend a per-pose discrepancy to several joints, one after another; return an improvement, if any.
-
-        Tried with the best combination and with none, since the amplitudes of one need not suit the other.
-        """
-        if self._joints_tried or hyper[0] < 0 or not self.kernels[hyper[0]].grouped:
-            return None
-        self._joints_tried = True
-        single = [k for k, f in enumerate(self.kernels) if f.grouped and f.joints]
-        if not single:
-            return None
-        tried = [(*self._best_joints(blocks, single), blocks) for blocks in {best.blocks, ()}]
-        return self._climbed(max(tried, key=lambda item: item[1]), best)
 
     def _climbed(
         self, found: tuple[Hyperparameters, float, tuple[int, ...]], best: Combination
@@ -213,47 +182,9 @@ class ModelSearch:
         found = self.search_at(hyper).run(best.blocks)
         return (hyper, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
-    def _best_joints(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Hyperparameters, float]:
-        found = max((self._best_amplitude(k, blocks) for k in single), key=lambda item: item[1])
-        for _ in range(settings.SCATTERING - 1):
-            further = self._one_more_joint(found[0], blocks, single)
-            if further is None or further[1] <= found[1]:
-                break
-            found = further
-        return found
-
-    def _one_more_joint(
-        self, hyper: Hyperparameters, blocks: tuple[int, ...], single: Sequence[int]
-    ) -> tuple[Hyperparameters, float] | None:
-        kernel = self.kernels[hyper[0]]
-        others = [self.kernels[k] for k in single if self.kernels[k].functions is kernel.functions]
-        others = [f for f in others if f.place[1] not in kernel.joints]
-        if not others:
-            return None
-        prior = float(self._priors[hyper] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
-        tried = []
-        for other in others:
-            for part in settings.PARTS:
-                further = kernel.with_joint(other, part)
-                # the joints so far stay as they are
-                tau = min(settings.TAUS, key=lambda t: abs(t - hyper[1] * float(np.hypot(1.0, part))))
-                tried.append((self._log_evidence((self._add_kernel(further, prior), tau), blocks), tau, further))
-                self._remove_kernel()
-        _, tau, best = max(tried, key=lambda item: item[0])
-        return self._best_amplitude(self._add_kernel(best, prior), blocks, tau)
-
-    def _remove_kernel(self) -> None:
-        """Remove the last kernel."""
-        number = len(self.kernels) - 1
-        del self.kernels[number], self._spectra[number], self._projections[number]
-        self._log_evidences = {key: log for key, log in self._log_evidences.items() if key[0][0] != number}
-        self._combinations = {key: found for key, found in self._combinations.items() if key[0] != number}
-
-    def _best_amplitude(
-        self, kernel: int, blocks: tuple[int, ...], start: float = 1.0
-    ) -> tuple[Hyperparameters, float]:
+    def _best_amplitude(self, kernel: int, blocks: tuple[int, ...]) -> tuple[Hyperparameters, float]:
         """Most probable amplitude of a kernel with one combination, and its log evidence; it is unimodal."""
-        k = settings.TAUS.index(self._amplitudes.get(kernel, start))
+        k = settings.TAUS.index(self._amplitudes.get(kernel, 1.0))
         best = self._log_evidence((kernel, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:
             for sign in (step, -step):
@@ -321,9 +252,7 @@ class ModelSearch:
                 peaks[kernel] = max(peaks.get(kernel, (-np.inf, 0.0)), (log, tau))
         least = best.log_evidence - settings.KERNEL_REACH
         near = {kernel for kernel, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
-        single = [kernel for kernel in self.kernels if not kernel.several]
-        several = any(self.kernels[k].several for k in near)
-        return tuple(f for k, f in enumerate(single) if k in near or (several and f.grouped))
+        return tuple(f for k, f in enumerate(self.kernels) if k in near)
 
     def _beside_others(self, best: Combination) -> tuple[Hyperparameters, Combination] | None:
         """Evaluate the neighbours with all plausible discrepancies; return an improvement, if any."""
@@ -537,7 +466,7 @@ def explain(
 
 def _state(blocks: tuple[int, ...], kernel: Kernel | None, whitening: Whitening) -> tuple[object, ...]:
     """Key of an iteration, to detect convergence: blocks, kernel of the discrepancy, and rows in use."""
-    return blocks, kernel and kernel.words, np.packbits(whitening.weights > 0).tobytes()
+    return blocks, kernel and kernel.name, np.packbits(whitening.weights > 0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -568,7 +497,7 @@ class _Iteration:
         cls, inputs: _Inputs, whitening: Whitening, beside: Sequence[Kernel], seeds: Sequence[tuple[int, ...]]
     ) -> _Iteration:
         models = ModelSearch(
-            inputs.linear, whitening, list(beside), inputs.log_prior, inputs.rivals, inputs.kernels, inputs.stack
+            inputs.linear, whitening, beside, inputs.log_prior, inputs.rivals, inputs.kernels, inputs.stack
         )
         return cls._searched(inputs, models, seeds, detours=False)
 

@@ -289,8 +289,8 @@ class Kernel:
 
     ``functions`` (N, k) are smooth in what is commanded and recorded; of one that is ``grouped`` (N,) the number of
     each pose or visit. ``moves`` (N, m, c) or, the same for all rows, (m, c): displacement of the target by each
-    component, root frame axes, m and rad. ``place`` is where it enters, the first of several joints (``further``);
-    empty where it may be anywhere.
+    component, root frame axes, m and rad. ``place`` is where it enters; empty
+    where it may be anywhere.
     """
 
     name: str
@@ -298,23 +298,6 @@ class Kernel:
     moves: Array
     grouped: bool = False
     place: tuple[str, str] = ("", "")
-    further: tuple[str, ...] = ()
-
-    @property
-    def words(self) -> frozenset[str]:
-        """Name of the kernel in words; the order of several joints does not matter."""
-        return frozenset(self.name.split(", "))
-
-    @property
-    def several(self) -> bool:
-        """Whether several joints err in this kernel."""
-        return bool(self.further)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints that err in this kernel; empty where it enters elsewhere."""
-        kind, name = self.place
-        return (name, *self.further) if kind == "joint" else ()
 
     def over(self, relative: Array | None) -> Kernel:
         """Kernel with each row divided by its relative noise (N, m); ``None`` if all are one."""
@@ -324,13 +307,6 @@ class Kernel:
             return replace(self, functions=self.functions / relative[:, :1])
         alike = bool((relative == relative[:1]).all())  # the same for all rows, if not for all figures
         return replace(self, moves=self.moves / (relative[0, :, None] if alike else relative[:, :, None]))
-
-    def with_joint(self, other: Kernel, part: float) -> Kernel:
-        """Kernel with one more joint, whose rms is a part of that of all joints so far."""
-        length = [np.sqrt((kernel.moves**2).sum(axis=2).mean()) for kernel in (self, other)]
-        moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
-        joint = other.place[1]
-        return replace(self, name=f"{self.name}, {joint}", moves=moves, further=(*self.further, joint))
 
 
 @dataclass(frozen=True, eq=False)

@@ -240,7 +240,7 @@ class Search:
         All neighbours of the best combination are evaluated, so that its probability is relative to all of them.
         """
         best = self.climb(start)
-        detours = (self._simpler, self._smaller, self._two_at_once, self._rescued)
+        detours = (self._simpler, self._smaller, self._two_at_once)
         while (better := next((found for detour in detours if (found := detour(best))), None)) is not None:
             best = self.climb(better.blocks)
         return best
@@ -248,7 +248,7 @@ class Search:
     def climb(self, start: Sequence[int] = ()) -> Combination:
         """Hill climbing by adding, dropping and exchanging blocks, neighbours of near ties included."""
         best = self._climb(start, frozenset())
-        while (better := self._rescued(best) or self._near_ties(best)) is not None:
+        while (better := self._near_ties(best)) is not None:
             best = self._climb(better.blocks, frozenset())
         return best
 
@@ -331,12 +331,6 @@ class Search:
             if best.log_evidence <= found.log_evidence:
                 return found
             found = best
-
-    def _rescued(self, best: Combination) -> Combination | None:
-        """Evaluate exactly the screened combinations near the best; return an improvement, if any."""
-        near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
-        found = max((self._at_least(blocks, best) for blocks in near), key=lambda c: c.log_evidence, default=best)
-        return found if found.log_evidence > best.log_evidence + settings.BETTER else None
 
     @staticmethod
     def _near(one: Combination, best: Combination) -> bool:
