@@ -22,7 +22,7 @@ from thermal_robot.robot import Robot, load_robot
     [
         ({"nonsense": 1}, "nonsense: is not known"),
         ({"target": [1.0, 2.0]}, r"target: is \[1\.0, 2\.0\], expected three numbers"),
-        ({"target": [1.0, float("nan"), 0.0]}, r"target\[1\]: is NaN, expected a finite number"),
+        ({"target": [1.0, float("nan"), 0.0]}, r"target: is \[1\.0, nan, 0\.0\], expected three numbers"),
         ({"noise_position": -1e-5}, "noise_position: a standard deviation cannot be negative"),
         ({"reference_temperature": -300}, "reference_temperature: no temperature is lower"),
         ({"gravity": [0, 0, -9810]}, r"gravity\[2\]: is -9810, expected a number of m/s"),

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import description, names
-from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import (
     check_covariate,
     check_joints,
@@ -21,7 +20,7 @@ from thermal_robot.campaign.checked import (
     checked_mapping,
     first_true,
 )
-from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector, given
+from thermal_robot.campaign.settings import FIELDS, SMALLEST, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, scale_of
@@ -47,19 +46,15 @@ def _instance(kind: Any, expected: str) -> Kind:
     return take
 
 
+_STATED = ("moves", "noise_position", "noise_orientation", "priors", "gears", "reference_temperature", "about")
 _TEXTS = listed(_instance(str, "a tuple of texts"), expected="a tuple of texts")
 _KINDS: dict[str, Kind] = {
     "robot": _instance(Robot, "a robot, from load_robot"),
     "units": _instance(Units, "Units"),
     "targets": _instance((Targets, type(None)), "Targets, as read from columns x.1 …, or None"),
-    "moves": kinds.HOW_MOVED,
     **dict.fromkeys(("extra", "derived", "turned", "warnings"), _TEXTS),
     **dict.fromkeys(("base_known", "tool_known"), boolean),
-    **dict.fromkeys(("noise_position", "noise_orientation"), kinds.sigma),
-    "priors": kinds.PRIORS,
-    "gears": kinds.GEARS,
-    "reference_temperature": kinds.TEMPERATURE,
-    "about": kinds.ABOUT,
+    **{key: own.kind for key, own in FIELDS.items() if key in _STATED},
 }
 """What each part may be that is no array."""
 _WIDE = {"q": 0, **{key: len(group) for key, group in names.POSES.items()}}
@@ -229,7 +224,7 @@ class Campaign:
         if self.noise_of_rows is None:
             return
         self._hold("noise_of_rows", (samples,))
-        row = first_true(self.noise_of_rows < kinds.SMALLEST)
+        row = first_true(self.noise_of_rows < SMALLEST)
         if row is not None:
             found, problem = f"{self.noise_of_rows[row]:.15g} at index {row}", "no standard deviation"
             raise CampaignError(file, problem, column="noise_of_rows", found=found, expected="a number above 0")

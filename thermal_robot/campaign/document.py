@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from thermal_robot.campaign import settings as kinds
-from thermal_robot.campaign.names import KINDS as NAMED_KINDS
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.settings import KINDS, Settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
-from thermal_robot.schema import Kind, MisfitError, record, shown, text, word
+from thermal_robot.schema import Kind, MisfitError, record, shown
 from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
 if sys.version_info >= (3, 11):
@@ -23,61 +21,12 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_KNOWN = word(("unknown", "known"), kinds.WORD)
-
-
-def _named(meaning: str) -> Kind:
-    return text(f"{meaning}, as text in quotes")
-
-
-def _vector(value: Any, path: str) -> Any:
-    try:
-        return kinds.VECTOR(value, path)
-    except MisfitError:
-        raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
-
-
-def _pairs(value: Any, path: str) -> Any:
-    """Take pairs of sockets with their distance."""
-    expected = 'pairs of sockets with their distance, as [["0", "1", 50.0]]'
-    if not isinstance(value, list) or not all(isinstance(own, list) and len(own) == 3 for own in value):
-        raise MisfitError(path, value, expected)
-    for one, other, length in value:
-        if str(one) == str(other) or not isinstance(length, (int, float)) or not length > 0.0:
-            raise MisfitError(path, [one, other, length], expected)
-    return value
-
-
-KINDS: dict[str, Mapping[str, Kind] | Kind] = {
-    "robot": {
-        "urdf": _named("the path of the robot's URDF file"),
-        "tool_frame": _named("the URDF link that carries the target"),
-        "root_frame": _named("the URDF link where the chain starts"),
-        "kinematics": _named("the path of a kinematics.yaml of Universal Robots"),
-        "gravity": _vector,
-        "moves": kinds.HOW_MOVED,
-        "reference_temperature": kinds.TEMPERATURE,
-    },
-    "measurements": {
-        "file": _named("the path of the table"),
-        "angle_unit": kinds.ANGLE_UNIT,
-        "length_unit": kinds.LENGTH_UNIT,
-        "kind": word(tuple(NAMED_KINDS), kinds.WORD),
-    },
-    "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
-    "noise": {"position": kinds.sigma, "orientation": kinds.sigma},
-    "payload": {"com": _vector},
-    "priors": kinds.PRIORS,
-    "gears": kinds.GEARS,
-    "socket": {"distances": _pairs},
-    "camera": kinds.CAMERAS,
-    "about": kinds.ABOUT,
-}
-"""What each key of each section of campaign.toml may be; priors, gears and about have keys of the user's own."""
 Kinds: TypeAlias = Mapping[str, "Mapping[str, Kind] | Kind"]
 """What each key of each section may be; of a section whose keys are the user's own, what the whole may be."""
 FILE_NAME = "campaign.toml"
 _LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
+_LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them
+_MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 
 def _content(file: Path, most: int, name: str, kind: str) -> str:
@@ -95,44 +44,36 @@ def _content(file: Path, most: int, name: str, kind: str) -> str:
 class Document:
     """A parsed TOML file together with its text, so that an error can name the line.
 
-    ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``kinds`` says
-    what each key of each section may be; of a section whose keys are the user's own, what the whole may be. ``data`` is
-    what stands there as it is, ``name`` is what such a file is usually called.
+    ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``data`` is what
+    stands there as it is, ``name`` is what such a file is usually called.
     """
 
     def __init__(self, file: Path, kinds: Kinds = KINDS, name: str = FILE_NAME) -> None:
         self.file, self.kinds, self.name = str(file), kinds, name
-        self.text, self.data = self._parsed(file)
-        for section, content in self.data.items():
-            self._refuse_unknown(section, content)
-        self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
-
-    def _parsed(self, file: Path) -> tuple[str, dict[str, Any]]:
-        text = _content(file, _LARGEST_FILE, self.name, "TOML")
+        self.text = _content(file, _LARGEST_FILE, name, "TOML")
         try:
-            return text, tomllib.loads(text)
+            self.data: dict[str, Any] = tomllib.loads(self.text)
         except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
             raise CampaignError(self.file, f"not valid TOML: {error}", row=int(line[1]) if line else None) from error
         except RecursionError as error:
-            problem = "values stand within each other too deep"
-            raise CampaignError(self.file, problem, expected="lists of numbers") from error
+            raise CampaignError(self.file, "values stand within each other too deep") from error
         except ValueError as error:  # an integer of thousands of digits
             raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
+        for section, content in self.data.items():
+            self._refuse_unknown(section, content)
+        self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
 
     def row(self, section: str, key: str = "") -> int | None:
         """Line number of a section or key, ``None`` where it cannot be located."""
-        current = ""
+        current, table = "", f"{section}.{key}" if key else section
+        stated = re.compile(rf"\s*[\"']?{re.escape(key or section)}[\"']?\s*=")
         for number, line in enumerate(self.text.splitlines(), start=1):
             if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
                 current = header[1].strip("\"'")
-                if current == section and not key:
+                if current == table:
                     return number
-                if key and current == f"{section}.{key}":
-                    return number
-            elif current == section and key and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
-                return number
-            elif not current and not key and re.match(rf"\s*{re.escape(section)}\s*=", line):
+            elif current == (section if key else "") and stated.match(line):
                 return number
         return None
 
@@ -148,11 +89,10 @@ class Document:
         if not isinstance(content, dict):
             told = {"found": shown(content), "expected": f"a section [{section}]"}
             raise self._error("wrong kind of value", section, **told)
-        kind = self.kinds[section]
-        known = kind if isinstance(kind, Mapping) else content
-        for key in content:
+        known = self.kinds[section]
+        for key in content if isinstance(known, Mapping) else ():
             if key not in known:
-                expected = f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known))
+                expected = f"{'one of ' if len(known) > 1 else ''}{', '.join(known)}"
                 raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
@@ -179,15 +119,9 @@ class Document:
 
 def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return values by section and key as the kinds want them; a :class:`MisfitError` tells another."""
-    fitted = {}
-    for section, content in sections.items():
-        kind = kinds[section]
-        kind = record(kind, may_lack=kind) if isinstance(kind, Mapping) else kind
-        fitted[section] = kind(content, section)
-    return fitted
-
-
-_MOST_NAMED = 5  # campaigns of a folder in one sentence
+    own = {section: kinds[section] for section in sections}
+    whole = {key: record(kind, may_lack=kind) if isinstance(kind, Mapping) else kind for key, kind in own.items()}
+    return {section: whole[section](content, section) for section, content in sections.items()}
 
 
 @dataclass(frozen=True)
@@ -212,18 +146,14 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     """
     file = declared_file(path)
     document = Document(file)
-    for key in ("angle_unit", "length_unit"):
-        document.required("measurements", key)
-    stated = document.sections.get("robot", {})
-    ends = {key: document.required("robot", key) for key in ("urdf", "tool_frame")}
-    ends |= {key: stated.get(key) for key in ("root_frame", "gravity")}
-    settings = Settings.stated(document.sections, **ends)
+    for place in ("measurements.angle_unit", "measurements.length_unit", "robot.urdf", "robot.tool_frame"):
+        document.required(*place.split("."))
     folder = file.parent if folder is None else folder
     table = folder / document.required("measurements", "file")
-    robot = robot_reference(settings.urdf, folder)
+    settings, kinematics = Settings.stated(document.sections), document.sections["robot"].get("kinematics")
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
-    kinematics = folder / stated["kinematics"] if stated.get("kinematics") else None
-    return Declaration(file, table, robot, settings, rows, kinematics)
+    robot = robot_reference(settings.urdf, folder)
+    return Declaration(file, table, robot, settings, rows, folder / kinematics if kinematics else None)
 
 
 def robot_reference(urdf: str, folder: Path) -> str | Path:
@@ -240,27 +170,19 @@ def declared_file(path: Path, name: str = FILE_NAME, section: str = "measurement
         No such file; it says which there are beside it.
     """
     file = path / name if is_folder(path) else path
-    if not is_file(file):
-        raise _absent(path, name, f"[{section}]".encode())
-    return file
-
-
-def _absent(path: Path, name: str, section: bytes) -> CampaignError:
-    """Say that there is no campaign, and which there are beside it: files that have its section, folders its file."""
-    problem, folder = f"this folder has no {name}", path
-    if not is_folder(path):
-        problem, folder = "there is no such file", path.parent
+    if is_file(file):
+        return file
+    problem, folder = (
+        (f"this folder has no {name}", path) if is_folder(path) else ("there is no such file", path.parent)
+    )
     try:
-        inside = sorted(folder.iterdir())
-        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and section in f.read_bytes()]
-        found = [f.name for f in (*files, *(f for f in inside if f.is_dir() and (f / name).is_file()))]
+        inside, mark = sorted(folder.iterdir()), f"[{section}]".encode()
+        found = [f.name for f in inside if f.suffix == ".toml" and f.is_file() and mark in f.read_bytes()]
+        found += [f.name for f in inside if f.is_dir() and (f / name).is_file()]
     except (OSError, ValueError):  # nothing can be proposed where nothing can be read
         found = []
     beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
-    return CampaignError(str(path), problem + beside, expected=f"{name}, or the folder that holds it")
-
-
-_LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them
+    raise CampaignError(str(path), problem + beside, expected=f"{name}, or the folder that holds it")
 
 
 def is_yaml(file: Path) -> bool:

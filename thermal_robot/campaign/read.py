@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
-from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.campaign import Campaign, read_alike
 from thermal_robot.campaign.checked import (
     LARGEST_COMMAND,
@@ -27,7 +26,17 @@ from thermal_robot.campaign.document import FILE_NAME, read_declaration
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, named, recognise
-from thermal_robot.campaign.settings import MOVES, SAME_CONFIGURATION, STANDARD_TEMPERATURE, Settings, as_vector, given
+from thermal_robot.campaign.settings import (
+    FIELDS,
+    KINDS,
+    MOVES,
+    SAME_CONFIGURATION,
+    SMALLEST,
+    STANDARD_TEMPERATURE,
+    Settings,
+    as_vector,
+    given,
+)
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.campaign.targets import FEWEST, Posed, posed, propagated_sigma, telling
 from thermal_robot.campaign.turning import arrivals
@@ -35,7 +44,7 @@ from thermal_robot.campaign.units import SI, Units, scale_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import boolean, text, word
+from thermal_robot.schema import boolean, text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -204,7 +213,7 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
     sigmas = cells * settings.units.length_scale
     if settings.noise_position is not None:
         sigmas = np.where(np.isnan(sigmas), settings.noise_position, sigmas)
-    index = first_true(~(sigmas >= kinds.SMALLEST))
+    index = first_true(~(sigmas >= SMALLEST))
     if index is not None:
         empty = bool(np.isnan(sigmas[index]))
         found = "an empty cell" if empty else f"{cells[index]:.15g}"
@@ -438,7 +447,6 @@ def read_samples(
 
 
 FILE = "<table>"  # What messages call the data frame
-_NOISE = "a finite number above 0, or None"
 
 
 def campaign_from_table(
@@ -516,27 +524,24 @@ def campaign_from_table(
     require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
-    frame = word(("known", "unknown"), kinds.WORD)
-    # by section and key of campaign.toml: name, value, kind, and what is expected where the kind says less
-    arguments: dict[str, tuple[Any, ...]] = {
-        "robot.moves": ("moves", moves, kinds.HOW_MOVED),
-        "robot.reference_temperature": ("reference_temperature", reference_temperature, kinds.TEMPERATURE),
-        "measurements.angle_unit": ("angle_unit", angle_unit, kinds.ANGLE_UNIT),
-        "measurements.length_unit": ("length_unit", length_unit, kinds.LENGTH_UNIT),
-        "frames.base": ("base", base, frame),
-        "frames.tool": ("tool", tool, frame),
-        "frames.target": ("target", target, kinds.VECTOR, "three numbers"),
-        "noise.position": ("noise_position", noise_position, kinds.sigma, _NOISE),
-        "noise.orientation": ("noise_orientation", noise_orientation, kinds.sigma, _NOISE),
-        "payload.com": ("payload_com", payload_com, kinds.VECTOR, "three numbers"),
+    said: dict[tuple[str, str], Any] = {
+        ("robot", "moves"): moves,
+        ("robot", "reference_temperature"): reference_temperature,
+        ("measurements", "angle_unit"): angle_unit,
+        ("measurements", "length_unit"): length_unit,
+        ("frames", "base"): base,
+        ("frames", "tool"): tool,
+        ("frames", "target"): target,
+        ("noise", "position"): noise_position,
+        ("noise", "orientation"): noise_orientation,
+        ("payload", "com"): payload_com,
     }
     stated: dict[str, dict[str, Any]] = {}
-    for place, argument in arguments.items():
-        section, key = place.split(".")
-        stated.setdefault(section, {})[key] = given(FILE, *argument)
-    stated["priors"] = given(FILE, "priors", {} if priors is None else priors, kinds.PRIORS)
-    stated["about"] = given(FILE, "about", {} if about is None else about, kinds.ABOUT)
-    stated["gears"] = given(FILE, "gears", {} if gears is None else gears, kinds.GEARS)
+    for (section, key), value in said.items():
+        argument = f"{section}_{key}" if section in ("noise", "payload") else key
+        stated.setdefault(section, {})[key] = given(FILE, argument, value, KINDS[section][key])  # type: ignore[index]
+    for section, own in (("priors", priors), ("about", about), ("gears", gears)):
+        stated[section] = given(FILE, section, {} if own is None else own, FIELDS[section].kind)
     ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
     settings = Settings.stated(stated, urdf="", **ends)
     check_joints(FILE, "gears", settings.gears, robot.joint_names)

@@ -1,12 +1,13 @@
-"""Settings of a campaign for all its rows: units, frames, noise, payload."""
+"""Settings of a campaign for all its rows (units, frames, noise, payload), and the one table of what each may be."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from datetime import date
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
+from thermal_robot.campaign.names import KINDS as MEASURED
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import STRONGEST_GRAVITY
@@ -19,6 +20,7 @@ from thermal_robot.schema import (
     mapping,
     number,
     optional,
+    plain,
     record,
     shown,
     text,
@@ -36,17 +38,18 @@ STILL = 1e-4
 fifty, and nothing that follows a joint's position shows over less."""
 SAME_CONFIGURATION = 9  # decimals, rad or m, to which commands are compared: finer than controllers, coarser than units
 ABSOLUTE_ZERO = -273.15  # °C
+SMALLEST = 1e-30  # In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12
 
-WORD = "unknown word"
+_WORD = "unknown word"
 ANGLE_UNIT, LENGTH_UNIT = word(ANGLE_UNITS, "unknown unit"), word(LENGTH_UNITS, "unknown unit")
-HOW_MOVED = word(MOVES, WORD)
 TEMPERATURE = number(least=ABSOLUTE_ZERO, expected="a number of °C", problem="no temperature is lower than −273.15 °C")
 VECTOR = listed(number(), 3, "three numbers")
 _G = STRONGEST_GRAVITY
 GRAVITY = listed(number(least=-_G, most=_G, expected=f"a number of m/s² from {-_G:g} to {_G:g}"), 3, "three numbers")
-SMALLEST = 1e-30  # In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12
-_STATED = "a number above 0, or 0 for not given"
+_STATED = "a finite number above 0, or 0 for not given"
 _SIGMA = number(least=0.0, expected=_STATED, problem="a standard deviation cannot be negative")
+_SIZE: dict[str, Any] = {"least": SMALLEST, "expected": "a number above 0"}
+_TEXT = text("text in quotes, a number or a date")
 
 
 def sigma(value: Any, path: str) -> float | None:
@@ -57,10 +60,19 @@ def sigma(value: Any, path: str) -> float | None:
     return found or None
 
 
-_SIZE: dict[str, Any] = {"least": SMALLEST, "expected": "a number above 0"}
-PRIORS = mapping(number(**_SIZE, problem="the expected size of an effect must be positive"))
-GEARS = mapping(number(**_SIZE, problem="a transmission ratio must be positive"))
-_TEXT = text("text in quotes, a number or a date")
+def _named(meaning: str) -> Kind:
+    return text(f"{meaning}, as text in quotes")
+
+
+def _vector(value: Any, path: str) -> Any:
+    try:
+        return VECTOR(value, path)
+    except MisfitError:
+        raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
+
+
+def _known(value: Any, path: str) -> bool:
+    return bool(word(("unknown", "known"), _WORD)(value, path) == "known")
 
 
 def _said(value: Any, path: str) -> str:
@@ -69,35 +81,83 @@ def _said(value: Any, path: str) -> str:
     return str(_TEXT(str(value) if plain else value, path))
 
 
+def _pairs(value: Any, path: str) -> Any:
+    """Take pairs of sockets with their distance."""
+    expected = 'pairs of sockets with their distance, as [["0", "1", 50.0]]'
+    if not isinstance(value, list) or not all(isinstance(own, list) and len(own) == 3 for own in value):
+        raise MisfitError(path, value, expected)
+    for one, other, length in value:
+        if str(one) == str(other) or not isinstance(length, (int, float)) or not length > 0.0:
+            raise MisfitError(path, [one, other, length], expected)
+    return value
+
+
 ABOUT = mapping(_said)
-_PIXELS = number(above=0.0, expected="a number of pixels above 0")
-CAMERAS = mapping(
-    record(
-        {
-            **dict.fromkeys(("fx", "fy", "cx", "cy"), _PIXELS),
-            "mount": word(("hand", "room"), WORD),
-            "refine": boolean,
-        },
-        may_lack=("refine",),
-    )
-)
-"""What the values of a campaign may be, whoever states them: campaign.toml, a call, a model file."""
 
 
-def given(call: str, name: str, value: Any, kind: Kind, expected: str = "") -> Any:
+class Field(NamedTuple):
+    """Where campaign.toml states a setting, and what it may be."""
+
+    section: str
+    key: str  # empty where the section is the setting, whose keys are the user's own
+    kind: Kind
+    length: bool = False  # whether it is in the file's length unit
+
+
+FIELDS = {
+    "urdf": Field("robot", "urdf", _named("the path of the robot's URDF file")),
+    "tool_frame": Field("robot", "tool_frame", _named("the URDF link that carries the target")),
+    "root_frame": Field("robot", "root_frame", _named("the URDF link where the chain starts")),
+    "gravity": Field("robot", "gravity", _vector),
+    "moves": Field("robot", "moves", word(MOVES, _WORD)),
+    "reference_temperature": Field("robot", "reference_temperature", TEMPERATURE),
+    "kind": Field("measurements", "kind", word(tuple(MEASURED), _WORD)),
+    "base_known": Field("frames", "base", _known),
+    "tool_known": Field("frames", "tool", _known),
+    "target": Field("frames", "target", _vector, length=True),
+    "noise_position": Field("noise", "position", sigma, length=True),
+    "noise_orientation": Field("noise", "orientation", sigma),
+    "payload_com": Field("payload", "com", _vector, length=True),
+    "priors": Field("priors", "", mapping(number(**_SIZE, problem="the expected size of an effect must be positive"))),
+    "gears": Field("gears", "", mapping(number(**_SIZE, problem="a transmission ratio must be positive"))),
+    "about": Field("about", "", ABOUT),
+}
+"""Settings by their names: read from campaign.toml, written to it, stored in a model, and given to calls, by these."""
+_CAMERA = dict.fromkeys(("fx", "fy", "cx", "cy"), number(above=0.0, expected="a number of pixels above 0"))
+_CAMERA |= {"mount": word(("hand", "room"), _WORD), "refine": boolean}
+_OF_A_FILE: dict[str, dict[str, Kind]] = {
+    "robot": {"kinematics": _named("the path of a kinematics.yaml of Universal Robots")},
+    "measurements": {
+        "file": _named("the path of the table"),
+        "angle_unit": ANGLE_UNIT,
+        "length_unit": LENGTH_UNIT,
+    },
+    "socket": {"distances": _pairs},
+}
+KINDS: dict[str, Mapping[str, Kind] | Kind] = {
+    **{
+        section: {**_OF_A_FILE.get(section, {}), **{own.key: own.kind for own in FIELDS.values() if own[0] == section}}
+        for section in ("robot", "measurements", "frames", "noise", "payload", "socket")
+    },
+    **{section: FIELDS[section].kind for section in ("priors", "gears", "about")},
+    "camera": mapping(record(_CAMERA, may_lack=("refine",))),
+}
+"""What each key of each section of campaign.toml may be; of a section whose keys are the user's own, the whole."""
+
+
+def given(call: str, name: str, value: Any, kind: Kind) -> Any:
     """Argument of a call, validated against its schema; errors name the argument.
 
     Raises
     ------
     CampaignError
-        Naming the call and the argument, what was found and what is ``expected``, by default as the kind says it.
+        Naming the call and the argument, what was found and what is expected.
     """
     try:
         return kind(value, name)
     except MisfitError as error:
-        what, place = (value, name) if expected else (error.value, error.path)
-        problem, expected = error.problem or "wrong kind of value", expected or error.expected
-        raise CampaignError(call, problem, column=place, found=shown(what), expected=expected) from None
+        problem, found = error.problem or "wrong kind of value", shown(error.value)
+        raise CampaignError(call, problem, column=error.path, found=found, expected=error.expected) from None
 
 
 @dataclass(frozen=True)
@@ -163,25 +223,14 @@ class Settings:
 
         ``sections`` state both units at least; ``ends`` are the robot's reference, the ends of the chain and gravity.
         """
-        robot, frames, noise, payload = (sections.get(key, {}) for key in ("robot", "frames", "noise", "payload"))
-        units = Units(sections["measurements"]["angle_unit"], sections["measurements"]["length_unit"])
-        scale, zero = units.length_scale, (0.0, 0.0, 0.0)
-        return cls(
-            **ends,
-            **{key: robot[key] for key in ("moves", "reference_temperature") if key in robot},
-            units=units,
-            base_known=frames.get("base") == "known",
-            tool_known=frames.get("tool") == "known",
-            target=as_vector(scale * value for value in frames.get("target", zero)),
-            noise_position=(noise.get("position") or 0.0) * scale or None,
-            noise_orientation=noise.get("orientation"),
-            payload_com=as_vector(scale * value for value in payload.get("com", zero)),
-            priors=sections.get("priors", {}),
-            gears=sections.get("gears", {}),
-            kind=sections["measurements"].get("kind", ""),
-            facts=facts_of(sections, scale),
-            about=sections.get("about", {}),
-        )
+        measurements = sections["measurements"]
+        units = Units(measurements["angle_unit"], measurements["length_unit"])
+        for name, (section, key, _, length) in FIELDS.items():
+            held = sections.get(section, {})
+            value = held.get(key) if key else held
+            if name not in ends and value is not None:
+                ends[name] = scaled(value, units.length_scale) if length else value
+        return cls(**ends, units=units, facts=facts_of(sections, units.length_scale))
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
@@ -197,26 +246,17 @@ class Settings:
 
 
 _KEYS: dict[str, Kind] = {
-    "urdf": text(empty=True),
+    **{name: own.kind for name, own in FIELDS.items()},
+    **dict.fromkeys(("urdf", "kind"), text(empty=True)),
+    **dict.fromkeys(("base_known", "tool_known"), boolean),
     "tool_frame": text("the name of a link"),
     "root_frame": optional(text("the name of a link")),
     "gravity": optional(GRAVITY),
-    "moves": HOW_MOVED,
-    "reference_temperature": TEMPERATURE,
     "units": record({"angle": ANGLE_UNIT, "length": LENGTH_UNIT}),
-    "base_known": boolean,
-    "tool_known": boolean,
-    "target": VECTOR,
-    "noise_position": sigma,
-    "noise_orientation": sigma,
-    "payload_com": VECTOR,
-    "priors": PRIORS,
-    "gears": GEARS,
     "turned": listed(text("the name of a quantity")),
-    "kind": text(empty=True),
-    "facts": lambda value, path: dict(value),
-    "about": ABOUT,
+    "facts": mapping(plain),
 }
+"""What each setting may be in a model file, in SI."""
 
 
 def settings_kind(value: Any, path: str) -> Settings:
@@ -227,8 +267,8 @@ def settings_kind(value: Any, path: str) -> Settings:
     return Settings(**{**values, "units": Units(**values["units"])})
 
 
-def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[str, Any]:
-    """Return what the tables of kinds of measurement state, lengths in m."""
+def facts_of(sections: Mapping[str, Any], scale: float) -> dict[str, Any]:
+    """Return what the tables of kinds of measurement state, lengths times ``scale``."""
     found = {key: sections[key] for key in ("socket", "camera") if sections.get(key)}
     if "socket" in found:
         pairs = found["socket"].get("distances", ())
@@ -236,13 +276,9 @@ def facts_of(sections: Mapping[str, Mapping[str, Any]], scale: float) -> dict[st
     return found
 
 
-def facts_in(facts: Mapping[str, Any], scale: float) -> dict[str, Any]:
-    """Return the tables of campaign.toml that state facts, lengths in a unit of ``scale`` m."""
-    found = dict(facts)
-    if "socket" in found:
-        pairs = found["socket"]["distances"]
-        found["socket"] = {"distances": [[one, other, length / scale] for one, other, length in pairs]}
-    return found
+def scaled(value: Any, scale: float) -> Any:
+    """Length, or three of them, times a factor."""
+    return as_vector(scale * each for each in value) if isinstance(value, tuple) else scale * value
 
 
 def as_vector(values: Any) -> Vector:

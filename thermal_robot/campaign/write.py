@@ -16,7 +16,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
-from thermal_robot.campaign.settings import facts_in
+from thermal_robot.campaign.settings import FIELDS, facts_of, scaled
 from thermal_robot.campaign.table import PARQUET, TABLES, WORKBOOKS, without_library
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
@@ -228,33 +228,21 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
 def _document(campaign: Campaign) -> dict[str, Any]:
     """Content of campaign.toml as a dict, lengths in the campaign's unit."""
     settings, several = campaign.settings, campaign.targets
-    scale = settings.units.length_scale
-    noise: dict[str, float] = {}
-    if settings.noise_position is not None and campaign.noise_of_rows is None:
-        noise["position"] = of_a_point(settings.noise_position, several) / scale
-    if settings.noise_orientation is not None and several is None:
-        noise["orientation"] = settings.noise_orientation
-    units = {"angle_unit": settings.units.angle, "length_unit": settings.units.length}
-    document: dict[str, Any] = {
-        "robot": {
-            "urdf": ROBOT_NAME,
-            "tool_frame": settings.tool_frame,
-            "root_frame": settings.root_frame,
-            "gravity": list(settings.gravity or ()),
-            "moves": settings.moves,
-            "reference_temperature": settings.reference_temperature,
-        },
-        "measurements": {"file": TABLE_NAME, **units},
-        "frames": {
-            "base": "known" if settings.base_known else "unknown",
-            "tool": "known" if settings.tool_known else "unknown",
-            "target": [value / scale for value in settings.target],
-        },
-        "noise": noise,
-        "payload": {"com": [value / scale for value in settings.payload_com]},
-        "priors": dict(settings.priors),
-        "gears": dict(settings.gears),
-        "about": dict(settings.about),
-        **facts_in(settings.facts, scale),
+    scale, sigma = settings.units.length_scale, settings.noise_position
+    known = {
+        "urdf": ROBOT_NAME,
+        "base_known": "known" if settings.base_known else "unknown",
+        "tool_known": "known" if settings.tool_known else "unknown",
+        "noise_position": None if sigma is None or campaign.noise_of_rows is not None else of_a_point(sigma, several),
+        "noise_orientation": None if several else settings.noise_orientation,
     }
+    units = {"angle_unit": settings.units.angle, "length_unit": settings.units.length}
+    document: dict[str, Any] = {"robot": {}, "measurements": {"file": TABLE_NAME, **units}}
+    for name, (section, key, _, length) in FIELDS.items():
+        value = known[name] if name in known else getattr(settings, name)
+        if value is None or value == "":
+            continue
+        value = scaled(value, 1.0 / scale) if length else value
+        document.setdefault(section, {}).update({key: value} if key else value)
+    document |= facts_of(settings.facts, 1.0 / scale)
     return {section: content for section, content in document.items() if content}

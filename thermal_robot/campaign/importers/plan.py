@@ -19,12 +19,12 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.checked import first_true, no_orientation, no_rotation
-from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
 from thermal_robot.campaign.recognise import bare, defined, headings, size
 from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector, given
+from thermal_robot.campaign.settings import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.table import SPACE, Cells, Layout, Table
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, unit_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
