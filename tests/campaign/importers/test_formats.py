@@ -358,7 +358,7 @@ REFUSED = [
      "it is not clear which sensor measured; found 'arm', 'camera', expected [recording] sensor"),
     (CALIBRATION, {"p.yaml": POSES}, "", "p.yaml: holds poses and no measurements"),
     (CALIBRATION, {"s.yaml": STATE.format(k=0, turn=0, slide=0, features=5)}, "",
-     "s.yaml, [0]: is no sample; … expected a list of features"),
+     "s.yaml, [0]: is no sample; … a list of features"),
     (CALIBRATION, {"s.yaml": "joint_states: 1\nobservations: 5\n"}, "", "there are no observations"),
     (CALIBRATION, {"s.yaml": "- 3\n"}, "", "s.yaml, [0]: is no sample; found 3"),
     (CALIBRATION, {"s.yaml": samples(3).replace("point:", "place:")}, "", "s.yaml, [0]: is no sample"),

@@ -21,7 +21,8 @@ mapping says which.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,8 @@ from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
+_POSE = "joints and as many positions, numbers"
+_SAMPLE = "joint_states, and observations with a sensor_name and a list of features, points of x, y and z"
 
 
 def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
@@ -43,7 +46,7 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     if any(isinstance(item, dict) and "observations" in item for item in listed_once):
         documents = listed_once  # samples in one list rather than in documents of their own
     elif listed_once or documents == [[]]:
-        commands = _table(str(file), [_positions(str(file), k, pose) for k, pose in enumerate(listed_once)])
+        commands = _table(str(file), listed_once, _positions, _POSE)
         tables = [each for each in files if each != file]
         if not tables:
             expected = "the table of measured points as a second file"
@@ -53,47 +56,37 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     files_of(files, "SAMPLES.yaml, or POSES.yaml MEASURED.csv", 1, 1)
     sensor = plan.get("recording", "sensor") or _only_sensor(str(file), documents)
     feature = plan.get("recording", "feature", 1)
-    rows = [_sample(str(file), k, sample, sensor, feature) for k, sample in enumerate(documents)]
-    return Source(
-        _table(str(file), rows), planned(_UNITS), (f"feature {feature} of sensor {sensor!r} taken as the target",)
-    )
+    table = _table(str(file), documents, partial(_sample, sensor=sensor, feature=feature), _SAMPLE)
+    return Source(table, planned(_UNITS), (f"feature {feature} of sensor {sensor!r} taken as the target",))
 
 
-def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
-    """Table of rows of numbers by name; rows are counted from 1."""
+def _table(file: str, items: Sequence[Any], row: Callable[[Any], dict[str, float]], expected: str) -> Table:
+    """Table of the numbers by name in each item, rows counted from 1; an item without them is refused."""
     import pandas as pd
 
+    rows = []
+    for k, item in enumerate(items):
+        try:
+            rows.append(row(item))
+        except (TypeError, KeyError, ValueError, AttributeError) as error:
+            found = repr(item)[:80]
+            raise CampaignError(file, "is no sample", key=f"[{k}]", found=found, expected=expected) from error
     return table_from_frame(pd.DataFrame(rows, index=range(1, len(rows) + 1)), file)
 
 
-def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joints", "positions")) -> dict[str, float]:
+def _positions(pose: Any, names: str = "joints", positions: str = "positions") -> dict[str, float]:
     """Joint positions by name, of a capture pose or of a sample's joint states."""
-    if not isinstance(pose, dict):
-        raise _odd(file, index, pose, "joints and positions")
-    given: list[Any] = [pose.get(key) for key in keys]
-    names, positions = given
-    fits = isinstance(names, list) and isinstance(positions, list) and len(names) == len(positions) > 0
-    if not fits or not all(isinstance(p, (int, float)) for p in positions):
-        raise _odd(file, index, {"joints": names, "positions": positions}, "as many positions as joints, numbers")
-    return {str(name): float(position) for name, position in zip(names, positions, strict=True)}
+    return dict(zip(map(str, pose[names]), map(float, pose[positions]), strict=True))
 
 
-def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> dict[str, float]:
+def _sample(sample: Any, sensor: str, feature: int) -> dict[str, float]:
     """Joint positions and measured point of one sample; without the point where it was not seen."""
-    state = sample.get("joint_states") if isinstance(sample, dict) else None
-    if not isinstance(state, dict):
-        raise _odd(file, index, sample, "joint_states and observations")
-    row = _positions(file, index, state, ("name", "position"))
-    seen = {each["sensor_name"]: each.get("features") or [] for each in _observations(sample)}
-    features = seen.get(sensor, [])
-    if not isinstance(features, list):
-        raise _odd(file, index, features, "a list of features")
+    row = _positions(sample["joint_states"], "name", "position")
+    seen = {each["sensor_name"]: each.get("features") for each in _observations(sample)}
+    features = list(seen.get(sensor) or [])
     if len(features) < feature:
         return row
-    point = features[feature - 1].get("point") if isinstance(features[feature - 1], dict) else None
-    if not isinstance(point, dict) or not all(isinstance(point.get(axis), (int, float)) for axis in "xyz"):
-        raise _odd(file, index, features[feature - 1], "a feature with a point of x, y and z")
-    return {**row, **{axis: float(point[axis]) for axis in "xyz"}}
+    return {**row, **{axis: float(features[feature - 1]["point"][axis]) for axis in "xyz"}}
 
 
 def _observations(sample: Any) -> list[Any]:
@@ -112,10 +105,6 @@ def _only_sensor(file: str, documents: Sequence[Any]) -> str:
     return str(sensors[0])
 
 
-def _odd(file: str, index: int, found: Any, expected: str) -> CampaignError:
-    return CampaignError(file, "is no sample", key=f"[{index}]", found=repr(found)[:80], expected=expected)
-
-
 ROBOT_CALIBRATION = Format(
     "samples of ROS robot_calibration as YAML; or its capture poses, and a table of measured points",
     "SAMPLES.yaml, or POSES.yaml MEASURED.csv",
@@ -128,17 +117,13 @@ _UNIVERSE = "universe"  # What Pinocchio calls the frame before the first joint:
 
 def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
     """Read the data; the first marker is the target."""
-    tables = [file for file in files if not is_yaml(file)]
-    configurations = [file for file in files if is_yaml(file)]
+    tables, configurations = ([file for file in files if is_yaml(file) == wanted] for wanted in (False, True))
     files_of(tables, "DATA.csv [CONFIG.yaml]", 1, 1)
     table = read_table(tables[0], plan.layout())
-    sections = _configured(configurations[0]) if configurations else {}
-    sections["measurements"] = {"angle_unit": "rad", "length_unit": "m"}
-    sections["columns"] = {axis: f"{axis}1" for axis in "xyz"}
-    markers = {int(name[1:]) for name in table.columns if re.fullmatch(r"x\d{1,4}", name)}
-    notes = []
-    if len(markers) > 1:
-        notes.append(f"marker 1 of {len(markers)} taken; [columns] in the mapping takes another")
+    sections = {**_UNITS, "columns": {axis: f"{axis}1" for axis in "xyz"}}
+    sections |= _configured(configurations[0]) if configurations else {}
+    markers = sum(re.fullmatch(r"x\d{1,4}", name) is not None for name in table.columns)
+    notes = [f"marker 1 of {markers} taken; [columns] in the mapping takes another"] if markers > 1 else []
     if "phix1" in table.columns and not plan.sections.get("orientation"):
         notes.append("phix1 phiy1 phiz1 left out: angles or a rotation vector? [orientation] in the mapping says")
     return Source(table, planned(sections, str(files[-1])), tuple(notes))
@@ -146,22 +131,16 @@ def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
 
 def _configured(file: Path) -> dict[str, dict[str, Any]]:
     """Chain and marker in the YAML, in either layout."""
-    documents = read_yaml(file)
-    whole = documents[0] if documents and isinstance(documents[0], dict) else {}
+    whole = next(iter(read_yaml(file)), None)
     task = _within(whole, "tasks", "calibration") or _within(whole, "calibration")
     if not task:
         expected = "tasks.calibration, or calibration"
         raise CampaignError(str(file), "is no configuration of FIGAROH", key="calibration", expected=expected)
     chain = _within(task, "kinematics") or task
     pose = _within(task, "measurements", "poses").get("tool_pose", task.get("tip_pose"))
-    sections: dict[str, dict[str, Any]] = {"robot": {}, "frames": {}}
-    for key, name in (("tool_frame", "tool_frame"), ("root_frame", "base_frame")):
-        frame = chain.get(name)
-        if isinstance(frame, str) and frame != _UNIVERSE:
-            sections["robot"][key] = frame
-    if isinstance(pose, list) and len(pose) == 6 and all(isinstance(v, (int, float)) for v in pose):
-        sections["frames"]["target"] = pose[:3]
-    return sections
+    ends = {"tool_frame": chain.get("tool_frame"), "root_frame": chain.get("base_frame")}
+    robot = {key: frame for key, frame in ends.items() if isinstance(frame, str) and frame != _UNIVERSE}
+    return {"robot": robot, "frames": {"target": pose[:3]} if isinstance(pose, list) and len(pose) == 6 else {}}
 
 
 def _within(content: Any, *keys: str) -> dict[str, Any]:

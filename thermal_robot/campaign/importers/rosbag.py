@@ -19,12 +19,12 @@ the place of the target are fitted together to what was measured in motion.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +67,7 @@ class Stream:
     def nearest(self, times: Array) -> NDArray[np.int64]:
         """Nearest neighbours in time: (M,) indices of samples."""
         after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
-        earlier = times - self.time[after - 1] < self.time[after] - times
-        return np.where(earlier, after - 1, after)
+        return np.where(times - self.time[after - 1] < self.time[after] - times, after - 1, after)
 
 
 def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
@@ -81,8 +80,7 @@ def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Strea
     return Stream(file, time[kept][first], values[kept][first], tuple(names))
 
 
-@dataclass(frozen=True)
-class Pairs:
+class Pairs(NamedTuple):
     """Samples of robot and instrument, one pair for each standstill."""
 
     times: Array  # (M,) s, of the robot's clock
@@ -115,8 +113,8 @@ def paired(
     middles = (begins + np.minimum(settling, (ends - begins) / 2) + ends)[long] / 2
     own, seen = joints.nearest(middles), target.nearest(middles - lag)
     near = np.abs(target.time[seen] + lag - middles) <= tolerance
-    short, lonely = int((~long).sum()), int((~near).sum())
-    return Pairs(middles[near], joints.values[own[near]], target.values[seen[near]], short, lonely)
+    held = middles[near], joints.values[own[near]], target.values[seen[near]]
+    return Pairs(*held, int((~long).sum()), int((~near).sum()))
 
 
 FINEST = 0.005  # s between instants at which speeds are compared: joint states are published no faster as a rule
@@ -128,8 +126,7 @@ BLOCKS = 10  # parts of the recording for Tukey's jackknife: honest whatever err
 LEAST = 60  # samples in motion that a fit of ten figures and its scatter want
 
 
-@dataclass(frozen=True)
-class Lag:
+class Lag(NamedTuple):
     """Clock offset of two recordings."""
 
     value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
@@ -186,9 +183,7 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
 
 def _speeds(stream: Stream, times: Array) -> Array:
     """Central differences: speed (M,) m/s of the target at given times."""
-    places = stream.between(times)[:, :3]
-    speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
-    return speeds
+    return np.asarray(np.linalg.norm(np.gradient(stream.between(times)[:, :3], times, axis=0), axis=1))
 
 
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
@@ -223,10 +218,8 @@ _NANOSECOND = 1e-9
 _CLOCKS = {"field.header.stamp": _NANOSECOND, "%time": _NANOSECOND, "__time": 1.0, "time": 1.0, "timestamp": 1.0}
 """Columns that tell the time, the best first, and their units in s: a stamp is of the measurement, %time of its
 coming."""
-_PLACE = re.compile(r"(?:^|[./])(?:position|point|translation)[./](?P<axis>[xyz])$")
-_TURN = re.compile(r"(?:^|[./])(?:orientation|rotation)[./](?P<axis>[xyzw])$")
-_WITHOUT_HEADER = Layout(",", 0, False)
-_BEFORE_NAMES = 2  # Fields of a stamp, sec and nanosec, at the beginning of each line without a header
+_PART = re.compile(r"(?:^|[./])(?:position|point|translation|(?P<turn>orientation|rotation))[./](?P<axis>[xyzw])$")
+_STAMP = re.compile(rb"\d+,\d+,")  # sec and nanosec, with which lines without a header begin
 
 
 def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
@@ -234,32 +227,39 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
 
     A file that is no table, has no clock, or has some of the joints only is refused.
     """
-    if _begins_with_figures(file):
-        return _without_header(read_table(file, _WITHOUT_HEADER), joints)
-    table = read_table(file)
+    bare = False
+    if is_file(file):
+        with file.open("rb") as content:
+            bare = _STAMP.match(content.read(64)) is not None
+    table = _named(read_table(file, Layout(",", 0, False))) if bare else read_table(file)
     clock = next((name for name in _CLOCKS if name in table.columns), None)
     if clock is None:
         expected = f"one of {', '.join(_CLOCKS)}"
         raise CampaignError(str(file), "has no column of time", row=table.header, expected=expected)
-    time = table.numbers(clock, gaps=True) * _CLOCKS[clock]
-    own, target = (_series(table, time, columns) for columns in (_joints(table, joints), _target(table)))
-    return own, target
+    time, found = table.numbers(clock, gaps=True) * _CLOCKS[clock], list[Stream | None]()
+    for columns in (_joints(table, joints), _target(table)):
+        values = [table.numbers(name, gaps=True) for name in columns.values()]
+        found.append(stream(table.file, time, np.column_stack(values), tuple(columns)) if columns else None)
+    return found[0], found[1]
 
 
-def _begins_with_figures(file: Path) -> bool:
-    """Whether the first line begins with two integers, a time stamp, and hence is no header."""
-    if not is_file(file):
-        return False
-    with file.open("rb") as content:
-        return re.match(rb"\d+,\d+,", content.read(64)) is not None
-
-
-def _series(table: Table, time: Array, columns: Mapping[str, str]) -> Stream | None:
-    """Time series of columns by what they are; ``None`` without any."""
-    if not columns:
-        return None
-    values = np.column_stack([table.numbers(name, gaps=True) for name in columns.values()])
-    return stream(table.file, time, values, tuple(columns))
+def _named(table: Table) -> Table:
+    """Table with names of columns: sec, nanosec, frame, names and their positions, or x y z (qx qy qz qw)."""
+    stamps, fields = list(table.columns)[:2], list(table.columns)[2:]
+    time = table.numbers(stamps[0]) + table.numbers(stamps[1]) * _NANOSECOND
+    # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
+    text = (table.first_text(name) is None and any(table.columns[name]) for name in fields)
+    first = next((k for k, figures in enumerate(text) if figures), len(fields))
+    recorded = [table.text(name)[0] for name in fields[1:first]]  # the first text is the frame
+    rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
+    if not recorded and len(rest) in (len(names.POSITION), len(names.MEASURED)):
+        recorded = ["x", "y", "z", "qx", "qy", "qz", "qw"][: len(rest)]
+    if len(recorded) < 2 or first + len(recorded) > len(fields):
+        problem = "neither joint states nor poses are recognised in lines without a header"
+        expected = "sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)"
+        raise CampaignError(table.file, problem, found=f"{len(fields) + 2} fields", expected=expected)
+    columns = {name: table.columns[field] for name, field in zip(recorded, fields[first:], strict=False)}
+    return replace(table, columns={"time": time, **columns})
 
 
 def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
@@ -269,12 +269,11 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
         for name in table.columns
         if re.fullmatch(r"field\.name\d+", name)
     }
-    series = joint_columns(named, joints).items()
     columns = joint_columns(table.columns, joints)
-    columns |= {joint: named[name] for joint, name in series if named[name] in table.columns}
+    columns |= {j: named[name] for j, name in joint_columns(named, joints).items() if named[name] in table.columns}
     if columns and len(columns) < len(joints):
         lacking = next(joint for joint in joints if joint not in columns)
-        raise table.error("a joint of the chain is not recorded", lacking, expected="all of them")
+        raise table.error("a joint of the chain is not recorded", lacking, expected=f"all of {listed(joints)}")
     return {joint: columns[joint] for joint in joints if columns}
 
 
@@ -282,42 +281,13 @@ def _target(table: Table) -> dict[str, str]:
     """Columns of the target's position, and of its orientation where all four are there."""
     parts: dict[str, str] = {}
     for name in table.columns:
-        if found := _PLACE.search(name):
-            parts.setdefault(found["axis"], name)
-        elif found := _TURN.search(name):
-            parts.setdefault(f"q{found['axis']}", name)
+        if found := _PART.search(name):
+            parts.setdefault(f"{'q' if found['turn'] else ''}{found['axis']}", name)
     for group in (names.POSITION, names.ORIENTATION):
         if not any(name in parts for name in group):
             parts |= {name: name for name in group if name in table.columns}
-    if not all(name in parts for name in names.POSITION):
-        return {}
-    whole = names.MEASURED if all(name in parts for name in names.MEASURED) else names.POSITION
-    return {name: parts[name] for name in whole}
-
-
-def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
-    """Time series of a file with a fixed order of columns and no header."""
-    fields = list(table.columns)
-    time = table.numbers(fields[0]) + table.numbers(fields[1]) * _NANOSECOND
-    # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
-    text = (table.first_text(name) is None and any(table.columns[name]) for name in fields[_BEFORE_NAMES:])
-    first = next((k for k, figures in enumerate(text, start=_BEFORE_NAMES) if figures), len(fields))
-    recorded = [table.text(name)[0] for name in fields[_BEFORE_NAMES + 1 : first]]  # the first text is the frame
-    columns = joint_columns(recorded, joints)
-    if columns and len(columns) == len(joints):
-        wanted = {joint: fields[first + recorded.index(columns[joint])] for joint in joints}
-        return _series(table, time, wanted), None
-    if len(recorded) > 1:
-        problem, found = "a joint of the chain is not among the names", listed(recorded)
-        lacking, expected = next(j for j in joints if j not in columns), f"all of {listed(joints)}"
-        raise CampaignError(table.file, problem, column=lacking, found=found, expected=expected)
-    rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
-    if len(rest) in (len(names.POSITION), len(names.MEASURED)):
-        by_name = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), rest, strict=False))
-        return None, _series(table, time, {name: by_name[name] for name in names.MEASURED if name in by_name})
-    problem = "neither joint states nor poses are recognised in lines without a header"
-    expected = "sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)"
-    raise CampaignError(table.file, problem, found=f"{len(fields)} fields", expected=expected)
+    wanted = next((each for each in (names.MEASURED, names.POSITION) if {*each} <= {*parts}), ())
+    return {name: parts[name] for name in wanted}
 
 
 ENDINGS = (".bag", ".mcap", ".db3")
@@ -415,24 +385,22 @@ _LIMITS = ("tolerance", "standstill", "velocity", "settling")
 
 def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
     """Read both recordings, estimate their clock offset unless stated, and pair them at standstill."""
-    own = planned(_UNITS)
-    robot = plan.robot()
+    own, robot = planned(_UNITS), plan.robot()
     settings = plan.over(own).settings(robot)
     joints, target = _streams(files, plan, robot)
     scale = np.array([settings.units.joint_scale(kind) for kind in robot.joint_types])  # SI values of one unit
-    lengths = np.where(np.isin(target.names, names.POSITION), settings.units.length_scale, 1.0)
-    known = plan.get("recording", "offset")
+    moved, known = joints.scaled(scale), plan.get("recording", "offset")
+    how = "as stated"
     if known is None:
-        estimate = lag(joints.scaled(scale), target.scaled(lengths), robot, np.array(settings.target))
-        known = estimate.value
-        clocks = (
-            f"the robot's clock shows {estimate.value:.6f} ± {estimate.std:.6f} s more than the instrument's, "
-            f"estimated from the motion, of which {1e3 * estimate.left:.2g} mm rms are left"
-        )
+        lengths = np.where(np.isin(target.names, names.POSITION), settings.units.length_scale, 1.0)
+        known, std, left = lag(moved, target.scaled(lengths), robot, np.array(settings.target))
+        how = f"estimated from the motion, of which {1e3 * left:.2g} mm rms are left"
+        clocks = f"{known:.6f} ± {std:.6f}"
     else:
-        clocks = f"the robot's clock shows {known:g} s more than the instrument's, as stated"
+        clocks = f"{known:g}"
+    clocks = f"the robot's clock shows {clocks} s more than the instrument's, {how}"
     limits = {key: value for key in _LIMITS if (value := plan.get("recording", key)) is not None}
-    pairs = paired(joints.scaled(scale), target, known, **limits)
+    pairs = paired(moved, target, known, **limits)
     if not len(pairs.times):
         found = f"{pairs.short} standstills too short, {pairs.lonely} without a sample"
         expected = "standstills; [recording] standstill, velocity and tolerance in the mapping"
@@ -450,14 +418,11 @@ def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
 
 def _streams(files: Sequence[Path], plan: Plan, robot: Robot) -> tuple[Stream, Stream]:
     """Time series of joints and target, each from the one file that has it."""
-    found: list[list[Stream]] = [[], []]
+    topics, read = [plan.get("recording", key) for key in ("joints", "pose")], []
     for file in files:
-        if file.suffix.lower() in ENDINGS or is_folder(file):
-            both = read_bag(file, robot.joint_names, *(plan.get("recording", key) for key in ("joints", "pose")))
-        else:
-            both = read_streams(file, robot.joint_names)
-        for streams, stream in zip(found, both, strict=True):
-            streams += [] if stream is None else [stream]
+        bag = file.suffix.lower() in ENDINGS or is_folder(file)
+        read.append(read_bag(file, robot.joint_names, *topics) if bag else read_streams(file, robot.joint_names))
+    found = [[each for each in streams if each is not None] for streams in zip(*read, strict=True)]
     for streams, what in zip(found, ("joint states of the chain", "poses or points of the target"), strict=True):
         if len(streams) != 1:
             problem = f"{'more than one file has' if streams else 'no file has'} {what}"
