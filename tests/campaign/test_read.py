@@ -110,11 +110,11 @@ REFUSED = [
     (with_column("approach.lift", "1", "0", "0.5"), 4, "approach.lift", "0.5", "impossible … -1, 0 or 1"),
     (with_column("payload", "0", "-2", "3"), 3, "payload", "-2", "impossible value … not negative"),
     (with_column("temperature", "20", "20", "-300"), 4, "temperature", "-300", "impossible value … °C"),
-    (with_column("noise", "0.02", "0", "0.02"), 3, "noise", "0", "no standard deviation … one sigma above 0"),
-    (with_column("noise", "0.02", "0.02", "-1"), 4, "noise", "-1", "no standard deviation … one sigma above 0"),
+    (with_column("noise", "0.02", "0", "0.02"), 3, "noise", "'0'", "no standard deviation … one sigma above 0"),
+    (with_column("noise", "0.02", "0.02", "-1"), 4, "noise", "'-1'", "no standard deviation … one sigma above 0"),
     (with_column("noise", "0.02", "inf", "1"), 3, "noise", "'inf'", "not a finite number"),
     (with_column("noise", "0.02", "good", "1"), 3, "noise", "'good'", "text where a number should be"),
-    (PLAIN.replace("0.5,-0.4", "2e6,-0.4"), 4, "turn", "2000000", "no joint goes so far … at most 1e+06 rad or m"),
+    (PLAIN.replace("0.5,-0.4", "2e6,-0.4"), 4, "turn", "'2e6'", "no joint goes so far … at most 1e+06 rad or m"),
 ]
 
 

@@ -19,8 +19,6 @@ from thermal_robot.campaign.checked import (
     check_covariate,
     check_joints,
     check_quaternions,
-    first_beyond,
-    first_true,
 )
 from thermal_robot.campaign.document import FILE_NAME, read_declaration
 from thermal_robot.campaign.names import CLOCK, split_name
@@ -123,36 +121,30 @@ def readings(
     if columns.kinds == ("controller",):
         return {}, labels | {names.KIND: np.full(len(table.rows), "controller")}
     stated = table.text(names.KIND) if names.KIND in table.columns else [columns.kinds[0]] * len(table.rows)
-    kind, figures = np.array(stated, dtype=np.str_), dict[str, Array]()
+    kind, figures, missing = np.array(stated, dtype=np.str_), dict[str, Array](), "a value is missing"
     for own in columns.kinds:
         numeric, texts = names.KINDS[own]
         here, spare = kind == own, [name for name in names.OPTIONAL.get(own, ()) if name in table.columns]
         for column in (*numeric, *spare):
             values = table.numbers(column, gaps=True) * names.reading_scale(column, settings.units.length_scale)
-            read = here & ~np.isnan(values)
-            row = first_true(here & ~read)
-            if row is not None and column in numeric:
-                raise table.error("a value is missing", column, row, found="an empty cell", expected="a number")
-            figures[column] = np.where(read, values, figures.get(column, 0.0))
+            if column in numeric:
+                table.refuse(here & np.isnan(values), missing, column, "a number")
+            figures[column] = np.where(here & ~np.isnan(values), values, figures.get(column, 0.0))
         for column in texts:
-            cells = np.array(table.text(column), dtype=np.str_)
-            row = first_true(np.asarray(here & (cells == "")))
-            if row is not None:
-                raise table.error("a value is missing", column, row, found="an empty cell", expected="a label")
-            labels[column] = cells
+            labels[column] = np.array(table.text(column), dtype=np.str_)
+            table.refuse(np.asarray(here & (labels[column] == "")), missing, column, "a label")
     return figures, labels | {names.KIND: kind}
 
 
 def _commands(table: Table, robot: Robot, units: Units) -> Array:
     """Joint positions (N, n), rad or m."""
-    joints = zip(robot.joint_names, robot.joint_types, strict=True)
-    commands = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
-    index = first_beyond(commands, LARGEST_COMMAND)
-    if index is not None:
-        joint = robot.joint_names[int(np.argmax(np.abs(commands[index])))]
-        found, expected = f"{table.numbers(joint)[index]:.15g}", f"at most {LARGEST_COMMAND:g} rad or m"
-        raise table.error("no joint goes so far", joint, index, found=found, expected=expected)
-    return commands
+    columns = []
+    for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True):
+        figures = table.numbers(joint)
+        columns.append(figures * units.joint_scale(kind))
+        far, expected = np.abs(columns[-1]) > LARGEST_COMMAND, f"at most {LARGEST_COMMAND:g} rad or m"
+        table.refuse(far, "no joint goes so far", joint, expected)
+    return np.column_stack(columns)
 
 
 def _covariates(
@@ -213,13 +205,10 @@ def _noise_of_rows(table: Table, settings: Settings) -> Array:
     sigmas = cells * settings.units.length_scale
     if settings.noise_position is not None:
         sigmas = np.where(np.isnan(sigmas), settings.noise_position, sigmas)
-    index = first_true(~(sigmas >= SMALLEST))
-    if index is not None:
-        empty = bool(np.isnan(sigmas[index]))
-        found = "an empty cell" if empty else f"{cells[index]:.15g}"
-        expected = "one sigma above 0" + (", or [noise] position for the rows without one" if empty else "")
-        problem = "a value is missing" if empty else "no standard deviation"
-        raise table.error(problem, names.NOISE, index, found=found, expected=expected)
+    expected = "one sigma above 0"
+    table.refuse(sigmas < SMALLEST, "no standard deviation", names.NOISE, expected)
+    more = f"{expected}, or [noise] position for the rows without one"
+    table.refuse(np.isnan(sigmas), "a value is missing", names.NOISE, more)
     return sigmas
 
 
@@ -286,11 +275,9 @@ def _points(table: Table, number: int) -> Array:
     axes = names.axes_of(number)
     found = np.column_stack([table.numbers(column, gaps=True) for column in axes])
     gaps = np.isnan(found)
-    row = first_true(np.asarray(gaps.any(axis=1) & ~gaps.all(axis=1)))
-    if row is not None:
-        expected = f"a number, or {axes[0]}, {axes[1]} and {axes[2]} empty where the target was not seen"
-        column = axes[int(np.argmax(gaps[row]))]
-        raise table.error("a value is missing", column, row, found="an empty cell", expected=expected)
+    expected = f"a number, or {axes[0]}, {axes[1]} and {axes[2]} empty where the target was not seen"
+    for column, lacking in zip(axes, gaps.T, strict=True):
+        table.refuse(np.asarray(lacking & ~gaps.all(axis=1)), "a value is missing", column, expected)
     return found
 
 

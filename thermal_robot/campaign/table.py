@@ -8,7 +8,8 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 Cells: TypeAlias = "Sequence[str] | Array"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
+Shown: TypeAlias = "Callable[[int], str]"
 
 _FEW = 5  # rows that a sentence names
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
@@ -70,6 +72,27 @@ class Table:
         row = self.header if index is None else int(self.rows[index])
         return CampaignError(self.file, problem, row=row, column=column, **told)
 
+    def refuse(
+        self,
+        wrong: NDArray[np.bool_],
+        problem: str,
+        column: str,
+        expected: str,
+        found: Callable[[int], str] | None = None,
+    ) -> None:
+        """Refuse the first of (N,) rows that are wrong; what was found is its cell, unless ``found`` says more."""
+        index = first_true(wrong)
+        if index is not None:
+            told = found(index) if found else self._shown(column, index)
+            raise self.error(problem, column, index, found=told, expected=expected)
+
+    def _shown(self, column: str, index: int) -> str:
+        """Cell in a message: text in quotes, a number without."""
+        cell = self.columns[column][index]
+        if isinstance(cell, str):
+            return repr(cell) if cell else "an empty cell"
+        return "an empty cell" if np.isnan(cell) else f"{cell:.15g}"
+
     def listed_rows(self, chosen: NDArray[np.bool_]) -> str:
         """Count chosen rows (N,) and list a few of their numbers: ``3 rows (4, 7, 9)``."""
         return listed_rows(self.rows[chosen])
@@ -82,24 +105,23 @@ class Table:
         CampaignError
             Text, a number that is infinite or larger than any, or an empty cell where none may be.
         """
-        cells, held = self.columns[column], self._values(column)
+        held = self._values(column)
         index = _first_text(held)
         if index is not None:
-            mixed = self.decimal_comma and "." in str(cells[index])
+            mixed = self.decimal_comma and "." in str(self.columns[column][index])
             expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
-            problem = "text where a number should be"
-            raise self.error(problem, column, index, found=repr(cells[index]), expected=expected)
+            told = {"found": self._shown(column, index), "expected": expected}
+            raise self.error("text where a number should be", column, index, **told)
         values = np.array(held, dtype=np.float64)
-        wrong = first_true(~(np.abs(values) <= LARGEST) & ~(gaps & np.isnan(values)))
-        if wrong is None:
-            return without_rounding(values)
-        value, cell = values[wrong], cells[wrong]
-        unfilled = len(values) > 1 and bool(np.isnan(values).all())
-        empty = "the column is still to be filled in" if unfilled else "a value is missing"
-        finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
-        blank = cell == "" or (np.isnan(value) and not isinstance(cell, str))
-        found = "an empty cell" if blank else repr(cell if isinstance(cell, str) else float(cell))
-        raise self.error(empty if np.isnan(value) else finite, column, wrong, found=found, expected="a number")
+        empty = np.isnan(values)
+        wrong = ~(np.abs(values) <= LARGEST) & ~(gaps & empty)
+        if wrong.any():
+            unfilled = len(values) > 1 and bool(empty.all())
+            first = values[np.argmax(wrong)]
+            problem = "not a finite number" if np.isinf(first) else "larger than anything that is measured"
+            lacking = "the column is still to be filled in" if unfilled else "a value is missing"
+            self.refuse(wrong, lacking if np.isnan(first) else problem, column, "a number")
+        return without_rounding(values)
 
     def text(self, column: str) -> list[str]:
         """Column as N strings; numbers in shortest form, empty cells as ``""``."""
@@ -160,14 +182,14 @@ def _first_text(values: Any) -> int | None:
 
 def _number(cell: str, comma: bool) -> float | None:
     """Return the number in a cell, NaN for an empty one, ``None`` for text."""
-    if comma and "." in cell:  # 1.234,5: a thousands separator, which cannot be told from a decimal point
+    # 1.234,5 has a thousands separator, which cannot be told from a decimal point; Python alone writes 1_000
+    if "_" in cell or (comma and "." in cell):
         return None
     try:
         # a spreadsheet's or a document's minus sign is still a minus sign
-        value = float((cell.replace(",", ".") if comma else cell).replace("−", "-"))
+        return float((cell.replace(",", ".") if comma else cell).replace("−", "-"))
     except ValueError:
         return float("nan") if cell.lower() in _EMPTY else None
-    return None if "_" in cell else value  # Python reads 1_000 as a number; no instrument writes it
 
 
 def listed_rows(numbers: NDArray[np.int64]) -> str:
@@ -339,22 +361,29 @@ def _as_text(cell: object) -> str:
         return f"<{type(cell).__name__}>"
 
 
+@contextmanager
+def _reading(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever a library raises over a file into a sentence."""
+    try:
+        yield
+    except CampaignError:
+        raise
+    except ImportError as error:
+        raise without_library(str(path), path.suffix.lower()) from error
+    except Exception as error:  # each library raises its own
+        raise CampaignError(str(path), f"cannot be read as a {kind} ({' '.join(str(error).split())})") from error
+
+
 def _read_parquet(path: Path) -> Table:
     import pandas as pd
 
     file = str(path)
-    try:
+    with _reading(path, "Parquet file"):
         from pyarrow.parquet import read_metadata
 
         held = read_metadata(path)
         _require_size(file, held.num_rows, held.num_columns)
         frame = pd.read_parquet(path)
-    except ImportError as error:
-        raise without_library(file, PARQUET[0]) from error
-    except CampaignError:
-        raise
-    except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
-        raise CampaignError(file, f"cannot be read as a Parquet file ({' '.join(str(error).split())})") from error
     # An index with a name is a column that pandas set aside.
     if twice := [name for name in frame.index.names if name in frame.columns]:
         raise CampaignError(file, "duplicate column", column=str(twice[0]), found="it as the index, too")
@@ -365,23 +394,18 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
     """First sheet of a workbook, with the spreadsheet's row numbers."""
     import pandas as pd
 
-    file = str(path)
-    try:
+    with _reading(path, "workbook"):
         sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
-    except ImportError as error:
-        raise without_library(file, path.suffix.lower()) from error
-    except Exception as error:  # each reader raises its own
-        raise CampaignError(file, f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
     first, frame = next(iter(sheets.items()))
-    _require_size(file, *frame.shape)
+    _require_size(str(path), *frame.shape)
     rows = frame.astype(object).where(frame.notna(), "").to_numpy()
     lines = ([_as_text(cell) for cell in row] for row in rows)
     kept = (
         [] if k < layout.skip or (layout.comment and line[0].startswith(layout.comment)) else line
         for k, line in enumerate(lines)
     )
-    more = f"{file} has {len(sheets)} sheets: the first, {first!r}, was read"
-    return replace(_table(file, kept, layout.header), warnings=(more,) if len(sheets) > 1 else ())
+    more = f"{path} has {len(sheets)} sheets: the first, {first!r}, was read"
+    return replace(_table(str(path), kept, layout.header), warnings=(more,) if len(sheets) > 1 else ())
 
 
 def _read_matlab(path: Path) -> Table:
@@ -390,25 +414,16 @@ def _read_matlab(path: Path) -> Table:
     from scipy.io import loadmat
 
     file = str(path)
-    try:
-        held = loadmat(path)
-    except NotImplementedError as error:
-        again = "the matrix saved with -v7, or as CSV"
-        raise CampaignError(file, "is a MATLAB file of version 7.3", expected=again) from error
-    except Exception as error:  # the reader raises whatever it stumbles over
-        raise CampaignError(file, f"cannot be read as a MATLAB file ({' '.join(str(error).split())})") from error
-    matrices = {
-        name: value
-        for name, value in held.items()
-        if isinstance(value, np.ndarray) and value.ndim == 2 and value.size > 1 and value.dtype.kind in "fiu"
-    }
+    with _reading(path, "MATLAB file of version 7 or older"):
+        held = {name: np.asarray(value) for name, value in loadmat(path).items()}
+    matrices = {k: v for k, v in held.items() if v.ndim == 2 and v.size > 1 and v.dtype.kind in "fiu"}
     if len(matrices) != 1:
         shapes = ", ".join(f"{name} ({' x '.join(map(str, value.shape))})" for name, value in matrices.items())
         raise CampaignError(file, "does not hold one matrix of numbers", found=shapes or "none", expected="one")
-    values = next(iter(matrices.values()))
+    (values,) = matrices.values()
     _require_size(file, *values.shape)
-    columns = [str(k) for k in range(1, values.shape[1] + 1)]
-    return replace(table_from_frame(pd.DataFrame(values, columns=columns), file, first_row=1), header=None)
+    frame = pd.DataFrame(values, columns=range(1, values.shape[1] + 1))
+    return replace(table_from_frame(frame, file, first_row=1), header=None)
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
