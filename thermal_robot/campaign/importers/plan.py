@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.checked import first_true, no_orientation, no_rotation
+from thermal_robot.campaign.checked import no_orientation, no_rotation
 from thermal_robot.campaign.document import Document, fitted_sections, robot_reference
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import build_campaign
@@ -57,11 +56,9 @@ class Column:
             raise CampaignError(table.file, problem, found=found, expected="a number")
         if self.count or self.value is not None:
             return np.arange(float(rows)) if self.count else np.full(rows, self.value)
-        values = np.zeros(rows)
-        for source in self.sources:
-            name = column_name(table, source)
-            values += self._instants(table, name) if self.time else table.numbers(name, gaps=True)
-        values = values * self.scale + self.offset
+        names = [column_name(table, source) for source in self.sources]
+        read = [self._instants(table, name) if self.time else table.numbers(name, gaps=True) for name in names]
+        values = np.sum(read, axis=0) * self.scale + self.offset
         return values - np.fmin.reduce(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
@@ -72,11 +69,9 @@ class Column:
     def complete(self, table: Table, name: str = "") -> Array:
         """Numbers (N,) without gaps; ``name`` is the campaign's column, for the message."""
         values = self.numbers(table)
-        index = first_true(np.isnan(values))
-        if index is not None:
-            problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
-            column = " + ".join(map(str, self.sources))
-            raise table.error(problem, column, index, found="an empty cell", expected="a number")
+        problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
+        column = " + ".join(map(str, self.sources))
+        table.refuse(np.isnan(values), problem, column, "a number", lambda _: "an empty cell")
         return values
 
     def text(self, table: Table) -> list[str]:
@@ -88,16 +83,17 @@ class Column:
 
     def _instants(self, table: Table, name: str) -> Array:
         """Time stamps (N,) in s since an epoch."""
-        seconds = np.full(len(table.rows), np.nan)
-        for k, cell in enumerate(table.text(name)):
-            try:
-                instant = datetime.strptime(cell, self.time) if cell else None
-            except ValueError:
-                told = {"found": repr(cell), "expected": repr(self.time)}
-                raise table.error("no instant of this pattern", name, k, **told) from None
-            if instant:
-                seconds[k] = (instant if instant.tzinfo else instant.replace(tzinfo=timezone.utc)).timestamp()
-        return seconds
+        import pandas as pd
+
+        cells = pd.Series(table.text(name), dtype=object)
+        try:
+            found = pd.to_datetime(cells, format=self.time, errors="coerce", utc=True)
+        except ValueError as error:  # a directive that there is not
+            problem = f"no pattern of an instant ({error})"
+            raise table.error(problem, name, found=repr(self.time), expected="such as %Y%m%d%H%M%S") from error
+        wrong = (found.isna() & (cells != "")).to_numpy()
+        table.refuse(wrong, "no instant of this pattern", name, repr(self.time))
+        return np.asarray((found - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1), dtype=float)
 
 
 def column_name(table: Table, source: str | int) -> str:
@@ -183,27 +179,25 @@ class Orientation:
         """
         from scipy.spatial.transform import Rotation
 
-        figures = np.column_stack([column.complete(table) for column in self.columns])
+        figures, wrong = np.column_stack([column.complete(table) for column in self.columns]), None
         if self.kind in (EULER, VECTOR):
             figures *= [ANGLE_UNITS.get(c.header_unit(table) or "", ANGLE_UNITS[self.unit]) for c in self.columns]
         if self.kind == QUATERNION:
-            self._refuse(table, no_orientation(figures), "a quaternion whose length is not 1", figures)
+            wrong, problem = no_orientation(figures), "a quaternion whose length is not 1"
+        elif self.kind == MATRIX:
+            matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
+            wrong, problem = no_rotation(matrices), "a matrix that is no rotation"
+        if wrong is not None:
+            column = str((self.columns[0].sources or ("orientation",))[0])
+            told = ", ".join(f"{figure:g}" for figure in figures[wrong])
+            raise table.error(problem, column, wrong, found=told, expected="an orientation")
+        if self.kind == QUATERNION:
             turned = Rotation.from_quat(figures, scalar_first=self.order == "wxyz")
         elif self.kind == EULER:
             turned = Rotation.from_euler(self.sequence, figures)
-        elif self.kind == VECTOR:
-            turned = Rotation.from_rotvec(figures)
         else:
-            matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
-            self._refuse(table, no_rotation(matrices), "a matrix that is no rotation", figures)
-            turned = Rotation.from_matrix(matrices)
+            turned = Rotation.from_rotvec(figures) if self.kind == VECTOR else Rotation.from_matrix(matrices)
         return np.asarray((turned.inv() if self.inverse else turned).as_quat(scalar_first=True))
-
-    def _refuse(self, table: Table, index: int | None, problem: str, figures: Array) -> None:
-        if index is not None:
-            column = str((self.columns[0].sources or ("orientation",))[0])
-            told = ", ".join(f"{figure:g}" for figure in figures[index])
-            raise table.error(problem, column, index, found=told, expected="an orientation")
 
     @property
     def position(self) -> tuple[Column, ...]:
@@ -391,21 +385,20 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
 
 def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     """Source of each campaign column: as mapped, else the table column of that name."""
-    stated = dict(plan.sections.get("columns", {}))
+    stated, orientation = dict(plan.sections.get("columns", {})), plan.get("orientation", "stated")
     joints = stated.pop(JOINTS, ())
     if joints and len(joints) != robot.n:
         found, expected = str(len(joints)), f"{robot.n}: {listed(robot.joint_names)}"
         problem, column = "another number of joints than the chain has", f"columns.{JOINTS}"
         raise CampaignError(plan.file or table.file, problem, column=column, found=found, expected=expected)
-    orientation = plan.get("orientation", "stated")
-    place = () if orientation is None else orientation.position
-    taken = () if orientation is None else names.ORIENTATION
     known = {*defined(robot), *names.of_kinds()}
     own = {name: name for name in table.columns if name in known or names.target_of(name) is not None}
     own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
-    found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
-    in_order = dict(zip(robot.joint_names, joints, strict=bool(joints)))
-    return {**found_out, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+    columns = {name: Column((column,)) for name, column in own.items()}
+    if orientation is not None:
+        columns = {name: column for name, column in columns.items() if name not in names.ORIENTATION}
+        columns |= dict(zip(names.POSITION, orientation.position, strict=False))
+    return {**columns, **dict(zip(robot.joint_names, joints, strict=bool(joints))), **stated}
 
 
 def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:

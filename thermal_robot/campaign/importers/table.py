@@ -24,14 +24,12 @@ their place. The T-Mac sits about 93 mm before the flange, which is where its pl
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, column_name, planned
 from thermal_robot.campaign.names import listed
@@ -75,11 +73,10 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
     it the rows of both are in the same order. Refused are tables of different lengths without names, a point that is
     commanded twice, and no name in common; messages speak of rows and columns of the measured table.
     """
-    taken, order = "", np.arange(len(commanded.rows))
-    notes: tuple[str, ...] = (f"rows of {measured.file} and {commanded.file} joined in their order",)
+    taken, notes = "", (f"rows of {measured.file} and {commanded.file} joined in their order",)
     if key:
         taken = _names_of(measured, commanded, key)
-        measured, order, notes = _by_name(measured, commanded, key, taken)
+        measured, commanded, notes = _by_name(measured, commanded, key, taken)
     elif len(measured.rows) != len(commanded.rows):
         headless = measured.headless or commanded.headless
         together = f"has not as many rows as {commanded.file}, and no names that tell which belong together"
@@ -87,17 +84,14 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         expected = "as many, in the same order, or a column of names in both"
         raise CampaignError(measured.file, f"{together}{headless}", found=found, expected=expected)
     # numbers at once, as one of the tables may have decimal commas
-    columns = {**measured.columns, **measured.numeric()}
-    commanded = commanded.take(order)
-    first = len(columns)
+    columns, first = {**measured.columns, **measured.numeric()}, len(measured.columns)
     for k, (name, cells) in enumerate({**commanded.columns, **commanded.numeric()}.items(), start=1):
         # columns without names are known by their numbers, which go on from those of the first table
         called = str(first + k) if commanded.unnamed else name
         if name != taken and called in columns:
             problem = f"has a column that {measured.file} has, too"
             raise commanded.error(problem, name, expected="every column in one of the two tables")
-        if name != taken:
-            columns[called] = cells
+        columns |= {called: cells} if name != taken else {}
     header = None if commanded.unnamed else measured.header
     return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
 
@@ -105,34 +99,31 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
 def _names_of(measured: Table, commanded: Table, key: str) -> str:
     """Column of the commands with most names of points; refused without any."""
     points = measured.text(key)
-    known = set(points) - {""}
-    common = {name: len(known & set(commanded.text(name))) for name in commanded.columns}
+    common = {name: len({*points} & {*commanded.text(name)} - {""}) for name in commanded.columns}
     best = max(common, key=lambda name: common[name])
     if not common[best]:
         such = listed((f"{name} {commanded.text(name)[0]}" for name in commanded.columns), _FEW)
-        problem, expected = f"no point has a name that stands in {commanded.file}", "names of one of its columns"
-        told, expected = listed(points, _FEW), f"{expected}, such as {such}"
-        raise CampaignError(measured.file, problem, column=key, found=told, expected=expected)
+        problem, expected = (
+            f"no point has a name that stands in {commanded.file}",
+            f"names of one column, such as {such}",
+        )
+        raise CampaignError(measured.file, problem, column=key, found=listed(points, _FEW), expected=expected)
     return best
 
 
-def _by_name(
-    measured: Table, commanded: Table, key: str, taken: str
-) -> tuple[Table, NDArray[np.int64], tuple[str, ...]]:
-    """Join by name: measured rows that are commanded, their rows among the commands, and what was left out."""
-    points, where = measured.text(key), dict[str, int]()
-    for row, name in enumerate(commanded.text(taken)):
-        if name in where:
-            again = f"{name!r}, as in row {commanded.rows[where[name]]}"
-            problem = "a point is commanded more than once"
-            raise commanded.error(problem, taken, row, found=again, expected="each name once")
-        where[name] = row
+def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Table, tuple[str, ...]]:
+    """Join by name: the rows of both that belong together, and what was left out."""
+    points, called = measured.text(key), commanded.text(taken)
+    where = {name: row for row, name in reversed([*enumerate(called)])}
+    again = np.array([where[name] != row for row, name in enumerate(called)])
+    problem, first = "a point is commanded more than once", lambda row: commanded.rows[where[called[row]]]
+    commanded.refuse(again, problem, taken, "each name once", lambda row: f"{called[row]!r}, as in row {first(row)}")
     unknown, unmeasured = [name for name in points if name not in where], sorted({*where} - {*points})
     notes = [f"{len(unknown)} points left out, not commanded: {listed(unknown, _FEW)}"] if unknown else []
     if unmeasured:
         notes.append(f"{len(unmeasured)} commands left out, not measured: {listed(unmeasured, _FEW)}")
     order = np.array([where.get(name, -1) for name in points])
-    return measured.take(order >= 0), order[order >= 0], tuple(notes)
+    return measured.take(order >= 0), commanded.take(order[order >= 0]), tuple(notes)
 
 
 def _read_table(files: Sequence[Path], plan: Plan) -> Source:
@@ -189,30 +180,28 @@ def _laid_out(file: Path) -> Layout:
 
 def _called(table: Table, plan: Plan) -> Table:
     """Name the columns collection, group, target, x, y, z as far as they are there."""
+    there = list(table.columns)
     if table.header is not None:
-        axes = {name: name.lower() for name in table.columns if name.lower() in _AXES}
-        first = min((k for k, name in enumerate(table.columns) if name in axes), default=0)
+        axes = {name: name.lower() for name in there if name.lower() in _AXES}
+        first = min((there.index(name) for name in axes), default=0)
     else:
         first = _names_before(table)
-        axes = dict(zip(list(table.columns)[first:], _AXES, strict=False))
+        axes = dict(zip(there[first:], _AXES, strict=False))
     if sorted(axes.values()) != list(_AXES) and not plan.sections.get("columns"):
-        found = listed(table.columns) if table.header is not None else f"{len(table.columns)} fields in a line"
-        expected = "at most three names, then x y z; or [columns] in the mapping"
-        raise CampaignError(
-            table.file, "x, y and z of the points are not found", row=table.header, found=found, expected=expected
-        )
-    titles = dict(zip(list(table.columns)[:first], _NAMES[max(0, len(_NAMES) - first) :], strict=False))
+        problem, expected = "x, y and z of the points are not found", "names, then x y z; or [columns] in the mapping"
+        found = listed(there) if table.header is not None else f"{len(there)} fields in a line"
+        raise CampaignError(table.file, problem, row=table.header, found=found, expected=expected)
+    titles = dict(zip(there[:first], _NAMES[max(0, len(_NAMES) - first) :], strict=False))
     return replace(table, columns={{**titles, **axes}.get(name, name): cells for name, cells in table.columns.items()})
 
 
 def _names_before(table: Table) -> int:
     """Return the number of leading name fields: text, or integers throughout where three fields remain."""
-    columns = list(table.columns)
-    for count, name in enumerate(columns[: len(_NAMES)]):
-        figures = table.first_text(name) is None
-        if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
+    for count, name in enumerate(list(table.columns)[: len(_NAMES)]):
+        spare = len(table.columns) - count > len(_AXES)
+        if table.first_text(name) is None and not (spare and all(map(str.isdigit, table.text(name)))):
             return count
-    return min(len(_NAMES), len(columns))
+    return min(len(_NAMES), len(table.columns))
 
 
 def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
@@ -249,35 +238,40 @@ POINTS = Format(
 )
 
 
-def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
-    table, stamp = read_table(files[0], plan.layout()), "Timestamp"
-    whole = stamp in table.columns and all(re.fullmatch(r"\d{14}", each) for each in table.text(stamp))
-    clock: dict[str, Any] = {"time": {"column": stamp, "time": "%Y%m%d%H%M%S"}} if whole else {"order": {"count": True}}
-    columns = {**{axis: f"measurement_{axis}" for axis in "xyz"}, **clock, "temperature": "measurement_temperature"}
-    angles = [f"measurement_r{axis}" for axis in "xyz"]
-    sections: dict[str, dict[str, Any]] = {
-        "measurements": {"angle_unit": "rad", "length_unit": "mm"},
-        "frames": {"target": [0.0, 0.0, 93.0]},
-        "columns": columns,
-        "orientation": {"kind": "euler", "sequence": "XYZ", "unit": "deg", "columns": angles},
-    }
-    notes = () if whole else ("the time stamps are no instants: the order of the rows is taken",)
-    return Source(table, planned(sections), notes)
-
-
-def _mapped(files: Sequence[Path], plan: Plan, mapping: Mapping[str, Any]) -> Source:
-    """Read one table, of which a mapping says everything."""
-    return Source(read_table(files[0], plan.layout()), planned(mapping))
-
-
 _JACOBI = {
     "measurements": {"angle_unit": "deg", "length_unit": "mm"},
     "columns": {**{axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}, "order": "step_order"},
 }
+_IPA: dict[str, Any] = {
+    "measurements": {"angle_unit": "rad", "length_unit": "mm"},
+    "frames": {"target": [0.0, 0.0, 93.0]},
+    "columns": {**{a: f"measurement_{a}" for a in "xyz"}, "temperature": "measurement_temperature"},
+    "orientation": {
+        "kind": "euler",
+        "sequence": "XYZ",
+        "unit": "deg",
+        "columns": [f"measurement_r{a}" for a in "xyz"],
+    },
+}
+"""What published sets are, as mappings."""
+
+
+def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
+    return Source(read_table(files[0], plan.layout()), planned(_JACOBI))
+
+
+def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
+    table, stamp = read_table(files[0], plan.layout()), "Timestamp"
+    whole = stamp in table.columns and all(re.fullmatch(r"\d{14}", each) for each in table.text(stamp))
+    clock: dict[str, Any] = {"time": {"column": stamp, "time": "%Y%m%d%H%M%S"}} if whole else {"order": {"count": True}}
+    notes = () if whole else ("the time stamps are no instants: the order of the rows is taken",)
+    return Source(table, planned({**_IPA, "columns": {**_IPA["columns"], **clock}}), notes)
+
+
 JACOBI = Format(
     "the data sets of P. Jacobi: UR5 and WAM, laser tracker",
     "3D_UR5_uncalibrated_grid_cleaned.csv",
-    partial(_mapped, mapping=_JACOBI),
+    _jacobi,
     most=1,
 )
 IPA_UR10 = Format(
