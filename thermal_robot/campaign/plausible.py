@@ -41,34 +41,31 @@ def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
     if campaign.targets is not None:
         axes = map(axes_of, campaign.targets.numbers)
         places = list(zip(axes, campaign.targets.points.swapaxes(0, 1), strict=True))
-    rows, sentences = np.zeros(campaign.samples, dtype=bool), []
-    for names, points in places if campaign.samples >= FEWEST_ROWS else []:
-        for found, sentence in _of_points(campaign, names, points):
-            rows |= found
-            sentences.append(sentence)
-    return rows, sentences
+    places = places if campaign.samples >= FEWEST_ROWS else []
+    found = [mark for columns, points in places for mark in _of_points(campaign, columns, points)]
+    none = np.zeros(campaign.samples, dtype=bool)
+    return np.any([none, *(rows for rows, _ in found)], axis=0), [sentence for _, sentence in found]
 
 
 def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Iterator[tuple[Mask, str]]:
     """Yield rows and a sentence for each mark among the positions (N, 3) of some columns, m; NaN where not seen."""
-    q, scale = campaign.q, campaign.units.length_scale
-    seen = np.asarray(np.isfinite(points).all(axis=1))
+    q, seen = campaign.q, np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
     # places that most rows share were meant: a ball in its socket
     if not any((places, *figures)) or 2 * sum(int(rows.sum()) for rows in places) > seen.sum():
         return
-    away = _away(campaign, points, seen)
+    away, told = _away(campaign, points, seen), points / campaign.units.length_scale
     for rows in places:
         if _astray(np.linalg.norm(away, axis=1), rows, seen, ASTRAY_PLACE):
             seen = seen & ~rows
-            told = [_figure(value / scale) for value in points[rows][0]]
-            one = len(set(told)) == 1
-            same = f"{' = '.join(names)} = {told[0]}" if one else f"({', '.join(names)}) = ({', '.join(told)})"
+            each = [_figure(value) for value in told[rows][0]]
+            one = f"{' = '.join(names)} = {each[0]}"
+            same = one if len(set(each)) == 1 else f"({', '.join(names)}) = ({', '.join(each)})"
             yield rows, f"{same} in {listed_rows(campaign.rows[rows])}: was the beam lost?"
     for k, name in enumerate(names):
         for rows in (group & seen for group in figures[k]):
             if _moved(q, rows) and _astray(away[:, k], rows, seen, ASTRAY_FIGURE):
-                marked = f"{_figure(points[rows, k][0] / scale)} in {listed_rows(campaign.rows[rows])}"
+                marked = f"{_figure(told[rows, k][0])} in {listed_rows(campaign.rows[rows])}"
                 yield rows, f"{name} is {marked}: a mark of a missing value?"
 
 
@@ -262,35 +259,21 @@ def _reach(campaign: Campaign) -> float:
 
 
 def another_unit(campaign: Campaign) -> float | None:
-    """Factor that converts the URDF's lengths to m; ``None`` where an arm may be so long.
-
-    Examples
-    --------
-    >>> import thermal_robot as tr
-    >>> another_unit(tr.demo_campaign()) is None
-    True
-    """
+    """Factor that converts the URDF's lengths to m; ``None`` where an arm may be so long."""
     length = sum(segment.length for segment in campaign.robot.segments)
     if length <= LONG_ARM:
         return THOUSAND if 0.0 < length < SHORTEST_ARM else None
     if campaign.position is not None:
         led = tool_poses(campaign.robot, campaign.q)[:, :3, 3]
-        wide, seen = (float(np.linalg.norm(np.ptp(own, axis=0))) for own in (led, campaign.position))
-        times = max(wide, TINY) / max(seen, TINY)
+        wide, seen = (max(float(np.linalg.norm(np.ptp(own, axis=0))), TINY) for own in (led, campaign.position))
         for unit in URDF_UNITS:
-            if abs(np.log(times * LENGTH_UNITS[unit])) < APART:
+            if abs(np.log(wide / seen * LENGTH_UNITS[unit])) < APART:
                 return LENGTH_UNITS[unit]
     return LENGTH_UNITS["mm"] if length > LONGEST_ARM else None
 
 
 def in_another_unit(factor: float) -> str:
-    """Describe the unit of a URDF whose lengths times a factor are m.
-
-    Examples
-    --------
-    >>> in_another_unit(0.01)
-    'the URDF stands in cm: its links are a hundred times too long'
-    """
+    """Describe the unit of a URDF whose lengths times a factor are m."""
     if factor > 1.0:
         return "the links of the URDF are a thousand times too short"
     unit = min(URDF_UNITS, key=lambda own: abs(np.log(factor / LENGTH_UNITS[own])))
@@ -356,12 +339,9 @@ def _limits(campaign: Campaign) -> Iterator[str]:
     for name, kind, q, lower, upper in joints:
         outside = np.flatnonzero((q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE))
         if len(outside):
-            first, scale, unit = outside[0], units.joint_scale(kind), units.joint_unit(kind)
-            limit = upper if q[first] > upper else lower
-            yield (
-                f"joint {name!r} is outside its limits in {_rows(outside)}, first in row "
-                f"{campaign.rows[first]}: {q[first] / scale:.6g} {unit}, limit {limit / scale:.6g} {unit}"
-            )
+            first, scale, unit = q[outside[0]], units.joint_scale(kind), units.joint_unit(kind)
+            limit = f"{first / scale:.6g} {unit}, limit {(upper if first > upper else lower) / scale:.6g} {unit}"
+            yield f"joint {name!r} is outside its limits in {_rows(campaign, outside)}: {limit}"
         farthest, limit = float(np.abs(q).max()), max(abs(lower), abs(upper))
         if kind == "prismatic" and math.isfinite(limit) and farthest > SLIDES * limit:
             yield (
@@ -375,13 +355,12 @@ def _conditions(campaign: Campaign) -> Iterator[str]:
     time, speed = (covariates.get(name, np.empty(0)) for name in ("time", "speed"))
     back = np.flatnonzero(np.diff(time) < 0) + 1
     if len(back):
-        yield (
-            f"column 'time' runs backwards {len(back)} time{'s' if len(back) > 1 else ''}, "
-            f"first in row {campaign.rows[back[0]]}: {time[back[0]]:.6g} s after {time[back[0] - 1]:.6g} s"
-        )
+        times, row = f"{len(back)} time{'s' if len(back) > 1 else ''}", back[0]
+        fell = f"{time[row]:.6g} s after {time[row - 1]:.6g} s"
+        yield f"column 'time' runs backwards {times}, first in row {campaign.rows[row]}: {fell}"
     outside = np.flatnonzero((speed < 0) | (speed > 1))
     if len(outside):
-        where = f"{_rows(outside)}, first in row {campaign.rows[outside[0]]}: {speed[outside[0]]:.6g}"
+        where = f"{_rows(campaign, outside)}: {speed[outside[0]]:.6g}"
         yield f"column 'speed' is outside 0..1 in {where}; it is a fraction of the maximum, not per cent"
     names = [n for n in covariates if n.split(".")[0] == "temperature" and n not in campaign.extra]
     told = [(f"column {n!r} has a median of", float(np.median(covariates[n]))) for n in names]
@@ -394,8 +373,8 @@ def _conditions(campaign: Campaign) -> Iterator[str]:
         yield f"the payload is up to {heaviest:.4g} kg{beside}: are these grams?"
 
 
-def _rows(chosen: NDArray[np.int64]) -> str:
-    return f"{len(chosen)} row{'s' if len(chosen) != 1 else ''}"
+def _rows(campaign: Campaign, chosen: NDArray[np.int64]) -> str:
+    return f"{len(chosen)} row{'s' if len(chosen) != 1 else ''}, first in row {campaign.rows[chosen[0]]}"
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:

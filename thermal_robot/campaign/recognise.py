@@ -13,6 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from thermal_robot.campaign import names
 from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
 from thermal_robot.campaign.table import Cells, Table
@@ -58,19 +60,12 @@ def bare(column: str) -> Heading:
     """Header without its unit, and that unit as this program spells it."""
     for pattern in (_IN_BRACKETS, _BEHIND):
         if found := pattern.fullmatch(column.strip()):
-            unit = _unit(found["square"] or found.groupdict().get("round") or "")
-            if unit is not None:
-                return Heading(found["name"], unit)
+            word = (found["square"] or found.groupdict().get("round") or "").strip().lower()
+            end = next((end for end in _RATES if word.endswith(end)), "")
+            word = _SPELLED.get(word.removesuffix(end), word.removesuffix(end))
+            if any(word in units for units in _KINDS):
+                return Heading(found["name"], word + _RATES.get(end, ""))
     return Heading(column.strip(), None)
-
-
-def _unit(word: str) -> str | None:
-    """Return the unit as this program spells it; ``None`` for an unknown word."""
-    word = word.strip().lower()
-    end = next((end for end in _RATES if word.endswith(end)), "")
-    word = word.removesuffix(end)
-    word = _SPELLED.get(word, word)
-    return word + _RATES.get(end, "") if any(word in units for units in _KINDS) else None
 
 
 def size(unit: str | None, other: str) -> float | None:
@@ -84,13 +79,12 @@ def size(unit: str | None, other: str) -> float | None:
 
 def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, str]:
     """Column of each joint found by name: its own, ``<joint>/position``, ``…/<joint>/position``."""
-    there = list(dict.fromkeys(columns))
-    found = {}
+    there, found = [*columns], {}
     for joint in joints:
         own = [name for name in (joint, f"{joint}/position", f"{joint}.position") if name in there]
-        series = [name for name in there if name.endswith(f"/{joint}/position")]
+        series = {name for name in there if name.endswith(f"/{joint}/position")}
         if own or len(series) == 1:
-            found[joint] = (own or series)[0]
+            found[joint] = [*own, *series][0]
     return found
 
 
@@ -136,28 +130,19 @@ def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Hea
         if known := _NUMBERED.fullmatch(own):
             stem = known["stem"].lower().replace(" ", "_")
             stems.setdefault(stem, {})[int(known["number"])] = Heading(column, unit)
-    count = len(joints)
-    whole = {
-        stem: [each[number] for number in sorted(each)]
-        for stem, each in stems.items()
-        if sorted(each) in (list(range(count)), list(range(1, count + 1)))
-    }
-    taken = next((stem for stem in _STEMS if stem in whole), None)
-    if taken is None:
-        return {}
-    read = next((stem for stem in _REPORTED if stem in whole and stem != taken), None)
-    encoders = [f"encoder.{joint}" for joint in joints] if read else []
-    return dict(zip((*joints, *encoders), (*whole[taken], *whole.get(read or "", ())), strict=True))
+    count, found = len(joints), dict[str, Heading]()
+    for stem in _STEMS:
+        numbers = sorted(stems.get(stem, ()))
+        prefix = "encoder." if found else ""
+        if numbers in (list(range(count)), list(range(1, count + 1))) and (not found or stem in _REPORTED):
+            found |= {f"{prefix}{joint}": stems[stem][k] for joint, k in zip(joints, numbers, strict=True)}
+        if len(found) == 2 * count:
+            break
+    return found
 
 
 def named(table: Table, robot: Robot, units: Units) -> Table:
-    """Table with the campaign's column names and declared units; translations are among its warnings.
-
-    Raises
-    ------
-    CampaignError
-        Text where a number should be that is to be converted.
-    """
+    """Table with the campaign's column names and declared units; translations are among its warnings."""
     known = headings(table.columns, robot)
     called = {heading.column: name for name, heading in known.items()}
     columns: dict[str, Cells] = {}
@@ -207,22 +192,14 @@ class Columns:
 def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> Columns:
     """Sort a table's columns for a robot; ``measured`` requires what each kind of measurement reads.
 
-    Rows are of the ``kind`` stated, unless a column says it. Without ``measured`` these columns are ignored.
-
-    Raises
-    ------
-    CampaignError
-        A joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
+    Rows are of the ``kind`` stated, unless a column says it. Without ``measured`` these columns are ignored. Refused
+    are a joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
     """
     _refuse_two_meanings(table, robot)
-    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
     more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
-    _require(
-        table,
-        robot.joint_names,
-        f"every movable joint of the chain from {chain} needs a column, one that stays where it is, too{more}",
-    )
+    chain = f"every movable joint of the chain from {robot.root_frame!r} to {robot.tool_frame!r}"
+    _require(table, robot.joint_names, f"{chain} needs a column, one that stays where it is, too{more}")
     kinds = _kinds(table, kind) if measured else ()
     plain = measured and not kinds
     targets, warnings = _targets(table, robot) if plain else ((), [])
@@ -233,7 +210,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
     for own in kinds:
         _require(table, [c for group in names.KINDS[own] for c in group], f"rows of the kind {own!r} need it")
     groups = tuple(group for group in asked if _whole_group(table, group))
-    if names.SIMULATED_ORIENTATION in groups and names.SIMULATED_POSITION not in groups:
+    if names.SIMULATED_ORIENTATION in groups:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
     has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
@@ -255,14 +232,14 @@ def _kinds(table: Table, stated: str) -> tuple[str, ...]:
     """Return the kinds of measurement of the rows; none where all are positions or poses by the columns there."""
     if not stated and names.KIND not in table.columns:
         stated = _by_columns(table)
-    cells = table.text(names.KIND) if names.KIND in table.columns else [stated] * len(table.rows)
-    for row, cell in enumerate(cells):
-        if cell not in (*names.KINDS, ""):
-            expected = f"one of {', '.join(names.KINDS)}"
-            raise table.error("unknown kind of measurement", names.KIND, row, found=repr(cell), expected=expected)
-        if not cell and any(cells):
-            raise table.error("a value is missing", names.KIND, row, found="an empty cell", expected="a kind")
-    found = tuple(sorted({*cells} - {""}))
+    if names.KIND in table.columns:
+        cells = np.array(table.text(names.KIND))
+        unknown = ~np.isin(cells, (*names.KINDS, ""))
+        table.refuse(unknown, "unknown kind of measurement", names.KIND, f"one of {', '.join(names.KINDS)}")
+        table.refuse((cells == "") & (cells != "").any(), "a value is missing", names.KIND, "a kind")
+    else:
+        cells = np.array([stated])
+    found = tuple(sorted({*cells.tolist()} - {""}))
     return () if set(found) <= {"position"} or set(found) == {"pose"} else found
 
 
@@ -280,26 +257,22 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
     Errors: a missing axis, too few targets, a target without a number among numbered ones.
     """
     named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
-    numbers = sorted({target[1] for target in named if target})
-    for number in numbers:
+    known = sorted({target[1] for target in named if target})
+    for number in known:
         _whole_group(table, names.axes_of(number))
-    empty = [n for n in numbers if all(table.is_empty(column) for column in names.axes_of(n))]
-    numbers = [n for n in numbers if n not in empty]
+    numbers = tuple(n for n in known if not all(table.is_empty(column) for column in names.axes_of(n)))
     if not numbers:
         return (), []
     beside = [column for column in names.POSITION if column in table.columns]
     if beside or len(numbers) < FEWEST:
-        raise table.error(
-            "a target without a number stands beside those with one" if beside else "too few targets to tell a pose",
-            (beside or names.axes_of(numbers[0]))[0],
-            found=f"{len(numbers)}{' with a number' if beside else ''}",
-            expected=f"at least {FEWEST} as x.1 y.1 z.1, x.2 …; or one, as x y z",
-        )
-    lost = [f"target {number} is seen in no row and counts as absent" for number in empty]
+        problem = "a target without a number stands beside those with one" if beside else "too few targets for a pose"
+        found, column = f"{len(numbers)}{' with a number' if beside else ''}", (beside or names.axes_of(numbers[0]))[0]
+        expected = f"at least {FEWEST} as x.1 y.1 z.1, x.2 …; or one, as x y z"
+        raise table.error(problem, column, found=found, expected=expected)
+    lost = [f"target {number} is seen in no row and counts as absent" for number in known if number not in numbers]
     turned = [column for column in names.ORIENTATION if column in table.columns]
-    if turned:
-        lost.append(f"columns {listed(turned)} are left out: several targets tell the orientation")
-    return tuple(numbers), lost
+    lost += [f"columns {listed(turned)} are left out: several targets tell the orientation"] if turned else []
+    return numbers, lost
 
 
 def _judge(table: Table, column: str, robot: Robot) -> tuple[str, str]:
