@@ -18,7 +18,7 @@ from thermal_robot.campaign.checked import (
     check_quaternions,
     checked_array,
     checked_mapping,
-    first_true,
+    refuse,
 )
 from thermal_robot.campaign.settings import FIELDS, SMALLEST, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
@@ -224,10 +224,8 @@ class Campaign:
         if self.noise_of_rows is None:
             return
         self._hold("noise_of_rows", (samples,))
-        row = first_true(self.noise_of_rows < SMALLEST)
-        if row is not None:
-            found, problem = f"{self.noise_of_rows[row]:.15g} at index {row}", "no standard deviation"
-            raise CampaignError(file, problem, column="noise_of_rows", found=found, expected="a number above 0")
+        own, problem = self.noise_of_rows, "no standard deviation"
+        refuse(file, "noise_of_rows", own < SMALLEST, problem, "a number above 0", lambda row: f"{own[row]:.15g}")
         if self.noise_position is None and samples:
             place, turn = sigma_of_all(self.noise_of_rows, self.targets)
             self._set("noise_position", place)
@@ -263,20 +261,19 @@ class Campaign:
         import pandas as pd
 
         robot, units, several = self.robot, self.units, self.targets
-        held: dict[str, Array] = dict(zip(robot.joint_names, self.q.T, strict=True))
+        held: Mapping[str, Array] = dict(zip(robot.joint_names, self.q.T, strict=True))
         if several is not None:
             for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
-                held |= dict(zip(names.axes_of(number), points, strict=True))
+                held = {**held, **dict(zip(names.axes_of(number), points, strict=True))}
         for key, group in names.POSES.items():
             values = getattr(self, key)
             # several targets tell a pose, which was not measured
             if values is not None and (several is None or group not in (names.POSITION, names.ORIENTATION)):
-                held |= dict(zip(group, values.T, strict=True))
+                held = {**held, **dict(zip(group, values.T, strict=True))}
         columns = {name: values / scale_of(name, robot, units) for name, values in held.items()}
         length = units.length_scale
         columns |= {name: values / names.reading_scale(name, length) for name, values in self.readings.items()}
-        held = {} if self.noise_of_rows is None else {names.NOISE: self.noise_of_rows}
-        held |= self.covariates
+        held = self.covariates if self.noise_of_rows is None else {names.NOISE: self.noise_of_rows, **self.covariates}
         columns |= {name: values / scale_of(name, robot, units) for name, values in held.items()}
         labels = {name: labels.astype(object) for name, labels in self.labels.items()}
         shown = pd.DataFrame({**columns, **labels}, index=pd.Index(self.rows, name="row"))
@@ -454,21 +451,8 @@ GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:
     """Copy of a campaign with the sign of one quantity reversed.
 
-    Parameters
-    ----------
-    campaign
-        Any; its arrays stay as they are.
-    quantity
-        ``torque`` or ``approach``, whose columns of all joints change their sign; ``temperature``, whose differences
-        from ``reference_temperature`` do; ``gravity``, of the robot.
-
-    Examples
-    --------
-    >>> import thermal_robot as tr
-    >>> campaign = tr.demo_campaign()
-    >>> other = turned_round(campaign, "approach")
-    >>> other.turned, bool((other.covariates["approach.joint_1"] == -campaign.covariates["approach.joint_1"]).all())
-    (('approach',), True)
+    ``torque`` or ``approach`` stands for their columns of all joints; of ``temperature`` the differences from
+    ``reference_temperature`` change their sign, and ``gravity`` is the robot's.
     """
     if quantity == GRAVITY:
         robot = campaign.robot
@@ -488,35 +472,16 @@ def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campa
 
 
 def appended(campaigns: Sequence[Campaign]) -> Campaign:
-    """Concatenate campaigns of one robot, with the declarations of the first.
+    """Concatenate campaigns of one robot and the same joints, with the declarations of the first.
 
-    Parameters
-    ----------
-    campaigns
-        At least one; of the same joints. What is measured must be the same in all; covariates and labels that not
-        all have are left out.
-
-    Returns
-    -------
-    Campaign
-        Each row keeps its number, its side of approach, and how far its joints had gone since they last turned: of the
-        move from one campaign to the next nothing is known.
+    Covariates and labels that not all have are left out. Each row keeps its number, its side of approach, and how far
+    its joints had gone since they last turned: of the move from one campaign to the next nothing is known.
 
     Raises
     ------
     CampaignError
         If one has columns of measurements that another has not, or several targets of each pose, whose places on the
         tool are found from all rows together.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import thermal_robot as tr
-    >>> from thermal_robot.campaign.campaign import appended
-    >>> campaign = tr.demo_campaign()
-    >>> both = appended([campaign.take(np.arange(100)), campaign.take(np.arange(100, 120))])
-    >>> both.samples, bool((both.q == campaign.q).all())
-    (120, True)
     """
     first = campaigns[0]
     if len(campaigns) == 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,6 +21,12 @@ ROTATION_TOLERANCE = 0.01  # By how much the product of a matrix with its transp
 LARGEST_COMMAND = 1e6  # rad or m: 160 000 turns, which leave ten digits for the angle
 
 Rows: TypeAlias = "NDArray[np.int64]"
+IMPOSSIBLE: dict[str, tuple[Callable[[Array], NDArray[np.bool_]], str]] = {
+    "approach.<joint>": (lambda values: ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"),
+    "payload": (lambda values: values < 0, "a mass in kg that is not negative"),
+    "temperature": (lambda values: values < ABSOLUTE_ZERO, "°C"),
+}
+"""Which values a quantity cannot have, and what is expected."""
 
 
 def first_true(refused: NDArray[np.bool_]) -> int | None:
@@ -51,6 +57,23 @@ def no_rotation(matrices: Array) -> int | None:
     return first_true((away > ROTATION_TOLERANCE) | (np.linalg.det(matrices) < 0.0))
 
 
+def refuse(
+    file: str,
+    column: str,
+    wrong: NDArray[np.bool_],
+    problem: str,
+    expected: str,
+    found: Callable[[int], str],
+    rows: Rows | None = None,
+) -> None:
+    """Refuse the first of (N,) or (N, k) that is wrong, naming it by its number of (N,) ``rows``, or by its index."""
+    index = first_true(wrong)
+    if index is not None:
+        row, place = (None, f" at index {index}") if rows is None else (int(rows[index]), "")
+        told = f"{found(index)}{place}"
+        raise CampaignError(file, problem, row=row, column=column, found=told, expected=expected)
+
+
 def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
     """Read-only array of a required shape and type; a copy unless the input is read-only.
 
@@ -66,10 +89,9 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
     if array.shape != shape:
         raise CampaignError(file, "wrong shape", column=key, found=str(array.shape), expected=str(shape))
     if kind is np.float64:
-        row = first_beyond(array, LARGEST_COMMAND if key == "q" else LARGEST)
-        if row is not None:
-            found, expected = f"{array[row]} at index {row}", "a finite number in every place"
-            raise CampaignError(file, "not a figure of a campaign", column=key, found=found, expected=expected)
+        wrong = ~(np.abs(array) <= (LARGEST_COMMAND if key == "q" else LARGEST))
+        expected, problem = "a finite number in every place", "not a figure of a campaign"
+        refuse(file, key, wrong, problem, expected, lambda index: str(array[index]))
         array = without_rounding(array)
     if array.flags.writeable:
         array = array.copy()
@@ -89,35 +111,23 @@ def _as_array(value: Any, kind: Any) -> NDArray[Any]:
 
 
 def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None = None) -> None:
-    """Refuse (N, 4) quaternions that are not normalised, naming the first by its number of (N,) ``rows``, or index."""
-    index = no_orientation(quaternions)
-    if index is not None:
-        four = ", ".join(f"{part:g}" for part in quaternions[index])
-        found, expected = f"({four}) of length {np.linalg.norm(quaternions[index]):.3g}", "qw, qx, qy, qz of length 1"
-        problem = "no orientation: the quaternion's length is not 1"
-        raise CampaignError(file, problem, column=key, expected=expected, **_at(found, index, rows))
+    """Refuse (N, 4) quaternions that are not normalised."""
+    length = np.linalg.norm(quaternions, axis=1)
+
+    def found(index: int) -> str:
+        return f"({', '.join(f'{part:g}' for part in quaternions[index])}) of length {length[index]:.3g}"
+
+    problem, expected = "no orientation: the quaternion's length is not 1", "qw, qx, qy, qz of length 1"
+    refuse(file, key, np.abs(length - 1.0) > QUATERNION_TOLERANCE, problem, expected, found, rows)
 
 
 def check_covariate(file: str, name: str, values: Array, rows: Rows | None = None) -> None:
-    """Refuse (N,) values outside the physical range of a quantity, naming the first by its number, or index."""
+    """Refuse (N,) values outside the physical range of a quantity."""
     quantity, place = split_name(name)
-    if quantity == "approach" and place:
-        refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
-    elif name == "payload":
-        refused, expected = values < 0, "a mass in kg that is not negative"
-    elif quantity == "temperature":
-        refused, expected = values < ABSOLUTE_ZERO, "°C"
-    else:
-        return
-    row = first_true(refused)
-    if row is not None:
-        told = _at(f"{values[row]:.15g}", row, rows)
-        raise CampaignError(file, "impossible value", column=name, expected=expected, **told)
-
-
-def _at(found: str, index: int, rows: Rows | None) -> dict[str, Any]:
-    """Found value and its row number, for an error."""
-    return {"found": f"{found} at index {index}"} if rows is None else {"found": found, "row": int(rows[index])}
+    known = "approach.<joint>" if quantity == "approach" and place else quantity if quantity == "temperature" else name
+    if known in IMPOSSIBLE:
+        wrong, expected = IMPOSSIBLE[known]
+        refuse(file, name, wrong(values), "impossible value", expected, lambda index: f"{values[index]:.15g}", rows)
 
 
 def check_joints(

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.checked import first_true, without_rounding
+from thermal_robot.campaign.checked import refuse, without_rounding
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
@@ -81,10 +82,7 @@ class Table:
         found: Callable[[int], str] | None = None,
     ) -> None:
         """Refuse the first of (N,) rows that are wrong; what was found is its cell, unless ``found`` says more."""
-        index = first_true(wrong)
-        if index is not None:
-            told = found(index) if found else self._shown(column, index)
-            raise self.error(problem, column, index, found=told, expected=expected)
+        refuse(self.file, column, wrong, problem, expected, found or partial(self._shown, column), self.rows)
 
     def _shown(self, column: str, index: int) -> str:
         """Cell in a message: text in quotes, a number without."""
