@@ -9,13 +9,10 @@ robot it is of.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from thermal_robot.arrays import Array
 from thermal_robot.campaign.document import read_yaml
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import homogeneous
@@ -58,11 +55,19 @@ def with_kinematics(robot: Robot, file: str | Path) -> Robot:
 
     Refused are a file that is none, one of another model, and a robot of other frames.
     """
-    documents = read_yaml(Path(file))
-    held = documents[0].get("kinematics") if documents and isinstance(documents[0], Mapping) else None
-    origins = {}
+    from scipy.spatial.transform import Rotation
+
+    held, origins = next(iter(read_yaml(Path(file))), None), {}
     for link, k in elements(robot, str(file)).items():
-        pose = _pose(held.get(link) if isinstance(held, Mapping) else None, str(file), link)
+        try:
+            # what has an exponent and no point is text to YAML
+            figures = np.array([float(held["kinematics"][link][key]) for key in FIGURES])
+        except (TypeError, KeyError, ValueError):
+            figures = np.array([np.nan])
+        if not np.isfinite(figures).all():
+            expected = f"{', '.join(FIGURES)} under kinematics: {link}"
+            raise CampaignError(str(file), "is no kinematics.yaml", key=f"kinematics.{link}", expected=expected)
+        pose = homogeneous(Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3])
         away = np.linalg.norm(pose[:3, 3] - robot.chain.translations[k])
         turned = np.linalg.norm(pose[:3, :3] - robot.chain.rotations[k]) / np.sqrt(2.0)
         if away > FARTHEST or turned > MOST_TURNED:
@@ -76,18 +81,3 @@ def with_kinematics(robot: Robot, file: str | Path) -> Robot:
         origins[robot.chain.names[k]] = pose
     urdf = rewritten(robot.urdf, origins, notes=[f"Joint origins of {Path(file).name}."])
     return load_robot(urdf, robot.tool_frame, root_frame=robot.root_frame, gravity=robot.gravity)
-
-
-def _pose(given: Any, file: str, link: str) -> Array:
-    """Pose (4, 4) of a link's six numbers."""
-    from scipy.spatial.transform import Rotation
-
-    try:
-        # what has an exponent and no point is text to YAML
-        figures = [float(given[key]) for key in FIGURES]
-    except (TypeError, KeyError, ValueError):
-        figures = [np.nan]
-    if not np.isfinite(figures).all():
-        expected = f"{', '.join(FIGURES)} under kinematics: {link}"
-        raise CampaignError(file, "is no kinematics.yaml", key=f"kinematics.{link}", expected=expected)
-    return homogeneous(Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3])

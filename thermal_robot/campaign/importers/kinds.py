@@ -51,8 +51,7 @@ def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
         found = np.array([sample[key] for sample in samples], dtype=float).reshape(-1, 4, 4)
     except (TypeError, KeyError, ValueError) as error:
         raise CampaignError(file, f"samples lack {key}", expected="sixteen figures of a 4 × 4 matrix") from error
-    upright = np.allclose(found[:, 3], [0.0, 0.0, 0.0, 1.0])
-    found = found if upright else found.transpose(0, 2, 1)
+    found = found if np.allclose(found[:, 3], [0.0, 0.0, 0.0, 1.0]) else found.transpose(0, 2, 1)
     wrong = first_beyond(found.reshape(-1, 16))
     wrong = no_rotation(found[:, :3, :3]) if wrong is None else wrong
     if wrong is not None:
@@ -72,24 +71,22 @@ def _on_the_hand(file: str, hand: Array, eye: Array) -> bool:
     """Tell whether the camera moves with the hand, from poses (N, 4, 4) of both: see the module's text."""
     hand, eye = hand[:, :3, :3], eye[:, :3, :3]
     seen = log3(eye[1:] @ eye[:-1].transpose(0, 2, 1))
-    moved = log3(hand[1:].transpose(0, 2, 1) @ hand[:-1]), log3(hand[1:] @ hand[:-1].transpose(0, 2, 1))
     large = np.linalg.norm(seen, axis=1) > _LEAST_TURN
     if not large.any():
         expected = f"poses that turn the camera by more than {_LEAST_TURN:g} rad"
         raise CampaignError(file, "samples do not tell whether the camera is on the hand", expected=expected)
+    moved = log3(hand[1:].transpose(0, 2, 1) @ hand[:-1]), log3(hand[1:] @ hand[:-1].transpose(0, 2, 1))
     with_it, before_it = (_apart(own[large], seen[large]) for own in moved)
     return with_it < before_it
 
 
 def _moveit(files: Sequence[Path], plan: Plan) -> Source:
     """Read joint states and samples, in either order."""
-    read = {str(file): (read_yaml(file) or [None])[0] for file in files}
-    states = next(((name, own) for name, own in read.items() if isinstance(own, dict)), None)
-    samples = next(((name, own) for name, own in read.items() if isinstance(own, list)), None)
-    if states is None or samples is None or not {"joint_names", "joint_values"} <= {*states[1]}:
+    read = [(str(file), (read_yaml(file) or [None])[0]) for file in files]
+    (name, own), (file, listed) = sorted(read, key=lambda each: isinstance(each[1], list))
+    if not isinstance(own, dict) or not isinstance(listed, list) or not {"joint_names", "joint_values"} <= {*own}:
         expected = "joint states (joint_names, joint_values) and samples (a list), both as MoveIt saves them"
         raise CampaignError(str(files[0]), "these are no such files", expected=expected)
-    (name, own), (file, listed) = states, samples
     joints = fitted(list_of(text("the name of a joint")), own["joint_names"], name, "joint_names")
     values = fitted(matrix((None, len(joints))), own["joint_values"], name, "joint_values")
     if len(values) != len(listed):
@@ -107,6 +104,9 @@ def _moveit(files: Sequence[Path], plan: Plan) -> Source:
     return Source(table, planned(units), (f"the camera is {where}",))
 
 
+_CORNERS: dict[str, Any] = {"robot": {"moves": "unknown"}, "measurements": {"kind": "pixel"}}
+
+
 def _corners(files: Sequence[Path], plan: Plan) -> Source:
     """Read corners by image, and the joints at each image; the one camera that the mapping states sees them."""
     cameras = [*plan.sections.get("camera", {})]
@@ -116,15 +116,9 @@ def _corners(files: Sequence[Path], plan: Plan) -> Source:
         raise CampaignError(str(files[0]), "it is not clear which camera saw this", expected=expected)
     both, notes = joined(corners, states, column_name(corners, "image"))
     columns: dict[str, Any] = {"u": "u", "v": "v"}
+    columns |= {} if "camera" in both.columns else {"camera": {"value": cameras[0]}}
     columns |= {f"board.{axis}": axis.upper() for axis in "xyz" if axis.upper() in both.columns}
-    if "camera" not in both.columns:
-        columns["camera"] = {"value": cameras[0]}
-    sections: dict[str, dict[str, Any]] = {
-        "robot": {"moves": "unknown"},
-        "measurements": {"kind": "pixel"},
-        "columns": columns,
-    }
-    return Source(both, planned(sections), notes)
+    return Source(both, planned({**_CORNERS, "columns": columns}), notes)
 
 
 MOVEIT = Format(
@@ -138,43 +132,35 @@ CORNERS = Format(
 _HOLE = re.compile(r"hole_(\d+)\.csv")
 _APART = 50.0  # mm, OFFSET_DISTANCE of the source
 _MOST = 1000  # files: no campaign has so many stands
-
-
-def _holes(files: Sequence[Path]) -> list[Path]:
-    """Return the files of sockets among some files, or in folders at any depth, sorted."""
-    inside = [found for file in files for found in (sorted(file.rglob("hole_*.csv")) if file.is_dir() else [file])]
-    holes = [file for file in inside if _HOLE.fullmatch(file.name)]
-    if not holes:
-        expected = "hole_0.csv, hole_1.csv in a folder for each place of the stand"
-        raise CampaignError(str(files[0]), "holds no readings of sockets", expected=expected)
-    return holes
+_SOCKETS: dict[str, dict[str, Any]] = {
+    "robot": {"moves": "unknown"},
+    "measurements": {"angle_unit": "rad", "length_unit": "mm", "kind": "socket"},
+}
 
 
 def _mukca(files: Sequence[Path], plan: Plan) -> Source:
-    said: dict[str, dict[str, Any]] = {
-        "robot": {"moves": "unknown"},
-        "measurements": {"angle_unit": "rad", "length_unit": "mm", "kind": "socket"},
-    }
+    """Read the files of sockets among some files, or in folders at any depth; or one table of all rows."""
     if len(files) == 1 and files[0].is_file() and not _HOLE.fullmatch(files[0].name):
-        return Source(read_table(files[0], plan.layout()), planned(said))
-    holes = _holes(files)
-    tables = [read_table(file, Layout(header=False)) for file in holes]
+        return Source(read_table(files[0], plan.layout()), planned(_SOCKETS))
+    inside = [found for file in files for found in (sorted(file.rglob("hole_*.csv")) if file.is_dir() else [file])]
+    holes = [(file, socket[1]) for file in inside if (socket := _HOLE.fullmatch(file.name))]
+    if not holes:
+        expected = "hole_0.csv, hole_1.csv in a folder for each place of the stand"
+        raise CampaignError(str(files[0]), "holds no readings of sockets", expected=expected)
+    tables = [read_table(file, Layout(header=False)) for file, _ in holes]
     wide = {len(table.columns) for table in tables}
     if len(wide) > 1:
-        raise CampaignError(str(holes[0]), "other files have another number of joints", found=str(sorted(wide)))
-    stands = [file.parent.name for file in holes]
-    sockets = [_HOLE.fullmatch(file.name)[1] for file in holes]  # type: ignore[index]
-    rows = [len(table.rows) for table in tables]
-    joints = [f"joint {k + 1}" for k in range(wide.pop())]
-    columns: dict[str, Cells] = {
-        name: np.concatenate([table.numbers(list(table.columns)[k]) for table in tables])
-        for k, name in enumerate(joints)
-    }
-    columns |= {"stand": np.repeat(stands, rows).tolist(), "socket": np.repeat(sockets, rows).tolist()}
+        raise CampaignError(str(holes[0][0]), "other files have another number of joints", found=str(sorted(wide)))
+    rows, joints = [len(table.rows) for table in tables], [f"joint {k + 1}" for k in range(wide.pop())]
+    figures = np.vstack([np.column_stack([table.numbers(name) for name in table.columns]) for table in tables])
+    columns: dict[str, Cells] = dict(zip(joints, figures.T, strict=True))
+    columns["stand"] = np.repeat([file.parent.name for file, _ in holes], rows).tolist()
+    columns["socket"] = np.repeat([socket for _, socket in holes], rows).tolist()
     columns["order"] = np.arange(float(sum(rows)))
-    table = Table(str(holes[0].parent.parent), columns, np.arange(2, sum(rows) + 2))
-    note = f"{len(holes)} sockets on {len(set(stands))} stands; {_APART:g} mm between two of a stand are not used"
-    return Source(table, planned({**said, "columns": {"joints": joints}}), (note,))
+    table = Table(str(holes[0][0].parent.parent), columns, np.arange(2, sum(rows) + 2))
+    stands = len({*columns["stand"]})
+    note = f"{len(holes)} sockets on {stands} stands; {_APART:g} mm between two of a stand are not used"
+    return Source(table, planned({**_SOCKETS, "columns": {"joints": joints}}), (note,))
 
 
 MUKCA = Format(

@@ -39,7 +39,7 @@ _TARGETS = {
     (3, 4, 4, 6): ("X", "Y", "Z", "q1", "q2", "q3", "q4", "cf1", "cf4", "cf6", "cfx", *_EXTERNAL),
 }
 """Names of the figures of a jointtarget and of a robtarget, by how many stand in each bracket."""
-Point = dict[str, float]
+Point = dict[str, Any]
 
 
 def _aggregate(text: str) -> list[Point]:
@@ -108,7 +108,7 @@ def _program(file: Path, language: Language) -> Table:
 
     beside = [other for other in file.parent.glob(f"{file.stem}.*") if other.suffix.lower() == language.data]
     declared: dict[str, list[Point]] = {}
-    moved: list[tuple[str, Point]] = []
+    moved: list[Point] = []
     for each in dict.fromkeys((*beside, file)):
         if not is_file(each) or each.stat().st_size > LARGEST_TABLE:
             raise CampaignError(str(each), "there is no such file, or it is too large", expected="a program")
@@ -116,18 +116,17 @@ def _program(file: Path, language: Language) -> Table:
         for found in language.statements.finditer(text):
             name, to = ((found[key] or "").upper() for key in ("name", "to"))
             points = declared.get(to, []) if to else language.points(found["figures"])
-            points = [point for point in points if language.first in point or "X" in point]
-            if name and points:
+            points = [{"name": name or to, **point} for point in points if language.first in point or "X" in point]
+            if not name:
+                moved += points
+            elif points:
                 declared[name] = points
-            moved += [] if name else [(to, point) for point in points]
-    named = moved or [(name, point) for name, several in declared.items() for point in several]
-    return table_from_frame(pd.DataFrame([{"name": name, **point} for name, point in named or [("", {})]]), str(file))
+    named = moved or [point for several in declared.values() for point in several]
+    return table_from_frame(pd.DataFrame(named or [{"name": ""}]), str(file))
 
 
 def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
     """Read a program of joint targets and measured points, a table or a program, in either order."""
-    import pandas as pd
-
     tables = [
         _program(file, language) if file.suffix.lower() in language.endings else read_table(file, plan.layout())
         for file in files
@@ -147,7 +146,8 @@ def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
     commands = replace(whole, columns={**({"name of the command": called} if key else {}), **axes})
     if key:
         sections["columns"] = {"pose": key}
-        commands = commands.take(~pd.Series(called).duplicated().to_numpy())  # a program may go there again
+        _, first = np.unique(called, return_index=True)  # a program may go there again
+        commands = commands.take(np.sort(first))
     if set(language.orientation["columns"]) <= set(measured.columns):
         sections["orientation"] = language.orientation
     both, notes = joined(replace(measured, columns=there), commands, key)
@@ -159,12 +159,13 @@ def _named(measured: Table, points: Sequence[str], stated: str | None) -> tuple[
 
     Of KUKA's point P1 the variable is XP1, and capitals and small letters are the same.
     """
-    best, called = "", list(points)
+    best, called, most = "", list(points), 0
     for column in [column_name(measured, stated)] if stated else measured.columns:
         spelled = {name.upper(): name for name in measured.text(column) if name}
         names = [spelled.get(point, spelled.get(point.removeprefix("X"), point)) for point in points]
-        if len({*names} & {*spelled.values()}) > len({*called} & {*(measured.text(best) if best else ())}):
-            best, called = column, names
+        common = len({*names} & {*spelled.values()})
+        if common > most:
+            best, called, most = column, names, common
     return best, called
 
 
