@@ -83,7 +83,7 @@ def test_predictions(tmp_path: Path, ending: str) -> None:
 
 
 def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(CampaignError, match="cannot be written: No such file or directory"):
+    with pytest.raises(CampaignError, match="cannot be written; found No such file or directory"):
         write_predictions(tmp_path / "nowhere" / "p.csv", predicted([[0, 0, 0]]))
     (tmp_path / "taken").write_text("")
     with pytest.raises(CampaignError, match="cannot be written"):

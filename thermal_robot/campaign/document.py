@@ -137,13 +137,7 @@ class Declaration:
 
 
 def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
-    """Read campaign.toml, or that of a directory; its paths are relative to ``folder``, by default its own.
-
-    Raises
-    ------
-    CampaignError
-        No such file, a syntax error, a section or key that is unknown or missing, a value of the wrong kind.
-    """
+    """Read campaign.toml, or that of a directory; its paths are relative to ``folder``, by default its own."""
     file = declared_file(path)
     document = Document(file)
     for place in ("measurements.angle_unit", "measurements.length_unit", "robot.urdf", "robot.tool_frame"):
@@ -162,12 +156,9 @@ def robot_reference(urdf: str, folder: Path) -> str | Path:
 
 
 def declared_file(path: Path, name: str = FILE_NAME, section: str = "measurements") -> Path:
-    """Return the file of a declaration, or of that in a folder; ``section`` tells it from other files.
+    """Return the file of a declaration, or of that in a folder; where there is none, say which are beside it.
 
-    Raises
-    ------
-    CampaignError
-        No such file; it says which there are beside it.
+    ``section`` tells such files from others.
     """
     file = path / name if is_folder(path) else path
     if is_file(file):

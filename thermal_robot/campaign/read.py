@@ -55,20 +55,17 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
 
     Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
     """
-    units = settings.units
+    units, told, left_out = settings.units, None, list[str]()
     table = named(table, robot, units)
     columns = recognise(table, robot, measured=measured, kind=settings.kind)
-    told: Posed | None = None
-    left_out: list[str] = []
     if columns.targets:
         table, told, left_out = of_targets(table, columns, settings)
         settings = replace(settings, tool_known=False)
     q = _commands(table, robot, units)
     covariates, missing, gaps = _covariates(table, columns, robot, units, q)
     settings, columns = framed(settings, columns)
-    poses: dict[str, Any] = {
-        key: _pose(table, group, units) for key, group in names.POSES.items() if group in columns.groups
-    }
+    groups = names.POSES.items()
+    poses: dict[str, Any] = {key: _pose(table, group, units) for key, group in groups if group in columns.groups}
     poses["readings"], labels = readings(table, columns, settings)
     poses |= {"position": told.position, "orientation": told.orientation} if told else {}
     campaign = Campaign(
@@ -191,25 +188,19 @@ def _pose(table: Table, group: Sequence[str], units: Units) -> Array:
 
 def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:
     """Stated noise of a campaign and its targets; of several targets, propagated to their pose."""
-    place, turn, targets = settings.noise_position, settings.noise_orientation, told.targets if told else None
-    if targets is not None:
-        place, turn = (None, None) if place is None else propagated_sigma(place, targets)
-    each = _noise_of_rows(table, settings) if columns.has_noise else None
-    known = {"noise_of_rows": each, "targets": targets, "noise_orientation": turn}
-    return {"noise_position": place if each is None else None, **known}
-
-
-def _noise_of_rows(table: Table, settings: Settings) -> Array:
-    """Noise (N,) of each row, m; an empty cell takes that of all rows, where stated."""
-    cells = table.numbers(names.NOISE, gaps=True)
-    sigmas = cells * settings.units.length_scale
-    if settings.noise_position is not None:
-        sigmas = np.where(np.isnan(sigmas), settings.noise_position, sigmas)
-    expected = "one sigma above 0"
-    table.refuse(sigmas < SMALLEST, "no standard deviation", names.NOISE, expected)
-    more = f"{expected}, or [noise] position for the rows without one"
-    table.refuse(np.isnan(sigmas), "a value is missing", names.NOISE, more)
-    return sigmas
+    stated, turn, each, targets = settings.noise_position, settings.noise_orientation, None, None
+    place = stated
+    if told:
+        targets = told.targets
+        place, turn = (None, None) if stated is None else propagated_sigma(stated, targets)
+    if columns.has_noise:
+        each = table.numbers(names.NOISE, gaps=True) * settings.units.length_scale
+        each = each if stated is None else np.where(np.isnan(each), stated, each)
+        expected, place = "one sigma above 0", None
+        table.refuse(each < SMALLEST, "no standard deviation", names.NOISE, expected)
+        more = f"{expected}, or [noise] position for the rows without one"
+        table.refuse(np.isnan(each), "a value is missing", names.NOISE, more)
+    return {"noise_position": place, "noise_of_rows": each, "targets": targets, "noise_orientation": turn}
 
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
@@ -224,8 +215,7 @@ def _too_few(file: str, campaign: Campaign) -> list[str]:
     if distinct >= needed:
         return []
     unknown = [word for word, count in unknowns.items() if count]
-    frames, more = " and ".join(unknown), "s" if len(unknown) > 1 else ""
-    problem = f"too few measurements to find the unknown {frames} frame{more}"
+    problem = f"too few measurements to find the unknown {' and '.join(unknown)} frame{'s' if len(unknown) > 1 else ''}"
     found = f"{campaign.samples} rows with {distinct} different joint configurations"
     expected = f"at least {needed} different configurations"
     if distinct == campaign.samples:
@@ -245,21 +235,21 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
     the others.
     """
     several = columns.targets
+    file, first = table.file, f"x.{several[0]}"
     if names.SIMULATED_POSITION in columns.groups:
         problem, expected = "sim.x, sim.y, sim.z predict one target", "one target, as x y z; or no columns sim.*"
-        found, column = f"{len(several)} targets", f"x.{several[0]}"
-        raise CampaignError(table.file, problem, column=column, found=found, expected=expected)
+        raise CampaignError(file, problem, column=first, found=f"{len(several)} targets", expected=expected)
     points = np.stack([_points(table, number) for number in several], axis=1) * settings.units.length_scale
     kept = telling(points)
     if not kept.any():
         expected = f"{FEWEST} targets or more that are not on a line; or one target, as x y z"
         found = "fewer targets in each, or targets on a line"
-        raise CampaignError(table.file, "no row tells a pose", column=f"x.{several[0]}", found=found, expected=expected)
+        raise CampaignError(file, "no row tells a pose", column=first, found=found, expected=expected)
     seen = posed(several, points[kept])
     if seen is None:
         rarest = several[int(np.argmin(np.isfinite(points[kept, :, 0]).sum(axis=0)))]
         problem = "a target is never seen together with three others: its place cannot be found"
-        raise CampaignError(table.file, problem, column=f"x.{rarest}", expected="rows that show it beside them")
+        raise CampaignError(file, problem, column=f"x.{rarest}", expected="rows that show it beside them")
     warnings = []
     if settings.tool_known:
         warnings.append('where several targets sit on the tool is fitted: tool = "known" counts as "unknown"')
@@ -286,15 +276,12 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
     noise, found = settings.noise_position, []
     astray = told.deviation > ASTRAY * max(sigma, noise or 0.0)
     if astray.any():
-        found.append(
-            f"the targets do not keep their places on the tool in {table.listed_rows(astray)}, by up to "
-            f"{float(told.deviation.max()) / scale:.3g} {unit}: is one of them exchanged for another, or has one moved?"
-        )
+        far = f"{table.listed_rows(astray)}, by up to {float(told.deviation.max()) / scale:.3g} {unit}"
+        asked = "is one of them exchanged for another, or has one moved?"
+        found.append(f"the targets do not keep their places on the tool in {far}: {asked}")
     if noise and sigma > LOOSE * noise:
-        found.append(
-            f"the targets move against each other by {sigma / scale:.3g} {unit} per axis, which is more than the "
-            f"stated noise of {noise / scale:.3g} {unit}"
-        )
+        more = f"more than the stated noise of {noise / scale:.3g} {unit}"
+        found.append(f"the targets move against each other by {sigma / scale:.3g} {unit} per axis, which is {more}")
     return found
 
 

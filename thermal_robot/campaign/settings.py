@@ -146,13 +146,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
 
 
 def given(call: str, name: str, value: Any, kind: Kind) -> Any:
-    """Argument of a call, validated against its schema; errors name the argument.
-
-    Raises
-    ------
-    CampaignError
-        Naming the call and the argument, what was found and what is expected.
-    """
+    """Argument of a call, validated against its schema; a :class:`CampaignError` names the call and the argument."""
     try:
         return kind(value, name)
     except MisfitError as error:

@@ -214,6 +214,11 @@ NO_TABLES = {
     **dict.fromkeys((".src", ".ls", ".mod", ".modx", ".tp"), "a robot's program"),
 }
 """Endings of files that people have beside a table and that hold none, and what they are."""
+_PACKED = (
+    (b"PK\x03\x04", "is a workbook or an archive", "a name that ends in .xlsx or .ods, or the table as CSV or Parquet"),
+    (b"PAR1", "is a Parquet file by its contents", "a name that ends in .parquet"),
+)
+"""First bytes of files that are no text, what they are, and what helps."""
 TABLES = {".csv": "", **dict.fromkeys(PARQUET, "pyarrow"), ".xlsx": "openpyxl", ".ods": "odf"}
 """Endings of tables that are written, and the module that writes each."""
 TYPED = tuple(ending for ending, module in TABLES.items() if module)
@@ -256,26 +261,27 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
         No such file, an empty one, a header without rows, a row with too few or too many fields, a duplicate
         column.
     """
-    file = str(path)
+    file, ending = str(path), path.suffix.lower()
     if not is_file(path):
         problem = "is a directory" if is_folder(path) else "there is no such file"
         raise CampaignError(file, problem, expected="the table of measurements")
     if path.stat().st_size > LARGEST_TABLE:
         raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
-    ending = path.suffix.lower()
     if what := NO_TABLES.get(ending):
         expected = "CSV, Parquet, .xlsx, .ods or .mat; `thermal-robot import --help` lists what else is read"
         raise CampaignError(file, f"is {what} by its ending, and no table", found=path.suffix, expected=expected)
-    if ending == MATLAB:
-        return _read_matlab(path)
-    if ending in PARQUET:
-        return _read_parquet(path)
     if ending in WORKBOOKS:
         return _read_workbook(path, layout)
+    if ending in (MATLAB, *PARQUET):
+        return _read_matlab(path) if ending == MATLAB else _read_parquet(path)
     try:
-        encoding = _encoding(path)
+        with path.open("rb") as stream:
+            head = stream.read(4)
+        for start, what, expected in _PACKED:
+            if head.startswith(start):
+                raise CampaignError(file, what, expected=expected)
         try:
-            return _read_text(path, layout, encoding)
+            return _read_text(path, layout, "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig")
         except UnicodeDecodeError:
             # spreadsheets still write the Windows code page; only letters outside ASCII differ
             odd = f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents"
@@ -290,18 +296,6 @@ def without_library(file: str, ending: str) -> CampaignError:
     if ending in WORKBOOKS:
         extra, problem = "excel", f"workbooks need {WORKBOOKS[ending]}, which is not installed"
     return CampaignError(file, problem, expected=f'pip install "thermal-robot[{extra}]", or the table as CSV')
-
-
-def _encoding(path: Path) -> str:
-    """Detect the encoding of a text by its first bytes; binary data are refused."""
-    with path.open("rb") as stream:
-        head = stream.read(4)
-    if head == b"PK\x03\x04":
-        expected = "a name that ends in .xlsx or .ods, or a table saved as CSV or Parquet"
-        raise CampaignError(str(path), "is a workbook or an archive", expected=expected)
-    if head == b"PAR1":
-        raise CampaignError(str(path), "is a Parquet file by its contents", expected="a name that ends in .parquet")
-    return "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
 
 
 def _read_text(path: Path, layout: Layout, encoding: str) -> Table:
@@ -451,9 +445,9 @@ def _separator(lines: Iterator[str]) -> str:
     """Detect the separator in the first line: white space where no other is in it, nor in the next line."""
     held = (line for line in lines if line.strip())
     header, line = next(held, ""), next(held, "")
-    parts = header.split()
-    figures = all(_DECIMAL_COMMA.fullmatch(part) or "," not in part for part in parts)
-    blanks = len(parts) > 1 and figures and len(line.split()) in (0, len(parts))
+    parts, rest = header.split(), line.split()
+    blanks = len(parts) > 1 and len(rest) in (0, len(parts))
+    blanks = blanks and all(_DECIMAL_COMMA.fullmatch(part) or "," not in part for part in parts)
     return next((each for each in (";", "\t") if each in header), SPACE if blanks else ",")
 
 
@@ -505,11 +499,10 @@ def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
     if len(header) > MOST_COLUMNS:
         expected = f"at most {MOST_COLUMNS}: leave out those that do not bear on the measurements"
         raise CampaignError(file, "too many columns", row=number, found=str(len(header)), expected=expected)
-    for name, count in Counter(header).items():
-        if not name:
-            found = f"column {header.index('') + 1} without one"
-            raise CampaignError(file, "a column has no name", row=number, found=found)
-        if count > 1:
-            problem = f"duplicate column{without_names(header, file)}"
-            told = {"found": f"it {count} times", "expected": "every column once"}
-            raise CampaignError(file, problem, row=number, column=name, **told)
+    if "" in header:
+        found = f"column {header.index('') + 1} without one"
+        raise CampaignError(file, "a column has no name", row=number, found=found)
+    name, count = Counter(header).most_common(1)[0] if header else ("", 0)
+    if count > 1:
+        problem, found = f"duplicate column{without_names(header, file)}", f"it {count} times"
+        raise CampaignError(file, problem, row=number, column=name, found=found, expected="every column once")

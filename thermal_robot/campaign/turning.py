@@ -21,11 +21,6 @@ def moves(q: Array) -> NDArray[np.bool_]:
     """Mask (n,) of the joints that move, of positions (N, n) in rad or m; one boolean for one joint's (N,).
 
     One that stays within :data:`~thermal_robot.campaign.settings.STILL` is held, whatever its encoder reads.
-
-    Examples
-    --------
-    >>> moves(np.array([[0.5, 0.300001], [0.7, 0.299999]])).tolist()
-    [True, False]
     """
     return np.asarray(np.ptp(q, axis=0) > STILL if len(q) else np.zeros(q.shape[1:], dtype=bool))
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,22 +20,13 @@ from thermal_robot.campaign.table import PARQUET, TABLES, WORKBOOKS, without_lib
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.files import whole, write_text
+from thermal_robot.files import whole, write_one, write_text
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TABLE_NAME, PLAN_NAME, ROBOT_NAME = "measurements.csv", "plan.csv", "robot.urdf"
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """Turn a failure to write into an error with the path."""
-    try:
-        yield
-    except OSError as error:
-        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
 
 def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Sequence[str] = ()) -> Path:
@@ -123,11 +113,14 @@ def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
 
     file = folder / FILE_NAME
     remarks = "".join(f"# {' '.join(comment.split())}\n" for comment in comments)
+
+    def write(folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / ROBOT_NAME, campaign.robot.urdf)
+        write_text(file, remarks + tomli_w.dumps(_document(campaign)))
+
     try:
-        with _writing(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            write_text(folder / ROBOT_NAME, campaign.robot.urdf)
-            write_text(file, remarks + tomli_w.dumps(_document(campaign)))
+        write_one(str(folder), write)
     except ValueError as error:  # NUL in a name
         raise CampaignError(str(folder), f"cannot be written: {error}") from error
     return file
@@ -140,8 +133,12 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
 
 def _write(path: Path, write: Callable[..., Any], **how: str) -> None:
     """Write a data frame by one of its methods, as a whole or not at all."""
-    with _writing(path), whole(path) as place:
-        write(place, index=False, **how)
+
+    def put(target: Path) -> None:
+        with whole(target) as place:
+            write(place, index=False, **how)
+
+    write_one(str(path), put)
 
 
 def with_prediction(

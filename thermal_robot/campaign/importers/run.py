@@ -62,16 +62,8 @@ def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
     """Import files of a format and write them as a campaign.
 
-    The directory is made if need be; a campaign in it is replaced where it was imported, too. ``plan`` is what the user
-    says beyond the files; it counts for more than what the format says.
-
-    Raises
-    ------
-    CampaignError
-        Files that cannot be used or would be overwritten, a folder that cannot be written, or that holds a campaign
-        which was not imported: it may hold what was measured, and nothing else does.
-    RobotError
-        A robot that cannot be loaded.
+    The directory is made if need be; a campaign in it is replaced where it was imported, too: what was measured may be
+    in any other, and nowhere else. ``plan`` is what the user says beyond the files; it counts for more than the format.
     """
     require_imported(files, directory, (FILE_NAME, TABLE_NAME, ROBOT_NAME))
     given = plan or Plan()
