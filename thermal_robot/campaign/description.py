@@ -52,7 +52,12 @@ def _facts(campaign: Any) -> Iterator[Sequence[str]]:
         yield "samples", f"{campaign.samples}, to be predicted"
         return
     if campaign.position is None:
-        yield from _of_kinds(campaign)
+        for kind in campaign.kinds:
+            here = campaign.labels["kind"] == kind
+            labels = names.KINDS[kind][1]
+            shared = (f"{len(np.unique(campaign.labels[label][here]))} of {label!r}" for label in labels)
+            yield f"rows of {kind}", ", ".join([str(int(here.sum())), *shared])
+        yield "noise of position", _noise_of_position(campaign)
         return
     what = "position and orientation" if campaign.measures == "pose" else "position only"
     what = what if campaign.targets is None else f"{len(campaign.targets.numbers)} targets, which tell a pose"
@@ -77,15 +82,6 @@ def _facts(campaign: Any) -> Iterator[Sequence[str]]:
     for name, sizes in (("gear ratios", campaign.gears), ("expected sizes", campaign.priors)):
         if sizes:
             yield name, ", ".join(f"{of} {size:g}" for of, size in sizes.items())
-
-
-def _of_kinds(campaign: Any) -> Iterator[Sequence[str]]:
-    """Yield how many rows there are of each kind of measurement, and what they share."""
-    for kind in campaign.kinds:
-        here, labels = campaign.labels["kind"] == kind, names.KINDS[kind][1]
-        shared = (f"{len(np.unique(campaign.labels[label][here]))} of {label!r}" for label in labels)
-        yield f"rows of {kind}", ", ".join([str(int(here.sum())), *shared])
-    yield "noise of position", _noise_of_position(campaign)
 
 
 def _joints(campaign: Any) -> Iterator[Sequence[str]]:

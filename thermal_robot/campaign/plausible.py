@@ -208,29 +208,18 @@ ANOTHER_ROBOT = 0.02  # reaches: a simulator of the same robot, however measured
 
 def doubts(campaign: Campaign) -> list[str]:
     """Sentences of all plausibility checks, none for an ordinary campaign."""
-    marked, lost = marks(campaign)
+    (marked, lost), robot = marks(campaign), campaign.robot
     seen = campaign.take(~marked) if marked.any() else campaign
-    checks = (_limits, _conditions, _pose_labels, _noise)
-    return [
-        *_beside(campaign),
-        *lost,
-        *doubled(campaign),
-        *_angle_unit(campaign),
-        *([*_length_unit(seen)] or _apart(seen)),
-        *(sentence for check in checks for sentence in check(campaign)),
-        *_rounded(seen),
-        *_grid(campaign),
-        *_simulator(campaign),
-    ]
-
-
-def _beside(campaign: Campaign) -> Iterator[str]:
-    """Note on joints of the chain that follow a joint outside it."""
-    robot = campaign.robot
+    told = []
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
         word, verb = ("joint", "mimics") if len(led) == 1 else ("joints", "mimic")
-        yield f"{word} {listed(led)} of the chain {verb} {joint!r}, which is outside the chain: its column is read"
+        told.append(
+            f"{word} {listed(led)} of the chain {verb} {joint!r}, which is outside the chain: its column is read"
+        )
+    told += [*lost, *doubled(campaign), *_angle_unit(campaign), *([*_length_unit(seen)] or _apart(seen))]
+    told += [*_limits(campaign), *_conditions(campaign), *_declared(campaign)]
+    return [*told, *_rounded(seen), *_grid(campaign), *_simulator(campaign)]
 
 
 def _angle_unit(campaign: Campaign) -> Iterator[str]:
@@ -377,23 +366,19 @@ def _rows(campaign: Campaign, chosen: NDArray[np.int64]) -> str:
     return f"{len(chosen)} row{'s' if len(chosen) != 1 else ''}, first in row {campaign.rows[chosen[0]]}"
 
 
-def _pose_labels(campaign: Campaign) -> Iterator[str]:
+def _declared(campaign: Campaign) -> Iterator[str]:
+    """Compare the labels of poses and the stated noise with what was commanded and measured."""
     labels = np.empty(0, dtype=str) if campaign.pose_labels is None else campaign.pose_labels
     known = [str(label) for label in np.unique(labels[labels != ""])]
     different = [label for label in known if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND]
     if different:
         yield f"rows with the same pose label have different joint commands: {listed(different, 5)}"
-
-
-def _noise(campaign: Campaign) -> Iterator[str]:
     turn, place = campaign.noise_orientation, campaign.noise_position
     if turn is not None and turn > COARSEST_TURN:
         yield f"the noise of orientation is {turn:.3g} rad, {math.degrees(turn):.3g} degrees: is it in rad?"
     if place is not None and place < FINEST:
-        yield (
-            f"the noise of position is {1e6 * place:.3g} µm, finer than any instrument that measures robots: "
-            f"is it in {campaign.units.length}, as length_unit says?"
-        )
+        finer = f"{1e6 * place:.3g} µm, finer than any instrument that measures robots"
+        yield f"the noise of position is {finer}: is it in {campaign.units.length}, as length_unit says?"
 
 
 def _rounded(campaign: Campaign) -> Iterator[str]:

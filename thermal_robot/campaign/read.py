@@ -537,12 +537,15 @@ def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ..
         expected = "a campaign of the same robot, or a pandas DataFrame of its columns"
         require("update(), rows", rows, (pd.DataFrame,), expected)
         rows = build_campaign(table_from_frame(rows, "<rows>"), old.settings, old.robot, name="rows")
-    _require_same_robot(old, rows)
     theirs = _stated(rows)
     for what, mine in _stated(old).items():
         if mine != theirs[what]:
             expected = f"{mine}, as of {old.name}"
             raise CampaignError(rows.name, f"another {what}", found=str(theirs[what]), expected=expected)
+    if rows.robot is not old.robot:
+        q = np.array([np.zeros(old.robot.n), *np.eye(old.robot.n), np.ones(old.robot.n)])
+        if np.abs(rows.robot.forward(q) - old.robot.forward(q)).max() > SAME_PLACE:
+            raise CampaignError(rows.name, "another nominal model", expected="the same URDF and tool frame")
     if old.targets is not None or rows.targets is not None:
         expected = "rows of one target; diagnose all rows together"
         raise CampaignError(rows.name, "several targets of each pose, whose places all rows tell", expected=expected)
@@ -557,6 +560,7 @@ def _stated(campaign: Campaign) -> dict[str, object]:
     """Return the declarations that old and new rows must share, by name."""
     own = campaign.simulated_position is not None
     return {
+        "robot, by its joints": ", ".join(campaign.robot.joint_names),
         "kind of measurement": campaign.measures,
         "base frame": "known" if campaign.base_known else "unknown",
         "tool frame": "known" if campaign.tool_known else "unknown",
@@ -566,16 +570,3 @@ def _stated(campaign: Campaign) -> dict[str, object]:
         "reference temperature": campaign.reference_temperature,
         "prediction": "of the user's simulator" if own else "of the URDF",
     }
-
-
-def _require_same_robot(old: Campaign, rows: Campaign) -> None:
-    """Refuse rows of another chain: other joints, or another forward kinematics."""
-    mine, theirs = old.robot, rows.robot
-    if theirs is mine:
-        return
-    if theirs.joint_names != mine.joint_names:
-        found, expected = ", ".join(theirs.joint_names), ", ".join(mine.joint_names)
-        raise CampaignError(rows.name, "another robot: its joints differ", found=found, expected=expected)
-    q = np.array([np.zeros(mine.n), *np.eye(mine.n), np.ones(mine.n)])
-    if np.abs(theirs.forward(q) - mine.forward(q)).max() > SAME_PLACE:
-        raise CampaignError(rows.name, "another nominal model", expected="the same URDF and tool frame")

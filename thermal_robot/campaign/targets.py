@@ -78,7 +78,11 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     if np.isnan(found).any():
         return None
     middle = found - found.mean(axis=0)
-    places = middle @ _axes(middle).T
+    axes = np.linalg.svd(middle)[2][:2]
+    along = middle @ axes.T
+    # principal axes, right-handed: the farthest along each of the first two is in front
+    axes = axes * np.sign(along[np.abs(along).argmax(axis=0), [0, 1]])[:, None]
+    places = middle @ np.vstack([axes, np.cross(*axes)]).T
     motion = align(places, np.nan_to_num(points), seen.astype(float))
     turn, shift = motion[:, :3, :3], motion[:, :3, 3]
     left = np.nan_to_num(points - shift[:, None] - places @ turn.transpose(0, 2, 1))
@@ -89,14 +93,6 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     typical = np.sqrt((spread.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
     targets = Targets(numbers, points, places, spread, typical, sigma)
     return Posed(targets, shift, rotation_to_quaternion(turn), deviation)
-
-
-def _axes(middle: Array) -> Array:
-    """(3, 3) principal axes of the targets, right-handed: the farthest along each of the first two is in front."""
-    axes = np.linalg.svd(middle)[2][:2]
-    along = middle @ axes.T
-    axes = axes * np.sign(along[np.abs(along).argmax(axis=0), [0, 1]])[:, None]
-    return np.vstack([axes, np.cross(*axes)])
 
 
 def _seen(points: Array) -> Mask:

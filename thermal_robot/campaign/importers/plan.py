@@ -353,9 +353,17 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     """
     table = source.table
     columns = _columns(table, plan, robot)
-    plan = plan.over(planned({"measurements": _units(table, columns, robot)}))
+    headed = {name: column.header_unit(table) for name, column in columns.items()}
+    # units of angles and lengths are those in the headers, of the first column that has one
+    said = [headed[name] for name in reversed((*names.POSITION, *robot.joint_names)) if name in headed]
+    kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
+    units = {key: unit for key, kind in kinds.items() for unit in said if unit in kind}
+    plan = plan.over(planned({"measurements": units}))
     settings = plan.settings(robot)
-    columns = {name: _in_units(column, table, unit_of(name, robot, settings.units)) for name, column in columns.items()}
+    for name, column in columns.items():
+        unit = unit_of(name, robot, settings.units)
+        factor = size(headed[name], unit) if unit else None
+        columns[name] = column if factor is None else replace(column, scale=column.scale * factor)
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
     measured = np.full(len(table.rows), not places)  # rows of other kinds are measured without a position
     for axis in places:
@@ -399,19 +407,6 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
         columns = {name: column for name, column in columns.items() if name not in names.ORIENTATION}
         columns |= dict(zip(names.POSITION, orientation.position, strict=False))
     return {**columns, **dict(zip(robot.joint_names, joints, strict=bool(joints))), **stated}
-
-
-def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
-    """Units of angles and lengths in the headers, of the first column that has one."""
-    said = [columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns]
-    kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
-    return {key: unit for key, kind in kinds.items() for unit in reversed(said) if unit in kind}
-
-
-def _in_units(column: Column, table: Table, unit: str) -> Column:
-    """Column converted from its header's unit to the campaign's."""
-    scale = size(column.header_unit(table), unit) if unit else None
-    return column if scale is None else replace(column, scale=column.scale * scale)
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:

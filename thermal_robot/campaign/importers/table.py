@@ -53,16 +53,11 @@ def commands(file: Path, plan: Plan) -> Table:
             table = read_table(file, layout)
         except CampaignError:
             continue
-        if len(table.columns) > 1 and _fits(table):
+        rest = table.take(np.arange(1, len(table.rows)))
+        titled = any(table.first_text(name) == 0 and rest.first_text(name) is None for name in table.columns)
+        if len(table.columns) > 1 and not (table.headless if table.header is not None else titled):
             return table
     return read_table(file, first)
-
-
-def _fits(table: Table) -> bool:
-    if table.header is not None:
-        return not table.headless
-    rest = table.take(np.arange(1, len(table.rows)))
-    return not any(table.first_text(name) == 0 and rest.first_text(name) is None for name in table.columns)
 
 
 def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tuple[str, ...]]:
@@ -256,10 +251,6 @@ _IPA: dict[str, Any] = {
 """What published sets are, as mappings."""
 
 
-def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
-    return Source(read_table(files[0], plan.layout()), planned(_JACOBI))
-
-
 def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
     table, stamp = read_table(files[0], plan.layout()), "Timestamp"
     whole = stamp in table.columns and all(re.fullmatch(r"\d{14}", each) for each in table.text(stamp))
@@ -271,7 +262,7 @@ def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
 JACOBI = Format(
     "the data sets of P. Jacobi: UR5 and WAM, laser tracker",
     "3D_UR5_uncalibrated_grid_cleaned.csv",
-    _jacobi,
+    lambda files, plan: Source(read_table(files[0], plan.layout()), planned(_JACOBI)),
     most=1,
 )
 IPA_UR10 = Format(
