@@ -89,8 +89,9 @@ class Document:
         if not isinstance(content, dict):
             told = {"found": shown(content), "expected": f"a section [{section}]"}
             raise self._error("wrong kind of value", section, **told)
-        known = self.kinds[section]
-        for key in content if isinstance(known, Mapping) else ():
+        kind = self.kinds[section]
+        known = kind if isinstance(kind, Mapping) else content
+        for key in content:
             if key not in known:
                 expected = f"{'one of ' if len(known) > 1 else ''}{', '.join(known)}"
                 raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)

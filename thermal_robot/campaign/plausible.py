@@ -214,9 +214,8 @@ def doubts(campaign: Campaign) -> list[str]:
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
         word, verb = ("joint", "mimics") if len(led) == 1 else ("joints", "mimic")
-        told.append(
-            f"{word} {listed(led)} of the chain {verb} {joint!r}, which is outside the chain: its column is read"
-        )
+        follow = f"{word} {listed(led)} of the chain {verb} {joint!r}"
+        told.append(f"{follow}, which is outside the chain: its column is read")
     told += [*lost, *doubled(campaign), *_angle_unit(campaign), *([*_length_unit(seen)] or _apart(seen))]
     told += [*_limits(campaign), *_conditions(campaign), *_declared(campaign)]
     return [*told, *_rounded(seen), *_grid(campaign), *_simulator(campaign)]

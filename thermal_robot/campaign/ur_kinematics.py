@@ -10,6 +10,7 @@ robot it is of.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,8 @@ def with_kinematics(robot: Robot, file: str | Path) -> Robot:
     """
     from scipy.spatial.transform import Rotation
 
-    held, origins = next(iter(read_yaml(Path(file))), None), {}
+    held: Any = next(iter(read_yaml(Path(file))), None)
+    origins = {}
     for link, k in elements(robot, str(file)).items():
         try:
             # what has an exponent and no point is text to YAML

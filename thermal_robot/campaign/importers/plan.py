@@ -58,7 +58,7 @@ class Column:
             return np.arange(float(rows)) if self.count else np.full(rows, self.value)
         names = [column_name(table, source) for source in self.sources]
         read = [self._instants(table, name) if self.time else table.numbers(name, gaps=True) for name in names]
-        values = np.sum(read, axis=0) * self.scale + self.offset
+        values: Array = np.sum(read, axis=0) * self.scale + self.offset
         return values - np.fmin.reduce(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
@@ -360,10 +360,10 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     units = {key: unit for key, kind in kinds.items() for unit in said if unit in kind}
     plan = plan.over(planned({"measurements": units}))
     settings = plan.settings(robot)
-    for name, column in columns.items():
-        unit = unit_of(name, robot, settings.units)
-        factor = size(headed[name], unit) if unit else None
-        columns[name] = column if factor is None else replace(column, scale=column.scale * factor)
+    for own, column in columns.items():
+        unit = unit_of(own, robot, settings.units)
+        factor = size(headed[own], unit) if unit else None
+        columns[own] = column if factor is None else replace(column, scale=column.scale * factor)
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
     measured = np.full(len(table.rows), not places)  # rows of other kinds are measured without a position
     for axis in places:

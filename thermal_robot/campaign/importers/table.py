@@ -68,7 +68,7 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
     it the rows of both are in the same order. Refused are tables of different lengths without names, a point that is
     commanded twice, and no name in common; messages speak of rows and columns of the measured table.
     """
-    taken, notes = "", (f"rows of {measured.file} and {commanded.file} joined in their order",)
+    taken, notes = "", [f"rows of {measured.file} and {commanded.file} joined in their order"]
     if key:
         taken = _names_of(measured, commanded, key)
         measured, commanded, notes = _by_name(measured, commanded, key, taken)
@@ -88,7 +88,7 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
             raise commanded.error(problem, name, expected="every column in one of the two tables")
         columns |= {called: cells} if name != taken else {}
     header = None if commanded.unnamed else measured.header
-    return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
+    return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), tuple(notes)
 
 
 def _names_of(measured: Table, commanded: Table, key: str) -> str:
@@ -106,19 +106,20 @@ def _names_of(measured: Table, commanded: Table, key: str) -> str:
     return best
 
 
-def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Table, tuple[str, ...]]:
+def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Table, list[str]]:
     """Join by name: the rows of both that belong together, and what was left out."""
     points, called = measured.text(key), commanded.text(taken)
     where = {name: row for row, name in reversed([*enumerate(called)])}
     again = np.array([where[name] != row for row, name in enumerate(called)])
-    problem, first = "a point is commanded more than once", lambda row: commanded.rows[where[called[row]]]
-    commanded.refuse(again, problem, taken, "each name once", lambda row: f"{called[row]!r}, as in row {first(row)}")
+    first = [commanded.rows[where[name]] for name in called]
+    problem, expected = "a point is commanded more than once", "each name once"
+    commanded.refuse(again, problem, taken, expected, lambda row: f"{called[row]!r}, as in row {first[row]}")
     unknown, unmeasured = [name for name in points if name not in where], sorted({*where} - {*points})
     notes = [f"{len(unknown)} points left out, not commanded: {listed(unknown, _FEW)}"] if unknown else []
     if unmeasured:
         notes.append(f"{len(unmeasured)} commands left out, not measured: {listed(unmeasured, _FEW)}")
     order = np.array([where.get(name, -1) for name in points])
-    return measured.take(order >= 0), commanded.take(order[order >= 0]), tuple(notes)
+    return measured.take(order >= 0), commanded.take(order[order >= 0]), notes
 
 
 def _read_table(files: Sequence[Path], plan: Plan) -> Source:
@@ -233,7 +234,7 @@ POINTS = Format(
 )
 
 
-_JACOBI = {
+_JACOBI: dict[str, Any] = {
     "measurements": {"angle_unit": "deg", "length_unit": "mm"},
     "columns": {**{axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}, "order": "step_order"},
 }
