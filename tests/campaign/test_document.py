@@ -152,7 +152,7 @@ def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
     assert found["robot"]["gravity"] == (0.0, 0.0, -9.0)
     assert type(found["robot"]["reference_temperature"]) is float
     assert found["gears"] == {"a": 100.0}
-    for wrong in ("true", "inf", "nan", '"21"'):
+    for wrong in ("true", "inf", "nan", '"21"', "-300"):
         with pytest.raises(CampaignError, match="a number"):
             document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n")
 

@@ -374,7 +374,7 @@ def test_lines_without_a_header(tmp_path):
     np.testing.assert_allclose(joints.values, [[0.1, 0.2], [0.3, 0.4]])
     _, target = read(tmp_path, "1,0,map,1,2,3,\n2,0,map,4,5,6,\n")  # a comma at the end is no field
     np.testing.assert_allclose(target.values, [[1, 2, 3], [4, 5, 6]])
-    with pytest.raises(CampaignError, match="column 'a': a joint of the chain is not recorded, expected all of 'a', 'b'"):
+    with pytest.raises(CampaignError, match="'a': a joint of the chain is not recorded, expected all of 'a', 'b'"):
         read(tmp_path, "1,0,,c,b,.1,.2\n2,0,,c,b,.3,.4\n")
     with pytest.raises(CampaignError, match="neither joint states nor poses are recognised"):
         read(tmp_path, "1,0,map,1,2\n2,0,map,1,2\n")
