@@ -83,12 +83,10 @@ def _said(value: Any, path: str) -> str:
 
 def _pairs(value: Any, path: str) -> Any:
     """Take pairs of sockets with their distance."""
-    expected = 'pairs of sockets with their distance, as [["0", "1", 50.0]]'
-    if not isinstance(value, list) or not all(isinstance(own, list) and len(own) == 3 for own in value):
-        raise MisfitError(path, value, expected)
-    for one, other, length in value:
-        if str(one) == str(other) or not isinstance(length, (int, float)) or not length > 0.0:
-            raise MisfitError(path, [one, other, length], expected)
+    for pair in value if isinstance(value, list) else [value]:
+        fits = isinstance(pair, list) and len(pair) == 3 and isinstance(pair[2], (int, float))
+        if not fits or str(pair[0]) == str(pair[1]) or not pair[2] > 0.0:
+            raise MisfitError(path, pair, 'pairs of sockets with their distance, as [["0", "1", 50.0]]')
     return value
 
 
