@@ -13,13 +13,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
+from typing import TYPE_CHECKING, TextIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.checked import refuse, without_rounding
+from thermal_robot.campaign.checked import first_true, refuse, without_rounding
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
@@ -103,19 +103,15 @@ class Table:
         CampaignError
             Text, a number that is infinite or larger than any, or an empty cell where none may be.
         """
-        held = self._values(column)
-        index = _first_text(held)
-        if index is not None:
-            mixed = self.decimal_comma and "." in str(self.columns[column][index])
+        values, text = self._parsed(column)
+        if text.any():
+            mixed = self.decimal_comma and "." in str(self.columns[column][int(np.argmax(text))])
             expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
-            told = {"found": self._shown(column, index), "expected": expected}
-            raise self.error("text where a number should be", column, index, **told)
-        values = np.array(held, dtype=np.float64)
+            self.refuse(text, "text where a number should be", column, expected)
         empty = np.isnan(values)
         wrong = ~(np.abs(values) <= LARGEST) & ~(gaps & empty)
         if wrong.any():
-            unfilled = len(values) > 1 and bool(empty.all())
-            first = values[np.argmax(wrong)]
+            unfilled, first = len(values) > 1 and bool(empty.all()), values[np.argmax(wrong)]
             problem = "not a finite number" if np.isinf(first) else "larger than anything that is measured"
             lacking = "the column is still to be filled in" if unfilled else "a value is missing"
             self.refuse(wrong, lacking if np.isnan(first) else problem, column, "a number")
@@ -152,30 +148,26 @@ class Table:
 
     def first_text(self, column: str) -> int | None:
         """Index of the first cell that is not a number, ``None`` for a numeric column."""
-        return _first_text(self._values(column))
+        return first_true(self._parsed(column)[1])
 
     def is_empty(self, column: str) -> bool:
         """Whether all cells of the column are empty."""
-        cells = self.columns[column]
-        if isinstance(cells, np.ndarray):
-            return bool(np.isnan(cells).all())
-        return all(cell.lower() in _EMPTY for cell in cells)
+        values, text = self._parsed(column)
+        return bool((np.isnan(values) & ~text).all())
 
-    def _values(self, column: str) -> Any:
-        """Return the number in each cell, NaN for an empty one, ``None`` for text."""
+    def _parsed(self, column: str) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the number in each cell, NaN where there is none, and which cells (N,) are text."""
         cells = self.columns[column]
         if isinstance(cells, np.ndarray):
-            return cells
+            return np.array(cells, dtype=np.float64), np.zeros(len(cells), dtype=bool)
         if not self.decimal_comma and "_" not in "".join(cells):
             try:
-                return [float(cell) for cell in cells]  # nearly every column of nearly every file
+                # nearly every column of nearly every file
+                return np.array([float(cell) for cell in cells]), np.zeros(len(cells), dtype=bool)
             except ValueError:
                 pass
-        return [_number(cell, self.decimal_comma) for cell in cells]
-
-
-def _first_text(values: Any) -> int | None:
-    return None if isinstance(values, np.ndarray) or None not in values else int(values.index(None))
+        found = [_number(cell, self.decimal_comma) for cell in cells]
+        return np.array(found, dtype=np.float64), np.array([number is None for number in found], dtype=bool)
 
 
 def _number(cell: str, comma: bool) -> float | None:
