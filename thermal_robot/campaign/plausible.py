@@ -214,8 +214,8 @@ def doubts(campaign: Campaign) -> list[str]:
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
         word, verb = ("joint", "mimics") if len(led) == 1 else ("joints", "mimic")
-        follow = f"{word} {listed(led)} of the chain {verb} {joint!r}"
-        told.append(f"{follow}, which is outside the chain: its column is read")
+        follows = f"{word} {listed(led)} of the chain {verb}"
+        told.append(f"{follows} {joint!r}, which is outside the chain: its column is read")
     told += [*lost, *doubled(campaign), *_angle_unit(campaign), *([*_length_unit(seen)] or _apart(seen))]
     told += [*_limits(campaign), *_conditions(campaign), *_declared(campaign)]
     return [*told, *_rounded(seen), *_grid(campaign), *_simulator(campaign)]
@@ -376,8 +376,10 @@ def _declared(campaign: Campaign) -> Iterator[str]:
     if turn is not None and turn > COARSEST_TURN:
         yield f"the noise of orientation is {turn:.3g} rad, {math.degrees(turn):.3g} degrees: is it in rad?"
     if place is not None and place < FINEST:
-        finer = f"{1e6 * place:.3g} µm, finer than any instrument that measures robots"
-        yield f"the noise of position is {finer}: is it in {campaign.units.length}, as length_unit says?"
+        yield (
+            f"the noise of position is {1e6 * place:.3g} µm, finer than any instrument that measures robots: "
+            f"is it in {campaign.units.length}, as length_unit says?"
+        )
 
 
 def _rounded(campaign: Campaign) -> Iterator[str]:

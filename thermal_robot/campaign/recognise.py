@@ -198,8 +198,9 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
     _refuse_two_meanings(table, robot)
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
     more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
-    chain = f"every movable joint of the chain from {robot.root_frame!r} to {robot.tool_frame!r}"
-    _require(table, robot.joint_names, f"{chain} needs a column, one that stays where it is, too{more}")
+    ends = f"{robot.root_frame!r} to {robot.tool_frame!r}"
+    why = f"every movable joint of the chain from {ends} needs a column, one that stays where it is, too{more}"
+    _require(table, robot.joint_names, why)
     kinds = _kinds(table, kind) if measured else ()
     plain = measured and not kinds
     targets, warnings = _targets(table, robot) if plain else ((), [])
