@@ -10,8 +10,8 @@ nbformat = pytest.importorskip("nbformat", reason="notebooks need the extra 'tes
 nbclient = pytest.importorskip("nbclient", reason="notebooks need the extra 'test'")
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
-QUICK = {"first_diagnosis", "motion"}
-"""The first steps of either kind; the others run at night."""
+QUICK = {"first_diagnosis"}
+"""The first steps; the others run at night."""
 DATA = "THERMAL_ROBOT_DATA"
 
 

@@ -57,7 +57,8 @@ def with_sag(seed, times=1.0, samples=120):
     return replace(plain, position=real.predicted_position + NOISE * rng.normal(size=(samples, 3)))
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
 def test_an_effect_of_ones_own_is_found_with_its_values_and_its_model_needs_its_covariate(rv_m2, seed):
     data = with_sag(seed)
     found = diagnose(data, effects=[JointSag()])

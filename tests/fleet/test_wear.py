@@ -156,6 +156,7 @@ def three(rv_m2):
     return problem(fitted(*(campaign(rv_m2, seed) for seed in (1, 2, 3))))
 
 
+@pytest.mark.slow
 def test_where_instrument_and_target_stand_means_nothing(rv_m2, three):
     here, there = three, problem(fitted(*(campaign(rv_m2, seed, place=seed) for seed in (1, 2, 3))))
     assert here.keys == there.keys
@@ -202,6 +203,7 @@ def test_another_robot_is_refused(rv_m2):
         require_alike(fitted(campaign(rv_m2, 1), campaign(other, 2)))
 
 
+@pytest.mark.slow
 def test_links_that_lag_follow_the_record_of_each_campaign():
     """Each campaign by itself says what was at work, whichever one has the setting that all are followed by."""
     for days in (lagging_days(), lagging_days()[:2][::-1]):

@@ -379,6 +379,7 @@ def test_an_axis_bears_the_unit_of_what_was_recorded(name, label):
     assert plot_remainder(follows(name, joint_names=tuple(joints), rows=known)).axes[5].get_xlabel() == label
 
 
+@pytest.mark.slow
 def test_a_diagnosis_knows_the_unit_of_a_joint_that_slides(awkward):
     found = diagnose(simulate(awkward, ["drift"], seed=3, moving=True)[0], only=["drift"])
     for joint, kind in zip(awkward.joint_names, awkward.joint_types, strict=True):

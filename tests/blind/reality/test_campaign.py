@@ -106,6 +106,7 @@ def test_an_unlisted_cause_comes_with_its_places_and_quantities(case, tmp_path):
     assert truth["parts"]["slip"]["places"] == [place]
 
 
+@pytest.mark.slow
 def test_motors_wheels_come_with_the_ratio_that_shows_them(case, tmp_path):
     """A draw with a disc on the motor's side states its ratio; one on the joint's side states none."""
     stated = set()
