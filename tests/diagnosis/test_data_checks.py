@@ -33,19 +33,6 @@ def test_a_table_pasted_twice_is_not_taken_for_repeats(clean):
     assert any(warning.startswith("60 rows (62, 63, 64, 65, 66 …) repeat another") for warning in found.warnings)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("spoilt", "said"),
-    [("mirrored", "The table is at fault, not the robot"), ("scrambled", "Robot and table do not describe the same")],
-)
-def test_another_robots_table_is_said_to_be_that(clean, spoilt, said):
-    position = clean.position * [1, -1, 1] if spoilt == "mirrored" else clean.position[::-1]
-    found = diagnose(replace(clean, position=position))
-    assert found.summary.startswith(said)
-    assert not found.usable
-    assert found.unexplained.flagged
-
-
 def test_noise_stated_ten_times_too_large_is_remarked(clean):
     found = diagnose(replace(clean, noise_position=200e-6))
     assert any("stated too large" in warning for warning in found.warnings)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from simulate import simulate
 
 from thermal_robot import CampaignError, EffectError, diagnose
@@ -148,7 +149,9 @@ def installed(monkeypatch, name, thing):
     monkeypatch.setattr(catalogue, "entry_points", lambda group: {"thermal_robot.effects": [point]}[group])
 
 
-@pytest.mark.parametrize("thing", [JointSag, JointSag()], ids=["class", "instance"])
+@pytest.mark.parametrize(
+    "thing", [JointSag, pytest.param(JointSag(), marks=pytest.mark.slow)], ids=["class", "instance"]
+)
 def test_an_installed_effect_stands_in_the_library_and_is_diagnosed(monkeypatch, thing):
     installed(monkeypatch, "sag", thing)
     assert names(["joint_sag"]) == ["joint_sag"]
@@ -182,7 +185,7 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("case", BROKEN)
+@pytest.mark.parametrize("case", some(BROKEN, 4))
 def test_a_broken_entry_point_warns_by_name_and_is_left_out(rv_m2, monkeypatch, case):
     thing, words = BROKEN[case]
     sound, data = library(), simulate(rv_m2, ["joint_gain"], samples=60, seed=1, ratio=(5.0, 6.0))[0]
