@@ -173,6 +173,7 @@ def test_where_instrument_and_target_stand_means_nothing(rv_m2, three):
     np.testing.assert_allclose(moved.matrices, here.matrices, rtol=2e-3, atol=1e-3 * here.matrices.max())
 
 
+@pytest.mark.slow
 def test_zeros_are_followed_whatever_was_named_and_nil_where_unknown_frames_take_them_up(rv_m2, three):
     assert [name for _, name in three.keys][:5] == [f"zero offset, joint_{k}" for k in range(1, 6)]
     assert not three.matrices[:, 0].any()

@@ -88,6 +88,7 @@ def test_processes_keep_nothing_of_where_they_were_and_have_one_thread_for_matri
     assert set().union(*cluster.run(threads).values()) == {1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("work", "more", "ended"), some([(square_in_time, (30.0, 1.0), {3}), (square, (0.05, (3, 4)), {3, 4})], 2)
 )

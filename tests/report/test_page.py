@@ -202,6 +202,7 @@ def test_a_notebook_shows_the_fragment(written):
     assert all(".thermal-robot" in selector for selector in selectors if not selector.startswith("@media"))
 
 
+@pytest.mark.slow
 def test_a_long_campaign_stays_small():
     assert len(html(case("unexplained", samples=12000, rows=rows(12000)))) < 2_000_000
 

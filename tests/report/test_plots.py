@@ -95,6 +95,7 @@ def test_of_a_long_campaign_some_thousand_points_are_drawn(plot_of_rows):
         assert all(len(arrows.U) <= 250 for arrows in axes.collections if hasattr(arrows, "U"))
 
 
+@pytest.mark.slow
 def test_hardly_any_row_and_no_gap_at_all_are_no_failure(plot_of_rows):
     for aside in ((2, 3, 4), (2, 3), ()):
         plot_of_rows(case("unexplained", rows=rows(3, aside=aside), outliers=aside)).draw_without_rendering()
