@@ -128,6 +128,7 @@ print(json.dumps(found), file=sys.stderr)
 """
 
 
+@pytest.mark.slow
 def test_an_examinee_reads_its_own_folder_only_and_knows_no_reality(directory, tmp_path):
     (directory / "campaigns" / "c2" / "way_out").symlink_to(directory / "opened.json")
     (directory / "campaigns" / "c22").mkdir()

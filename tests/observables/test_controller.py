@@ -53,6 +53,7 @@ def test_no_wear_is_looked_for(ur5):
     assert not names & {"backlash", "joint_compliance", "drift", "transmission_error"}
 
 
+@pytest.mark.slow
 def test_another_robot_of_the_family_is_named(ur5):
     other = tr.load_robot("example-robot-data:ur3", "tool0")
     found = tr.diagnose(replace(reported(other), robot=ur5))
