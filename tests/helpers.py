@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from simulate import commands, simulate
 
 from thermal_robot.campaign import Campaign
@@ -80,3 +81,9 @@ def numbers(value):
     if isinstance(value, list):
         return [n for v in value for n in numbers(v)]
     return [value] if isinstance(value, float) else []
+
+
+def some(cases, every):
+    """Parameters of a test: each so-many-th case in an ordinary run, the others among the slow tests."""
+    own = (case if isinstance(case, tuple) else (case,) for case in cases)
+    return [pytest.param(*case, marks=pytest.mark.slow if k % every else ()) for k, case in enumerate(own)]

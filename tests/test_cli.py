@@ -18,7 +18,10 @@ FULL = pytest.mark.skipif(not Path("/dev/full").exists(), reason="has no full de
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals and pipes of POSIX")
 PRINTING = pytest.mark.parametrize(
     "arguments",
-    [("effects",), ("plan", "builtin:rv_m2", "--tool", "tool0", "--rows", "6", "--effects", "backlash", "--json", "-")],
+    [
+        pytest.param(("effects",), marks=pytest.mark.slow),
+        ("plan", "builtin:rv_m2", "--tool", "tool0", "--rows", "6", "--effects", "backlash", "--json", "-"),
+    ],
     ids=["text", "a file that is printed"],
 )
 

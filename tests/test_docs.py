@@ -203,13 +203,19 @@ def said_in_the_program():
     return texts
 
 
+@pytest.mark.slow
 def test_every_message_that_is_explained_is_one_of_the_program():
     page = prose(ROOT / "docs" / "troubleshooting.md")
     messages = re.findall(r"^\| `([^|]+)` \|", page, flags=re.M)
     assert len(messages) >= 30
     texts = {text.replace("`", "") for text in said_in_the_program()}
-    patterns = {message: ".+".join(map(re.escape, message.split("…"))) for message in messages}
-    assert [said for said, pattern in patterns.items() if not any(re.search(pattern, text) for text in texts)] == []
+    unsaid = []
+    for message in messages:
+        parts = message.split("…")
+        pattern = re.compile(".+".join(map(re.escape, parts)))
+        if not any(pattern.search(text) for text in texts if all(part in text for part in parts)):
+            unsaid.append(message)
+    assert unsaid == []
 
 
 # ---- the site

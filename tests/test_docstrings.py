@@ -4,6 +4,8 @@ import doctest
 import inspect
 from types import FunctionType
 
+import pytest
+
 import thermal_robot
 from thermal_robot import correction, effects, iso9283, planning
 
@@ -32,6 +34,8 @@ def examples():
 
 
 EXAMPLES = list(examples())
+DEAR = ("compare", "Comparison", "diagnose_many", "zero_offsets", "Diagnosis.update", "wear", "after_crash")
+"""Examples that diagnose several campaigns: they run at night."""
 HAVING = {test.name for test in EXAMPLES}
 
 
@@ -49,11 +53,12 @@ def test_every_public_name_and_method_has_an_example_and_every_property_is_in_on
     assert missing == []
 
 
-def test_examples_show_what_they_print(monkeypatch, tmp_path, diagnosed_once):
+@pytest.mark.parametrize(
+    "test", [pytest.param(t, id=t.name, marks=[pytest.mark.slow] * (t.name in DEAR)) for t in EXAMPLES]
+)
+def test_an_example_shows_what_it_prints(monkeypatch, tmp_path, diagnosed_once, test):
     monkeypatch.setattr(thermal_robot, "diagnose", diagnosed_once)
     runner, told = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS), []
-    for number, test in enumerate(EXAMPLES):
-        (tmp_path / str(number)).mkdir()
-        monkeypatch.chdir(tmp_path / str(number))
-        runner.run(test, out=told.append, clear_globs=False)
+    monkeypatch.chdir(tmp_path)
+    runner.run(test, out=told.append, clear_globs=False)
     assert runner.summarize(verbose=False).failed == 0, "".join(told)

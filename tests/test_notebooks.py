@@ -10,18 +10,15 @@ nbformat = pytest.importorskip("nbformat", reason="notebooks need the extra 'tes
 nbclient = pytest.importorskip("nbclient", reason="notebooks need the extra 'test'")
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
-QUICK = {"first_diagnosis", "motion"}
-"""The first steps of either kind; the others run at night."""
 DATA = "THERMAL_ROBOT_DATA"
 
 
 def test_there_are_notebooks():
-    assert {path.stem for path in NOTEBOOKS} > QUICK
+    assert {path.stem for path in NOTEBOOKS} > {"first_diagnosis", "motion"}
 
 
-@pytest.mark.parametrize(
-    "path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem not in QUICK)) for p in NOTEBOOKS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs_and_shows_something(path, tmp_path):
     if DATA in path.read_text(encoding="utf-8") and not os.environ.get(DATA):
         pytest.skip(f"{DATA} is not set: it names the folder of the public campaigns")

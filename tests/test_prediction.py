@@ -95,6 +95,7 @@ def test_a_saved_model_is_as_sure(warm):
     assert np.isnan(replace(found.model, spread=None).prediction(fresh).std).all()
 
 
+@pytest.mark.slow
 def test_a_session_that_was_not_seen_is_said_and_widens_the_deviation():
     """Of five sessions, in each of which the tool sits a millimetre elsewhere, and of forty other ones."""
     rng, labels = np.random.default_rng(5), ("a", "b", "c", "d", "e")

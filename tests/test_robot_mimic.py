@@ -43,6 +43,7 @@ def test_the_table_has_no_column_for_what_follows(campaign, tmp_path):
     assert again.robot.joint_names == DRIVEN["parallelogram"]
 
 
+@pytest.mark.slow
 def test_a_zero_of_the_driving_joint_is_found(campaign):
     found = thermal_robot.diagnose(campaign)
     assert found.verdict == ("joint_offset",)
@@ -56,6 +57,7 @@ def test_a_zero_of_the_driving_joint_is_found(campaign):
     assert np.sqrt(((predicted - campaign.position) ** 2).mean()) < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_a_hand_whose_own_zero_is_off_is_no_zero_of_a_drive():
     found = thermal_robot.diagnose(measured(np.zeros(4), turns=10 * OFFSET))
     assert "joint_offset" not in found.verdict

@@ -241,6 +241,7 @@ def file(tmp_path):
     return tmp_path / "mine.py"
 
 
+@pytest.mark.slow
 def test_a_fault_of_ones_own_is_put_into_campaigns(file, tmp_path):
     from thermal_robot.blind.plan import ROBOTS, plan, robots
     from thermal_robot.blind.reality import make

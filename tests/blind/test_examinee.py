@@ -128,6 +128,7 @@ print(json.dumps(found), file=sys.stderr)
 """
 
 
+@pytest.mark.slow
 def test_an_examinee_reads_its_own_folder_only_and_knows_no_reality(directory, tmp_path):
     (directory / "campaigns" / "c2" / "way_out").symlink_to(directory / "opened.json")
     (directory / "campaigns" / "c22").mkdir()
@@ -192,6 +193,7 @@ def test_a_comparison_tells_what_changed(tmp_path):
     assert marks({**record, "said": said})["exact"] == (True,)
 
 
+@pytest.mark.slow
 def test_a_series_tells_the_day(tmp_path):
     days = [f"2026-0{month}-01" for month in range(1, 6)]
     made(tmp_path, [BEFORE] * 3 + [AFTER] * 2, date=days)
@@ -201,6 +203,7 @@ def test_a_series_tells_the_day(tmp_path):
     assert answers["exact"] == answers["day"] == answers["amount"] == (True,)
 
 
+@pytest.mark.slow
 def test_a_fleet_tells_what_is_shared_and_who_stands_out(tmp_path):
     pytest.importorskip("pyarrow", reason='fleets need "thermal-robot[fleet]"')
     sizes = (1.0e-3, 1.1e-3, 0.9e-3, 1.05e-3, 0.95e-3, 1.0e-3)
@@ -265,6 +268,7 @@ def test_a_model_without_effects_has_no_parts(model):
     assert refitted(bare, campaign, samples) == {}
 
 
+@pytest.mark.slow
 def test_known_frames_are_not_fitted(model):
     """Without effects and without unknown frames nothing is fitted: the nominal robot predicts."""
     _, campaign, samples, _, _ = model

@@ -166,6 +166,7 @@ def test_a_long_answer_hangs_under_its_head(plain):
     assert sum(line.count("word") for line in (first, *rest)) == 40
 
 
+@pytest.mark.slow
 def test_several_campaigns_are_told_by_what_changes(plain, several, page):
     told = text(several)
     assert re.search(

@@ -211,6 +211,7 @@ def coverage(*records):
     return score(records)["coverage"]
 
 
+@pytest.mark.slow
 def test_who_states_the_spread_that_he_has_holds_95_percent_and_who_halves_it_does_not():
     errors = np.random.default_rng(1).normal(size=4000)
     honest, boast = (coverage(*(measured(estimate(e, std)) for e in errors))["parameters"] for std in (1.0, 0.5))

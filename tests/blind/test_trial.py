@@ -111,6 +111,7 @@ def test_an_effect_that_is_taken_from_the_library_is_described_less_well(tmp_pat
     assert records[0]["fresh"]["rms_after"] < 0.7 * records[1]["fresh"]["rms_after"]
 
 
+@pytest.mark.slow
 def test_a_campaign_of_the_trials_own_world_is_made_twice_to_the_same_byte(tmp_path):
     pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
     from thermal_robot.blind import reality

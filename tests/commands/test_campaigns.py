@@ -204,6 +204,7 @@ def test_an_output_that_fails_does_not_take_the_others_with_it(run, folder, tmp_
     assert not outputs["--report"].exists()
 
 
+@pytest.mark.slow
 def test_the_demo_prints_and_draws(run, tmp_path, monkeypatch):
     page = tmp_path / "demo.html"
     status, out, err = run("demo", "--report", page)
@@ -219,6 +220,7 @@ def test_the_demo_prints_and_draws(run, tmp_path, monkeypatch):
     assert out.startswith("The gap of ")
 
 
+@pytest.mark.slow
 def test_the_program_itself_exits_as_it_should(folder, tmp_path):
     def program(*arguments):
         command = [sys.executable, "-m", "thermal_robot.cli", *map(str, arguments)]

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pytest
 import ur_arm
 from commanded import refused, table
 from readers import by_mujoco, held, model_of
@@ -87,6 +88,7 @@ def test_predict_reads_and_writes_streams(run, folder, diagnosed, stdin, tmp_pat
     refused(run("predict", model, "-", "-o", "-"), "standard input, row 4", "wrong")
 
 
+@pytest.mark.slow
 def test_units_of_the_campaign_are_units_of_its_prediction(run, folder, tmp_path):
     campaign = read_campaign(folder)
     write_campaign(replace(campaign, units=type(campaign.units)("deg", "um")), tmp_path / "um")

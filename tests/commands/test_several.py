@@ -53,6 +53,7 @@ def test_one_campaign_and_another_robot_are_bad_input(run, days, tmp_path):
     assert run("compare", days / "before", days / "none")[0] == 2
 
 
+@pytest.mark.slow
 def test_a_model_file_stands_for_its_campaign(run, days, tmp_path):
     model, page = tmp_path / "before.model.json", tmp_path / "c.html"
     assert run("diagnose", days / "before", "--only", *ONLY, "--model", model)[0] == 0

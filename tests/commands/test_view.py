@@ -76,6 +76,7 @@ def test_it_is_served_to_this_machine_alone_until_it_is_interrupted():
     assert err == "thermal-robot: interrupted; nothing was left half written\n"
 
 
+@pytest.mark.slow
 def test_another_port_is_taken_where_this_one_is_and_the_diagnosis_is_shown(run, monkeypatch):
     pytest.importorskip("viser", reason=VIEWER)
     seen = []

@@ -7,6 +7,7 @@ import denavit
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from readers import model_of
 from simulate import simulate
 
@@ -268,7 +269,7 @@ def test_what_frames_can_take_up_or_the_model_does_not_hold_is_not_told(rv_m2, e
     assert not table["add_to_command"][[word != TOLD for word in said]].any()
 
 
-@pytest.mark.parametrize("turning", [None, 3e-5])
+@pytest.mark.parametrize("turning", some([None, 3e-5], 2))
 def test_zeros_inside_geometry_are_those_of_the_diagnosis(turning):
     """And the true ones, which were put there with the errors of axes beside them."""
     campaign, truth = denavit.off(load_arm("ur10"), 3, turning=turning)

@@ -1,11 +1,13 @@
 """The corrected model: near the truth where nothing was measured, saved without loss, exact in what it needs."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
 import pytest
 from conftest import load_arm
+from helpers import some
 from readers import model_of
 from simulate import simulate
 
@@ -22,7 +24,6 @@ MIXTURES = {
     "hand": ["joint_compliance", "instrument_scale"],
     "morning": ["drift", "transmission_error"],
 }
-on_arms = pytest.mark.parametrize("arm", ["ur10", pytest.param("panda", marks=pytest.mark.slow)], indirect=True)
 
 
 def corrected(robot, effects, seed=1, turning=None, only=None):
@@ -36,25 +37,29 @@ def hall(rv_m2):
     return corrected(rv_m2, MIXTURES["hall"])
 
 
-@on_arms
-def test_predictions_are_within_half_a_noise_of_the_truth(arm):
-    misses = {}
-    for name, effects in MIXTURES.items():
-        _, model, fresh, place = corrected(arm, effects)
-        predicted, orientation = model.prediction(fresh)[:2]
-        assert orientation is None
-        misses[name] = np.sqrt(((predicted - place) ** 2).mean()) / NOISE
-    assert max(misses.values()) < 0.5, misses
+@pytest.mark.parametrize(
+    ("arm", "effects"), some(product(("ur10", "panda"), (MIXTURES["hand"], *MIXTURES.values())), 12), indirect=["arm"]
+)
+def test_predictions_are_within_half_a_noise_of_the_truth(arm, effects):
+    _, model, fresh, place = corrected(arm, effects)
+    predicted, orientation = model.prediction(fresh)[:2]
+    assert orientation is None
+    assert np.sqrt(((predicted - place) ** 2).mean()) < 0.5 * NOISE
 
 
 @pytest.mark.parametrize(
     ("effect", "needs"),
     [
-        ("geometric", set()),
-        ("thermal_elongation", {"temperature"}),
-        ("drift", {"time"}),
         ("backlash", None),
-        ("joint_compliance", {"payload"}),
+        *(
+            pytest.param(name, needs, marks=pytest.mark.slow)
+            for name, needs in (
+                ("geometric", set()),
+                ("thermal_elongation", {"temperature"}),
+                ("drift", {"time"}),
+                ("joint_compliance", {"payload"}),
+            )
+        ),
     ],
 )
 def test_a_model_needs_what_its_effects_read_and_nothing_more(rv_m2, effect, needs):
@@ -173,7 +178,8 @@ def test_an_order_is_taken_at_its_word_unless_it_starts_again(rv_m2):
     assert again.last_order == model.last_order == (0.0, 119.0)
 
 
-@on_arms
+@pytest.mark.slow
+@pytest.mark.parametrize("arm", ["ur10", "panda"], indirect=True)
 def test_orientation_is_predicted_where_it_was_measured(arm):
     """A campaign of poses is corrected in both: the target's direction within half a noise of the truth."""
     campaign, _, _ = simulate(arm, ["geometric"], seed=4, turning=TURNING, ratio=(4.0, 6.0), samples=220)
@@ -198,6 +204,7 @@ def test_orientation_does_not_depend_on_the_sign_of_quaternions(rv_m2):
     np.testing.assert_allclose(other.prediction(campaign)[0], one.prediction(campaign)[0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
     """The user's simulator has the robot's true lengths, the URDF has not; both have the wrong zeros."""
     campaign, _, (fresh, place) = simulate(rv_m2, ["joint_offset"], seed=6, fresh=100)
@@ -215,6 +222,7 @@ def test_a_simulators_prediction_is_corrected_and_needed(rv_m2):
         found.model.predict(fresh)
 
 
+@pytest.mark.slow
 def test_more_columns_than_the_campaign_had_change_no_prediction():
     campaign, _, (fresh, _) = simulate(load_arm("ur10"), ["backlash"], samples=100, seed=5, fresh=20)
     first = f"approach.{campaign.robot.joint_names[0]}"

@@ -266,6 +266,7 @@ def test_zeros_that_are_found_against_the_simulator_mend_it(tmp_path):
     assert diagnose(mended).verdict == ()
 
 
+@pytest.mark.slow
 def test_geometry_that_is_found_mends_the_simulator_where_nothing_was_measured():
     arm = load_arm("rv_m2")
     campaign = real_robot(arm, 5, misplaced=4e-4, samples=240)

@@ -5,7 +5,6 @@ from itertools import combinations
 from math import factorial
 
 import numpy as np
-import pytest
 
 from thermal_robot.diagnosis.cross_validation import Model
 from thermal_robot.inference.columns import Block
@@ -81,9 +80,3 @@ def forced(known, item):
     assert said.best.blocks == tuple(every)
     effects = tuple((b.effect, said.values[k][0]) for k, b in enumerate(linear.blocks))
     return replace(known, explanation=said, effects=effects, families=families)
-
-
-def some(cases, every):
-    """Parameters of a test: each so-many-th case in an ordinary run, the others among the slow tests."""
-    own = (case if isinstance(case, tuple) else (case,) for case in cases)
-    return [pytest.param(*case, marks=pytest.mark.slow if k % every else ()) for k, case in enumerate(own)]

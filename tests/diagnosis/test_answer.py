@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers import disturbed, with_law
+from helpers import disturbed, some, with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
@@ -46,6 +46,7 @@ def test_the_parts_agree_with_each_other(hall):
     assert np.sqrt((rows.remainder[inside] ** 2).sum(axis=1).mean()) == pytest.approx(hall.gap.rms_after)
 
 
+@pytest.mark.slow
 def test_orientation_has_figures_where_it_was_measured(rv_m2, hall):
     poses = diagnose(simulate(rv_m2, ["joint_offset"], seed=2, turning=3e-5)[0])
     assert poses.measures == "pose"
@@ -55,7 +56,7 @@ def test_orientation_has_figures_where_it_was_measured(rv_m2, hall):
 
 
 def test_what_was_not_asked_for_is_not_said(rv_m2):
-    campaign = simulate(rv_m2, seed=2)[0]
+    campaign = simulate(rv_m2, samples=40, seed=2)[0]
     narrow = diagnose(campaign, only=["drift", "encoder_resolution"])
     assert {f.name for f in narrow.effects} == {"drift", "encoder_resolution"}
     assert narrow.narrowed
@@ -67,7 +68,7 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     assert "by request (--without drift encoder_resolution)" in str(without)
 
 
-@pytest.mark.parametrize(("name", "capped"), [("session", True), ("region", True), ("temperature", False)])
+@pytest.mark.parametrize(("name", "capped"), some([("session", True), ("temperature", False), ("region", True)], 2))
 def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2, monkeypatch, name, capped):
     harmful = FoldScheme(name, "one after the other", 4, 60, 1e-4, 2e-4, -3.0, 1e-6)
     monkeypatch.setattr("thermal_robot.diagnosis.answer.worst_folds", lambda fit: (harmful,))
@@ -92,6 +93,7 @@ def found(rv_m2):
     return refit(known, {law.name: (law,) for law in (GONE, SMALL, LARGE)}, [[SMALL, LARGE]])
 
 
+@pytest.mark.slow
 def test_the_largest_share_is_the_first_and_names_agree_wherever_they_stand(found):
     assert {effect.name for effect, _ in found.effects} == {"discovered.2", "discovered.3"}
     before = held_out(found)
@@ -134,7 +136,7 @@ def test_noise_alone_is_less_certain_where_effects_may_be_smaller(rv_m2):
     assert 0.3 < weighed.smaller < weighed.larger < 1.0
 
 
-@pytest.mark.parametrize("times", [0.3, 0.5, 1.5])
+@pytest.mark.parametrize("times", some([0.3, 0.5, 1.5], 3))
 def test_at_the_stated_sizes_it_is_the_probability_itself(rv_m2, monkeypatch, times):
     """Among the explanations that are compared again."""
     known = fitted(rv_m2, times)

@@ -17,7 +17,7 @@ from thermal_robot.report import schema, text
 NOISE = 12e-6
 
 
-@pytest.fixture(scope="module", params=[None, 3e-5], ids=["positions", "poses"])
+@pytest.fixture(scope="module", params=[None, pytest.param(3e-5, marks=pytest.mark.slow)], ids=["positions", "poses"])
 def repeated(request, rv_m2):
     """A joint's zero is off; five of sixty poses are measured ten times."""
     once = simulate(rv_m2, ["joint_offset"], samples=60, seed=11, noise=NOISE, ratio=(8, 12), turning=request.param)[0]
@@ -57,6 +57,7 @@ def test_text_and_json_have_it(repeated, found):
     assert "\n\nISO 9283\n" in text(found)
 
 
+@pytest.mark.slow
 def test_a_table_that_does_not_fit_or_without_repeats_has_none(repeated):
     # a table that does not fit the robot has none
     spoilt = diagnose(replace(repeated, position=repeated.position[:, [1, 0, 2]]), only=["joint_offset"])
@@ -69,6 +70,7 @@ def test_a_table_that_does_not_fit_or_without_repeats_has_none(repeated):
     assert "ISO 9283" not in text(once)
 
 
+@pytest.mark.slow
 def test_what_several_targets_tell_is_turned_back_about_the_axes_of_the_frame(rv_m2):
     """The turn of a pose that is corrected is the same, whichever axes the gap has."""
     poses = simulate(rv_m2, ["joint_offset"], samples=30, seed=5, noise=25e-9, turning=1e-12, ratio=(3e4, 6e4))[0]

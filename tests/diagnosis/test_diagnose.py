@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from diagnosis.simulated import some
+from helpers import some
 from several import FLAT, LONG, simulated, table_of
 from simulate import simulate
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -24,9 +24,15 @@ DOUBTED = ("ur10", "base_compliance")
 """Robot and effect whose probability is an expected failure of its own."""
 COLUMNS = {"tracking_lag": {"moving": True}, "thermal_bending": {"links": True}}
 NOISE = 25e-6
-SLOW_ARMS = [pytest.param(name, marks=pytest.mark.slow) for name in ("ur10", "panda")]
+FEW = [ALONE.index(name) for name in ("joint_offset", "backlash", "geometric", "thermal_elongation")]
+EVERY = range(len(ALONE))
 two_arms = pytest.mark.parametrize("arm", ["rv_m2", pytest.param("ur10", marks=pytest.mark.slow)], indirect=True)
-on_arms = pytest.mark.parametrize("arm", ["rv_m2", *SLOW_ARMS], indirect=True)
+on_arms = pytest.mark.parametrize(
+    ("arm", "seeds"),
+    [("rv_m2", FEW), *(pytest.param(name, EVERY, marks=pytest.mark.slow) for name in ("rv_m2", "ur10", "panda"))],
+    ids=["rv_m2-few", "rv_m2", "ur10", "panda"],
+    indirect=True,
+)
 
 
 @dataclass(frozen=True)
@@ -54,15 +60,20 @@ def diagnosed(robot, effects, seed, **how):
 
 
 @pytest.fixture(scope="module")
-def cases(arm):
-    """Every effect alone on one arm."""
-    return [diagnosed(arm, [name], seed, **COLUMNS.get(name, {})) for seed, name in enumerate(ALONE)]
+def seeds(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def cases(arm, seeds):
+    """Effects alone on one arm: a few of them, or each."""
+    return [diagnosed(arm, [ALONE[seed]], seed, **COLUMNS.get(ALONE[seed], {})) for seed in seeds]
 
 
 @on_arms
 def test_the_verdict_is_the_effect_and_nothing_is_unexplained(cases):
     wrong = {c.name: (c.found.verdict, c.found.unexplained.reasons) for c in cases if not c.right}
-    assert len(wrong) <= 1, wrong
+    assert len(wrong) <= (len(cases) > len(FEW)), wrong
 
 
 @on_arms
@@ -75,7 +86,7 @@ def test_the_rows_set_aside_are_the_spoilt_ones(cases):
         predicted, _ = case.found.model.prediction(case.campaign)[:2]
         distance = np.linalg.norm(case.campaign.position - predicted, axis=1)
         assert (distance[missed] < 10.0 * NOISE).all()
-    assert sum(len(c.truth["outliers"]) for c in cases) > 10
+    assert sum(len(c.truth["outliers"]) for c in cases) >= 2 * len(cases)
     assert falsely <= 0.01 * sum(c.campaign.samples for c in cases)
 
 
@@ -94,7 +105,8 @@ def in_the_parameters_told(case):
     return dict(zip(names, np.linalg.lstsq(stack, moved.ravel(), rcond=1e-10)[0].tolist(), strict=False))
 
 
-@on_arms
+@pytest.mark.slow
+@pytest.mark.parametrize(("arm", "seeds"), [(name, EVERY) for name in ("rv_m2", "ur10", "panda")], indirect=True)
 def test_parameters_are_as_far_from_the_truth_as_they_say(cases):
     standard = []
     for case in (c for c in cases if c.right):
@@ -174,7 +186,7 @@ def test_figures_are_consistent(cases):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arm", ["ur10"], indirect=True)
+@pytest.mark.parametrize(("arm", "seeds"), [("ur10", EVERY)], indirect=True)
 def test_a_soft_base_under_a_ur10_is_as_sure_as_all_others(cases):
     own = next(case.found.finding(case.name) for case in cases if case.name == DOUBTED[1])
     assert own.probability > 0.9
@@ -197,23 +209,26 @@ def test_what_is_not_identified_has_no_number(arm, cases):
     assert any(p.identified for p in offsets)
 
 
-@two_arms
-def test_two_effects_share_the_gap_as_they_caused_it(arm):
+@pytest.mark.parametrize(
+    ("arm", "seed"),
+    [
+        ("rv_m2", 1),
+        *(pytest.param(arm, seed, marks=pytest.mark.slow) for arm, seed in (("rv_m2", 0), ("ur10", 0), ("ur10", 1))),
+    ],
+    indirect=["arm"],
+)
+def test_two_effects_share_the_gap_as_they_caused_it(arm, seed, diagnosed_once):
     """Shares add up to the whole; each is near its part of the mean square, noise included."""
-    apart = []
-    for seed in range(2):
-        both = ["thermal_elongation", "backlash"]
-        campaign, truth, _ = simulate(arm, both, seed=seed, outliers=0.03)
-        found = diagnose(campaign)
-        if set(found.verdict) != set(both):
-            continue
-        square = {name: truth["parts"][name]["rms"] ** 2 for name in both}
-        share = {name: found.finding(name).shrinkage for name in both}
-        assert sum(share.values()) == pytest.approx(found.gap.held_out.shrinkage, abs=0.03)
-        assert list(found.verdict) == sorted(both, key=lambda n: -share[n])
-        apart += [share[name] - square[name] / (sum(square.values()) + 3.0 * NOISE**2) for name in both]
-    assert len(apart) >= 2
-    assert np.abs(apart).max() < 0.15
+    both = ["thermal_elongation", "backlash"]
+    campaign, truth, _ = simulate(arm, both, seed=seed, outliers=0.03)
+    found = diagnosed_once(campaign)
+    assert set(found.verdict) == set(both)
+    square = {name: truth["parts"][name]["rms"] ** 2 for name in both}
+    share = {name: found.finding(name).shrinkage for name in both}
+    assert sum(share.values()) == pytest.approx(found.gap.held_out.shrinkage, abs=0.03)
+    assert list(found.verdict) == sorted(both, key=lambda n: -share[n])
+    for name in both:
+        assert share[name] == pytest.approx(square[name] / (sum(square.values()) + 3.0 * NOISE**2), abs=0.15)
 
 
 # Withheld effects -----------------------------------------------------------------------------------------
@@ -226,7 +241,7 @@ WITHHELD = ("transmission_error", "backlash", "joint_compliance", "geometric", "
 
 @pytest.mark.parametrize(
     ("arm", "alone"),
-    [("rv_m2", CONDITIONS), *(pytest.param(arm, WITHHELD, marks=pytest.mark.slow) for arm in ("rv_m2", "ur10"))],
+    [("rv_m2", ("drift",)), *(pytest.param(arm, WITHHELD, marks=pytest.mark.slow) for arm in ("rv_m2", "ur10"))],
     indirect=["arm"],
 )
 def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm, alone):
@@ -249,9 +264,11 @@ def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm
         placed.append(place.kind == CONDITIONS[name] and (name == "drift" or place.name in faulty))
         expected = {"drift": "time", "backlash": f"approach.{place.name}", "transmission_error": place.name}
         followed.append(quantity == expected[name])
-    assert sum(flagged) >= len(alone) - 1
-    assert len(placed) == len(CONDITIONS)
-    assert sum(placed) + sum(followed) >= 2 * len(CONDITIONS) - 1
+    few = len(set(alone) & set(CONDITIONS))
+    missed = len(alone) > 1
+    assert sum(flagged) >= len(alone) - missed
+    assert len(placed) == few
+    assert sum(placed) + sum(followed) >= 2 * few - missed
 
 
 @pytest.mark.parametrize("arm", ["ur10"], indirect=True)
@@ -268,7 +285,7 @@ def test_a_withheld_effect_that_another_contains_is_carried_by_that(arm, name, s
 @pytest.fixture(scope="module")
 def campaign(rv_m2):
     """Two effects at work, a few rows spoilt."""
-    return simulate(rv_m2, ["thermal_elongation", "backlash"], samples=80, seed=1, outliers=0.03)[0]
+    return simulate(rv_m2, ["thermal_elongation", "backlash"], samples=60, seed=1, outliers=0.03)[0]
 
 
 @pytest.fixture(scope="module")
@@ -317,7 +334,9 @@ def test_a_name_that_no_effect_has_is_named(campaign):
 
 
 @two_arms
-@pytest.mark.parametrize(("effects", "lost"), [(["joint_offset"], 0.1), (["thermal_elongation"], 0.0), ([], 0.1)])
+@pytest.mark.parametrize(
+    ("effects", "lost"), some([(["joint_offset"], 0.1), (["thermal_elongation"], 0.0), ([], 0.1)], 3)
+)
 def test_several_targets_of_each_pose_tell_the_effect(arm, effects, lost):
     """Nothing else, nothing unexplained, and what remains is the noise of their middle."""
     data, _ = simulated(arm, effects, LONG, 3, samples=80, lost=lost)

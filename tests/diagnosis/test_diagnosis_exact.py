@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.simulated import some
+from helpers import some
 from simulate import random_motion, simulate
 
 from thermal_robot import diagnose
@@ -46,7 +46,7 @@ def measured(robot, sizes, seed, noise, turning=None):
     "sizes",
     [
         {"joint_offset": 5e-3},
-        {"geometric": 5e-3},
+        pytest.param({"geometric": 5e-3}, marks=pytest.mark.slow),
         pytest.param(
             {"joint_offset": 5e-3, "backlash": 2e-3, "thermal_elongation": 1e-4},
             marks=pytest.mark.xfail(

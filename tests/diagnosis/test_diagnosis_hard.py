@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.simulated import some
-from helpers import erring, numbers
+from helpers import erring, numbers, some
 from simulate import simulate
 
 import thermal_robot
@@ -42,6 +41,7 @@ def test_too_few_poses_are_refused_and_the_need_is_named(offset, rows):
             diagnose(campaign)
 
 
+@pytest.mark.slow
 def test_seven_poses_without_a_stated_noise_are_diagnosed_without_a_warning(offset):
     """Each is held out once: six others determine the frames."""
     found = diagnose(replace(offset.take(np.arange(7)), noise_position=None))
@@ -50,7 +50,8 @@ def test_seven_poses_without_a_stated_noise_are_diagnosed_without_a_warning(offs
     assert low <= found.gap.held_out.shrinkage <= high <= 1.0
 
 
-@pytest.mark.parametrize("rows", [8, 20, pytest.param(11, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [8, 11, 20])
 def test_few_poses_are_diagnosed_or_refused_but_never_by_accident(offset, rows):
     for stated in (NOISE, None):
         try:
@@ -67,6 +68,7 @@ def test_one_pose_again_and_again_is_refused(offset):
         diagnose(replace(offset, q=np.tile(offset.q[0], (120, 1))))
 
 
+@pytest.mark.slow
 def test_a_perfect_robot_leaves_no_gap_and_no_question(rv_m2):
     """Rounding has a structure, too, but nobody measures 1e-16 m."""
     campaign = simulate(rv_m2, seed=0)[0]
@@ -82,26 +84,8 @@ def test_a_perfect_robot_leaves_no_gap_and_no_question(rv_m2):
     assert not rounded.unexplained.flagged
 
 
-WRONG = {
-    "conjugate": lambda quaternion: quaternion * np.array([1.0, -1.0, -1.0, -1.0]),
-    "scalar last": lambda quaternion: np.roll(quaternion, -1, axis=1),
-    "at random": lambda quaternion: np.random.default_rng(0).normal(size=quaternion.shape),
-}
-
-
-@pytest.mark.parametrize(
-    "convention",
-    ["scalar last", *(pytest.param(name, marks=pytest.mark.slow) for name in ("conjugate", "at random"))],
-)
-def test_orientations_in_another_convention_are_not_explained(rv_m2, convention):
-    campaign = simulate(rv_m2, ["joint_offset"], seed=0, turning=3e-5)[0]
-    wrong = WRONG[convention](campaign.orientation)
-    found = diagnose(replace(campaign, orientation=wrong / np.linalg.norm(wrong, axis=1, keepdims=True)))
-    assert found.unexplained.flagged
-    assert found.gap.orientation_after > 0.1
-
-
-@pytest.mark.parametrize("arm", ["rv_m2", pytest.param("panda", marks=pytest.mark.slow)], indirect=True)
+@pytest.mark.slow
+@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
 def test_joints_in_the_wrong_unit_or_order_are_not_explained(arm):
     campaign = simulate(arm, ["joint_offset"], seed=1)[0]
     degrees = "The table is at fault, not the robot: degrees"
@@ -118,6 +102,7 @@ def test_joints_in_the_wrong_unit_or_order_are_not_explained(arm):
     assert "joint_1 and joint_5" in str(found) or arm.n != 5
 
 
+@pytest.mark.slow
 def test_the_origin_and_the_unit_of_time_do_not_matter(rv_m2):
     campaign = simulate(rv_m2, ["drift"], seed=2)[0]
     plain = diagnose(campaign)
@@ -275,11 +260,11 @@ def test_large_errors_are_told_of_the_model_that_is_saved(rv_m2):
 
 
 AT_WORK = [
+    {"thermal_elongation": 1.2e-5},
     {"joint_offset": 1e-3},
     {"joint_compliance": 1e-5},
     {"backlash": 1e-3},
     {"joint_gain": 1e-3},
-    {"thermal_elongation": 1.2e-5},
 ]
 
 
@@ -287,7 +272,7 @@ def without_noise(at_work):
     return tr.simulate(tr.load_robot("builtin:rv_m2", "tool0"), at_work, rows=60, seed=1)
 
 
-@pytest.mark.parametrize("at_work", some(AT_WORK, 4), ids=["".join(a) for a in AT_WORK])
+@pytest.mark.parametrize("at_work", some(AT_WORK, 5), ids=["".join(a) for a in AT_WORK])
 def test_one_effect_and_no_noise(at_work):
     found = tr.diagnose(without_noise(at_work))
     assert found.verdict == tuple(at_work)

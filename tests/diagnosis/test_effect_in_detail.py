@@ -61,7 +61,7 @@ def test_the_error_of_a_joint_is_a_length_where_it_slides_and_else_an_angle(awkw
 
 
 def test_the_spread_is_that_of_the_points(rv_m2):
-    for name in ("joint_gain", "backlash", "thermal_elongation", "joint_offset"):
+    for name in ("backlash", "joint_offset"):
         _, found, _, _ = shown(rv_m2, name)
         place = found.places[0]
         assert 0.85 < np.std(place.after / place.spread) < 1.15
@@ -176,10 +176,13 @@ def test_gross_errors_are_left_out():
     assert known.explanation.outliers.any()
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 8])
-def test_no_text_meets_another_and_every_axis_has_a_unit(rv_m2, count):
-    _, found, _, _ = shown(rv_m2, "backlash", places=["joint_3"])
-    one = found.places[0]
+@pytest.fixture(scope="module")
+def one(rv_m2):
+    return shown(rv_m2, "backlash", places=["joint_3"])[1].places[0]
+
+
+@pytest.mark.parametrize("count", [1, 4, 8])
+def test_no_text_meets_another_and_every_axis_has_a_unit(one, count):
     many = tuple(
         replace(one, name=f"left_arm_{k}_joint", quantity=f"approach.left_arm_{k}_joint") for k in range(count)
     )

@@ -42,6 +42,7 @@ def in_the_root_frame(campaign):
     return replace(campaign, position=position, base_known=True, tool_known=True, target=frames.tool[:3, 3])
 
 
+@pytest.mark.slow
 def test_an_offset_of_the_first_joint_is_an_alias_of_a_known_base(clean):
     known = in_the_root_frame(clean)
     turned = 1e-3 * np.cross([0.0, 0.0, 1.0], known.position)
@@ -297,7 +298,8 @@ def test_another_effect_in_its_place_is_a_rival(known, odds, told):
     assert found == ({"joint_offset": ("joint_gain",), "joint_gain": ("joint_offset",)} if told else {})
 
 
-@pytest.mark.parametrize("seed", [33, *(pytest.param(k, marks=pytest.mark.slow) for k in range(34, 37))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(33, 37))
 def test_what_could_do_the_same_and_is_improbable_is_no_rival(rv_m2, seed):
     """A joint that its weight always seats on one side is off by a constant, as by lost motion, at its price."""
     off = {"joint_offset": {"joint_2": 8e-4}}
@@ -307,7 +309,8 @@ def test_what_could_do_the_same_and_is_improbable_is_no_rival(rv_m2, seed):
     assert found.separates == ()
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
 def test_links_and_joints_that_bend_are_told_together_on_few_rows(rv_m2, seed):
     bends = {"joint_compliance": {"joint_2": 1e-5}}
     found = diagnose(program(rv_m2, bends, rows=16, tool=(0.05, 0.03, 0.1), noise=2e-5, base_known=False, seed=seed))

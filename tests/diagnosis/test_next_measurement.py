@@ -204,7 +204,7 @@ def test_what_it_expects_is_what_comes(rv_m2):
     assert 0.3 < np.median(came) / np.median(promised) < 3.0
 
 
-QUICK = ("rv_m2", "awkward-from-base", "coupled", "tiago-from-torso")
+QUICK = ("rv_m2", "awkward-from-base")
 
 
 @pytest.mark.parametrize(
@@ -277,6 +277,7 @@ def test_the_same_seed_gives_the_same_samples_and_json_is_plain(rv_m2):
         assert one | other <= set(pair)
 
 
+@pytest.mark.slow
 def test_where_all_is_settled_the_parameters_are_sharpened(rv_m2):
     """D-optimal samples leave the parameters less uncertain than random ones."""
     rng = np.random.default_rng(1)
@@ -312,6 +313,7 @@ def test_without_anything_to_learn_nothing_is_proposed(rv_m2):
     assert len(asked.to_table()) == 0
 
 
+@pytest.mark.slow
 def test_with_both_frames_known_and_nothing_found_it_still_answers(rv_m2):
     plain = simulate(rv_m2, seed=3)[0]
     here = observe(plain, Frames.declared(plain))

@@ -50,7 +50,7 @@ def known(robot, effects=(), only=("instrument_scale",), **how):
 
 
 def test_noise_is_noise_whatever_its_size(rv_m2):
-    for seed in range(4):
+    for seed in range(2):
         said = analyse_residual(known(rv_m2, seed=seed))
         assert not said.unexplained.flagged
         assert (said.unexplained.rms, said.unexplained.reasons, said.unexplained.depends_on) == (0.0, (), ())
@@ -106,10 +106,10 @@ def test_a_remainder_below_what_anybody_measures_is_no_question(rv_m2):
     assert said.unexplained.rms == 0.0
 
 
-@pytest.mark.parametrize("stated", [1.0, 2.0])
+@pytest.mark.parametrize("stated", [1.0, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_structure_below_the_stated_noise_is_looked_at(rv_m2, stated):
     """What is smaller than the stated noise is not too large; neighbours and laws are asked all the same."""
-    for seed in range(3):
+    for seed in range(1):
         play = simulate(rv_m2, ["backlash"], seed=seed, noise=NOISE / 2.0, ratio=(1.2, 1.3), places=["joint_3"])[0]
         known = fit(replace(play, noise_position=stated * NOISE), ())
         said = analyse_residual(known).unexplained
@@ -285,7 +285,7 @@ def test_the_scan_statistic_is_that_of_chance():
     rng = np.random.default_rng(0)
     for samples, count in ((60, 3), (100, 8), (300, 40)):
         said = []
-        for _ in range(400):
+        for _ in range(150):
             aside = np.isin(np.arange(samples), rng.permutation(samples)[:count])
             values = [rng.normal(size=samples), rng.choice([-1.0, 1.0], samples), rng.integers(0, 4, samples)]
             said += [scan_test(np.asarray(v, dtype=float), aside) for v in values]

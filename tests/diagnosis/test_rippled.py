@@ -28,6 +28,7 @@ def test_ripple_is_named_with_its_orders(rv_m2, seed):
     assert found.gap.held_out.rms_after == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.15)
 
 
+@pytest.mark.slow
 def test_who_leaves_ripple_out_gets_none(rv_m2):
     true = JointRipple().having("joint_2", 26.6, 1.0)
     plain = fit(rippling(rv_m2, true, (3e-4,), 0), choose(without=("joint_ripple",)))
@@ -35,6 +36,7 @@ def test_who_leaves_ripple_out_gets_none(rv_m2):
     assert not any(isinstance(effect, JointRipple) for effect, _ in wider.effects)
 
 
+@pytest.mark.slow
 def test_a_ripple_that_is_held_stays_where_none_is_generated_anew(rv_m2, monkeypatch):
     """Evidence and rows held out decide of it, and no generator."""
     rippled = forward_selection(
@@ -47,6 +49,7 @@ def test_a_ripple_that_is_held_stays_where_none_is_generated_anew(rv_m2, monkeyp
     assert JointRipple.name in again.variants
 
 
+@pytest.mark.slow
 def test_a_step_is_no_sum_of_waves(rv_m2):
     step = Discovered(place="joint_2", quantity="joint_2", shape="step", marks=(0.2,), unit="rad")
     campaign = with_law(rv_m2, step, (0.0, 6e-4), seed=4)[0]

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from simulate import simulate
 
 from thermal_robot import CampaignError, EffectError, diagnose
@@ -57,7 +58,8 @@ def with_sag(seed, times=1.0, samples=120):
     return replace(plain, position=real.predicted_position + NOISE * rng.normal(size=(samples, 3)))
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
 def test_an_effect_of_ones_own_is_found_with_its_values_and_its_model_needs_its_covariate(rv_m2, seed):
     data = with_sag(seed)
     found = diagnose(data, effects=[JointSag()])
@@ -147,7 +149,9 @@ def installed(monkeypatch, name, thing):
     monkeypatch.setattr(catalogue, "entry_points", lambda group: {"thermal_robot.effects": [point]}[group])
 
 
-@pytest.mark.parametrize("thing", [JointSag, JointSag()], ids=["class", "instance"])
+@pytest.mark.parametrize(
+    "thing", [JointSag, pytest.param(JointSag(), marks=pytest.mark.slow)], ids=["class", "instance"]
+)
 def test_an_installed_effect_stands_in_the_library_and_is_diagnosed(monkeypatch, thing):
     installed(monkeypatch, "sag", thing)
     assert names(["joint_sag"]) == ["joint_sag"]
@@ -181,7 +185,7 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("case", BROKEN)
+@pytest.mark.parametrize("case", some(BROKEN, 4))
 def test_a_broken_entry_point_warns_by_name_and_is_left_out(rv_m2, monkeypatch, case):
     thing, words = BROKEN[case]
     sound, data = library(), simulate(rv_m2, ["joint_gain"], samples=60, seed=1, ratio=(5.0, 6.0))[0]

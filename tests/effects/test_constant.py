@@ -130,6 +130,7 @@ TOOL, POSES = {"tool": (0.05, 0.03, 0.1)}, {"measures": "pose", "noise_orientati
 LAST = {"joint_offset": {"joint_5": 3e-3}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("frame", "at_work", "options"),
     [

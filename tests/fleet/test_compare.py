@@ -78,6 +78,7 @@ def test_a_changed_parameter_is_found_and_nothing_else(before, frame):
     assert found.effect("joint_offset").p_value < 1e-6
 
 
+@pytest.mark.slow
 def test_the_order_of_campaigns_does_not_matter_but_for_since():
     days = diagnosed(1), diagnosed(2, frame="there"), diagnosed(3, moved(STEP))
     names = ["a", "b", "c"]
@@ -124,6 +125,7 @@ def test_what_one_campaign_cannot_tell_is_not_compared(arm):
     assert (own.status, own.reason) == ("not_compared", "warm alone can tell it")
 
 
+@pytest.mark.slow
 def test_links_that_lag_are_compared_with_the_record_of_each_campaign():
     """The setting of one campaign would read a clock that another does not have, or follow the wrong day's air."""
     days = [tr.diagnose(day, only="thermal_elongation") for day in lagging_days()]

@@ -285,6 +285,7 @@ def lifted():
     return load_robot(urdf(*parts, hinge("end", "fixed", before, "tip", "0 0.1 0.1"), link("tip")), "tip")
 
 
+@pytest.mark.slow
 def test_a_base_that_rocks_does_not_tell_where_it_stands():
     """A campaign's drift turns the base; a shift of the first link is then not exactly one of the base any more."""
     robot = lifted()

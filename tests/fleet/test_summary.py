@@ -88,6 +88,7 @@ def test_counts_places_and_the_largest_gaps(tmp_path, monkeypatch):
     assert len(found.found) == 3
 
 
+@pytest.mark.slow
 def test_what_gathers_in_a_hall_is_told_and_what_does_not_is_not(tmp_path):
     (found,) = of_halls(tmp_path, 1, gathered="hall 2").gathered
     assert (found.label, found.group, found.robots, found.robots_elsewhere) == ("hall", "hall 2", 20, 40)

@@ -156,6 +156,7 @@ def three(rv_m2):
     return problem(fitted(*(campaign(rv_m2, seed) for seed in (1, 2, 3))))
 
 
+@pytest.mark.slow
 def test_where_instrument_and_target_stand_means_nothing(rv_m2, three):
     here, there = three, problem(fitted(*(campaign(rv_m2, seed, place=seed) for seed in (1, 2, 3))))
     assert here.keys == there.keys
@@ -172,6 +173,7 @@ def test_where_instrument_and_target_stand_means_nothing(rv_m2, three):
     np.testing.assert_allclose(moved.matrices, here.matrices, rtol=2e-3, atol=1e-3 * here.matrices.max())
 
 
+@pytest.mark.slow
 def test_zeros_are_followed_whatever_was_named_and_nil_where_unknown_frames_take_them_up(rv_m2, three):
     assert [name for _, name in three.keys][:5] == [f"zero offset, joint_{k}" for k in range(1, 6)]
     assert not three.matrices[:, 0].any()
@@ -202,6 +204,7 @@ def test_another_robot_is_refused(rv_m2):
         require_alike(fitted(campaign(rv_m2, 1), campaign(other, 2)))
 
 
+@pytest.mark.slow
 def test_links_that_lag_follow_the_record_of_each_campaign():
     """Each campaign by itself says what was at work, whichever one has the setting that all are followed by."""
     for days in (lagging_days(), lagging_days()[:2][::-1]):

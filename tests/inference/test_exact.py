@@ -200,7 +200,8 @@ def test_constants_of_several_effects_are_moved_together(rv_m2):
     assert left(after) < 0.7 * left(before)
 
 
-@pytest.mark.parametrize("other", ["instrument_scale", pytest.param("drift", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("other", ["instrument_scale", "drift"])
 def test_what_only_pays_for_a_constant_that_is_off_is_left_out(other):
     """At 3600 s instead of 2200 s both are needed; once the constant has moved, one is enough."""
     needed = 0

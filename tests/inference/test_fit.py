@@ -29,7 +29,7 @@ def constant_of(effects, kind):
 
 @pytest.mark.parametrize(
     ("kind", "constant"),
-    [(LAG, 420.0), (DRIFT, 0.067), pytest.param(LAG, 1759.0, marks=slow), pytest.param(DRIFT, 0.195, marks=slow)],
+    [(LAG, 420.0), *(pytest.param(*own, marks=slow) for own in ((DRIFT, 0.067), (LAG, 1759.0), (DRIFT, 0.195)))],
 )
 def test_a_large_effect_leaves_nothing_to_others_whatever_its_constant(kind, constant):
     data = campaign("panda", 0, kind, constant, 35.0)
@@ -114,6 +114,7 @@ def test_rows_of_unlike_noise_count_by_it(rv_m2):
     assert np.std(off) < 0.4 * np.std(alike)
 
 
+@pytest.mark.slow
 def test_one_noise_in_every_row_is_the_noise_of_all(rv_m2):
     data = simulate(rv_m2, ["joint_offset"], seed=4, samples=60)[0]
     each = replace(data, noise_position=None, noise_of_rows=np.full(60, data.noise_position))
@@ -121,6 +122,7 @@ def test_one_noise_in_every_row_is_the_noise_of_all(rv_m2):
     assert same == whole
 
 
+@pytest.mark.slow
 def test_rows_of_unlike_noise_leave_a_diagnosis_as_it_is(rv_m2):
     """A thousand times the noise in every second row is as good as their absence."""
     data = simulate(rv_m2, ["joint_offset"], seed=4, samples=120)[0]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from inference.densities import dense
 from scipy.linalg import sqrtm
 from simulate import simulate
@@ -324,7 +325,7 @@ def test_noise_is_not_followed(draws):
 
 
 @pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
-@pytest.mark.parametrize("number", [0, 3, 4, -1], ids=["tool", "places", "one place", "grouped"])
+@pytest.mark.parametrize("number", some([3, 0, 4, -1], 4))
 def test_a_form_over_the_noise_of_each_row_is_the_dense_one_over_it(rv_m2, number, turning):
     """K of rows in units of their own noise is D⁻¹ K D⁻¹, up to its mean on the diagonal."""
     data = replace(simulate(rv_m2, samples=12, seed=2, turning=turning)[0], priors={})

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from simulate import simulate
 
 from thermal_robot import diagnose
@@ -55,7 +56,7 @@ SEEDED = [(seed, *own) for own in REPEATED for seed in (0, 1)]
 
 @pytest.mark.parametrize(
     ("seed", "repeats", "poses"),
-    [pytest.param(*own, marks=() if k % 4 in (0, 3) else pytest.mark.slow) for k, own in enumerate(SEEDED)],
+    [pytest.param(*own, marks=() if k == 3 else pytest.mark.slow) for k, own in enumerate(SEEDED)],
 )
 def test_steps_of_an_encoder_are_found_where_poses_repeat(seed, repeats, poses):
     data, step = visited(("rv_m2", "ur10")[seed], seed, repeats, poses, (2.0, 4.0)[seed])
@@ -96,12 +97,14 @@ def test_scatter_that_a_few_rows_carry_is_none():
     assert carried >= 3
 
 
+@pytest.mark.slow
 def test_a_step_that_many_poses_show_is_measured_by_its_period():
     data, step = visited("rv_m2", 3, 2, 150, 3.0)
     _, (steps, _) = gap_of(data)
     assert steps.parameters[0].value == pytest.approx(step, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_errors_of_a_pose_that_follow_no_steps_are_no_encoder():
     for seed, name in enumerate(["rv_m2", "ur10"]):
         seen, (steps, _) = gap_of(visited(name, seed, 3, 160, 3.0, stepped=False)[0])
@@ -151,7 +154,7 @@ def test_steps_are_the_verdict_where_poses_repeat():
     assert named.count(("encoder_resolution",)) >= 13, named
 
 
-@pytest.mark.parametrize("repeats", [1, 3])
+@pytest.mark.parametrize("repeats", some([3, 1], 2))
 def test_rows_of_unlike_noise_are_no_scatter(repeats):
     """Whether the noisy rows are visits of a pose beside quiet ones, or whole poses."""
     for seed in range(3):
@@ -163,6 +166,7 @@ def test_rows_of_unlike_noise_are_no_scatter(repeats):
         assert gap_of(data)[0].kept == ()
 
 
+@pytest.mark.slow
 def test_a_joint_that_scatters_is_measured_in_rows_of_unlike_noise():
     """Its standard deviation, as of quiet rows alone."""
     for seed in range(2):

@@ -1,8 +1,11 @@
 """Scatter that enters at the joints: found where it is, not where it is not, and told apart by repeats."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference.scatter import variance_components
@@ -41,8 +44,12 @@ def found(scatter):
     return {(c.kind, c.joint) for c in scatter.components if scatter.probability[c.kind] > 0.5}
 
 
-@pytest.mark.parametrize("setting", [{}, {"k": 5}, {"tails": 4}, {"tails": 4, "k": 5}, {"m": 6}], ids=str)
-@pytest.mark.parametrize("stated", [True, False])
+@pytest.mark.parametrize(
+    ("stated", "setting"),
+    some(
+        [(False, {"k": 5}), *product((True, False), ({}, {"k": 5}, {"tails": 4}, {"tails": 4, "k": 5}, {"m": 6}))], 11
+    ),
+)
 def test_an_instrument_alone_is_not_a_joint(robot, setting, stated):
     false = 0
     for seed in range(40):
@@ -51,8 +58,9 @@ def test_an_instrument_alone_is_not_a_joint(robot, setting, stated):
     assert false <= 1
 
 
-@pytest.mark.parametrize("ratio", [2.0, 6.0])
-@pytest.mark.parametrize("setting", [{}, {"k": 5}, {"m": 6}], ids=str)
+@pytest.mark.parametrize(
+    ("setting", "ratio"), some([({"k": 5}, 2.0), *product(({}, {"k": 5}, {"m": 6}), (2.0, 6.0))], 7)
+)
 def test_a_joint_that_scatters_is_found(robot, ratio, setting):
     right = 0
     for seed in range(24):
@@ -88,6 +96,7 @@ def test_fitted_parameters_do_not_shrink_the_noise(robot):
     assert np.mean(ratios) == pytest.approx(1.0, abs=4 * np.std(ratios) / np.sqrt(40))
 
 
+@pytest.mark.slow
 def test_repeats_tell_visit_from_pose(robot):
     right = 0
     for seed in range(20):
@@ -115,6 +124,7 @@ def test_a_bias_that_repeats_is_no_visit(robot):
     assert visits == 0
 
 
+@pytest.mark.slow
 def test_two_joints_at_once(robot):
     right = 0
     for seed in range(20):
@@ -123,6 +133,7 @@ def test_two_joints_at_once(robot):
     assert right >= 18
 
 
+@pytest.mark.slow
 def test_three_joints_that_scatter_are_no_larger_noise():
     """Each along an axis of its own: beside a noise that has swallowed two of them neither brings much alone."""
     right = 0
@@ -136,6 +147,7 @@ def test_three_joints_that_scatter_are_no_larger_noise():
     assert right == 10
 
 
+@pytest.mark.slow
 def test_a_few_gross_errors_left_in(robot):
     right = 0
     for seed in range(8):

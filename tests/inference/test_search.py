@@ -39,8 +39,8 @@ def alike(seed, rows=25, count=7):
 @pytest.mark.parametrize(
     ("seeds", "known"),
     # from one wrong start of 144 the way to the best leads through pairs 18 nats below: why there are several starts
-    [(range(12), set()), pytest.param(range(12, 60), {(48, (0, 1))}, marks=pytest.mark.slow)],
-    ids=["12", "48"],
+    [(range(3), set()), pytest.param(range(3, 60), {(48, (0, 1))}, marks=pytest.mark.slow)],
+    ids=["3", "57"],
 )
 def test_blocks_that_resemble_each_other_do_not_lead_astray(seeds, known):
     """From nothing, or from a wrong combination: two that stand in for two others are left again."""

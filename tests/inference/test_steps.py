@@ -4,6 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from helpers import some
 
 from thermal_robot.blind.score import reliability
 from thermal_robot.inference.scatter import followed, period, stepped
@@ -25,8 +26,7 @@ def variances(sigma, rows):
     return np.full(rows, sigma**2)
 
 
-@pytest.mark.parametrize("rows", [120, 200])
-@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize(("rows", "noise"), some([(120, 0.1), (120, 0.0), (200, 0.0), (200, 0.1)], 4))
 def test_the_period_of_a_sawtooth_is_found(rows, noise):
     for seed in range(3):
         rng, command = np.random.default_rng(seed), commands(seed, rows)
@@ -75,9 +75,10 @@ def test_where_steps_would_not_be_seen_nothing_is_said():
             assert abs(found.log_factor) < 1.0
 
 
+@pytest.mark.slow
 def test_a_ripple_on_errors_of_another_kind_is_no_step():
     """Normal errors of the whole size, and a sawtooth of a third of it."""
-    for seed in range(4):
+    for seed in range(2):
         rng, command = np.random.default_rng(seed), commands(seed, 600)
         errors = 1.0 / np.sqrt(12.0) * rng.normal(size=600) * STEP + 0.35 * sawtooth(command)
         found = period(errors, variances(0.0, 600), command, STEP)
@@ -99,13 +100,21 @@ HALVES = pytest.mark.xfail(reason="whole steps lie on half steps, too: with a sl
 THIRDS = pytest.mark.xfail(reason="two thirds of a step count a little, by e³, too few for a step to be measured by")
 
 
-@pytest.mark.parametrize("other", [1.6, pytest.param(1.0 / 1.45, marks=THIRDS), pytest.param(1.0 / 1.6, marks=HALVES)])
+@pytest.mark.parametrize(
+    "other",
+    [
+        1.6,
+        pytest.param(1.0 / 1.45, marks=(pytest.mark.slow, THIRDS)),
+        pytest.param(1.0 / 1.6, marks=(pytest.mark.slow, HALVES)),
+    ],
+)
 def test_a_step_far_from_what_the_size_says_is_not_looked_for(other):
     command = commands(0)
     errors, variance = sawtooth(command), variances(0.0, 150)
     assert period(errors, variance, command, other * STEP).log_factor < 0.0
 
 
+@pytest.mark.slow
 def test_a_step_that_the_size_says_outweighs_one_far_from_it():
     command = commands(0)
     others = (1.0, 1 / 1.6, 1 / 1.45, 1.6)
@@ -140,10 +149,10 @@ def test_steps_do_not_depend_on_where_commands_begin_nor_on_the_unit():
 LITTLE = pytest.mark.xfail(reason="e⁻¹·⁶ to e⁻⁴·³ since a fifth of a step may be others' errors")
 
 
-@pytest.mark.parametrize("bound", [0.5, pytest.param(1e-4, marks=LITTLE)])
+@pytest.mark.parametrize("bound", [0.5, pytest.param(1e-4, marks=(pytest.mark.slow, LITTLE))])
 def test_few_poses_that_are_seen_well_show_steps_plainly_and_count_against_those_of_another_command(bound):
     """Thirty poses, errors seen to a twentieth of a step: a sine of the command would explain 60 % of them."""
-    for seed in range(10):
+    for seed in range(4):
         rng, command = np.random.default_rng(seed), commands(seed, 30)
         errors, variance = sawtooth(command) + 0.05 * STEP * rng.normal(size=30), variances(0.05 * STEP, 30)
         assert period(errors, variance, command, 1.2 * STEP).log_factor > np.log(1e6)
@@ -172,7 +181,7 @@ def test_the_quantity_that_errors_follow_is_named(name):
         assert followed(errors, np.full(120, 1e8), known) == name
 
 
-@pytest.mark.parametrize("rows", [25, 120])
+@pytest.mark.parametrize("rows", some([25, 120], 2))
 def test_noise_follows_nothing(rows):
     """Among few errors many a law explains a sixth by chance: it is named once in a thousand campaigns."""
     names = []

@@ -124,6 +124,7 @@ def test_poses_are_found_from_anywhere(name):
     assert ((arm.lower <= found.q) & (found.q <= arm.upper)).all()
 
 
+@pytest.mark.slow
 def test_of_several_postures_the_nearest_is_taken():
     arm = load_arm("ur10")
     q = easy(arm, ROWS)

@@ -29,7 +29,7 @@ PAIRS = [(made, arm) for made in MADE for arm in ("ur10", "panda")]
 
 @pytest.mark.parametrize(
     ("made", "arm"),
-    [pytest.param(*pair, marks=() if k % 4 in (0, 3) else pytest.mark.slow) for k, pair in enumerate(PAIRS)],
+    [pytest.param(*pair, marks=() if k in (4, 7) else pytest.mark.slow) for k, pair in enumerate(PAIRS)],
     indirect=["arm"],
 )
 def test_an_effect_explains_what_it_made_and_is_saved_whole(arm, made, tmp_path):
@@ -49,6 +49,7 @@ def test_an_effect_explains_what_it_made_and_is_saved_whole(arm, made, tmp_path)
     np.testing.assert_allclose(again.prediction(fresh.take([7]))[0][0], predicted[7], rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_backlash_is_named_where_only_the_side_counts():
     """Poses passed in the direction of approach: the friction of a lag is then exactly lost motion."""
     campaign = simulate(load_arm("ur10"), [], seed=5, moving=True)[0]
@@ -63,7 +64,8 @@ def test_backlash_is_named_where_only_the_side_counts():
     assert found.verdict == ("backlash",)
 
 
-@pytest.mark.parametrize("name", ["ur10", pytest.param("panda", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ur10", "panda"])
 def test_weights_that_nobody_wrote_down_are_free(name, tmp_path):
     arm = load_arm(name)
     campaign, truth, (fresh, place) = simulate(

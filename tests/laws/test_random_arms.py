@@ -8,7 +8,7 @@ from random import Random
 import pytest
 from arms import MOST, arms, urdfs
 from fuzz import checks, corpus, harmless
-from hypothesis import find, given
+from hypothesis import find, given, settings
 from hypothesis import strategies as st
 from kinematics import test_engines as engines
 from kinematics import test_gravity as gravity
@@ -34,10 +34,16 @@ LAWS = (
 """Each takes an arm, and draws configurations of it."""
 
 
+by_number = pytest.mark.parametrize("examples", [5, pytest.param(100, marks=pytest.mark.slow)])
+"""A few in each commit, many at night."""
+
+
+@by_number
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__.removeprefix("test_"))
-def test_a_law_of_the_fixed_arms(law, configurations):
+def test_a_law_of_the_fixed_arms(law, examples, configurations):
     asked = inspect.signature(law).parameters
 
+    @settings(max_examples=examples)
     @given(arm=arms())
     def holds(arm):
         known = {"arm": arm, "configurations": configurations, "engine": None}
@@ -48,11 +54,16 @@ def test_a_law_of_the_fixed_arms(law, configurations):
     holds()
 
 
+SEEDS = st.integers(0, 2**32 - 1)
 UNITS = st.builds(Units, st.sampled_from(["rad", "deg"]), st.sampled_from(sorted(harmless.LENGTHS)))
 
 
-@given(urdf=urdfs(), units=UNITS, seed=st.integers(0, 2**32 - 1))
-def test_a_campaign_survives_its_files(urdf, units, seed):
+@by_number
+def test_a_campaign_survives_its_files(examples):
+    settings(max_examples=examples)(given(urdf=urdfs(), units=UNITS, seed=SEEDS)(survives_its_files))()
+
+
+def survives_its_files(urdf, units, seed):
     """Written and read, written in another way and read, as a data frame: the same observations."""
     campaign = corpus.made(urdf, "tip", units=units, seed=seed)
     files = corpus.files_of(campaign)
@@ -77,11 +88,16 @@ def test_a_campaign_survives_its_files(urdf, units, seed):
     checks.alike(framed, campaign)
 
 
-@given(urdf=urdfs(), seed=st.integers(0, 2**32 - 1))
-def test_a_model_survives_its_file(urdf, seed):
-    with tempfile.TemporaryDirectory() as name:
-        corpus.put(corpus.model_of(corpus.files_of(corpus.made(urdf, "tip", seed=seed))), Path(name))
-        checks.model(Path(name))
+@by_number
+def test_a_model_survives_its_file(examples):
+    @settings(max_examples=examples)
+    @given(urdf=urdfs(), seed=SEEDS)
+    def survives(urdf, seed):
+        with tempfile.TemporaryDirectory() as name:
+            corpus.put(corpus.model_of(corpus.files_of(corpus.made(urdf, "tip", seed=seed))), Path(name))
+            checks.model(Path(name))
+
+    survives()
 
 
 @pytest.mark.slow

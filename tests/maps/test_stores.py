@@ -68,7 +68,7 @@ def test_chunks_come_back_as_they_were_and_an_unfinished_one_does_not_count(end,
     assert (kept.notes, kept.done) == ({"robot": "other"}, 0)
 
 
-@pytest.mark.parametrize("over", [PLANE, Joints(90)], ids=["places", "joints"])
+@pytest.mark.parametrize("over", [PLANE, pytest.param(Joints(90), marks=pytest.mark.slow)], ids=["places", "joints"])
 def test_a_run_that_was_stopped_is_gone_on_with(rv_m2, plane, tmp_path, in_chunks, over):
     in_chunks(30)
     end = "parquet" if over is PLANE else "zarr"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import some
 
 from thermal_robot.blind.motions import sizes
 from thermal_robot.blind.motions.fault import EVERYTHING, FAULTS, NOTHING, Fault, draw_fault
@@ -99,7 +100,7 @@ def test_drag_and_inertia_leave_the_place_of_rest_but_for_sticking(name):
     assert abs(after - before)[0] < (size / kp if name == "coulomb" else 2e-4)
 
 
-@pytest.mark.parametrize("name", EVERYTHING)
+@pytest.mark.parametrize("name", some(EVERYTHING, 5))
 def test_every_fault_is_drawn_moves_an_encoder_and_comes_again(name):
     world = a_world(3, 4, seed=21, rows=250)
     log, fault = draw_log(np.random.default_rng(4), world, name)

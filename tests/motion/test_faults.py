@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import some
 from motion.arms import JOINTS, STEP, log, tables
 
 from thermal_robot.motion import Channel, find_faults, read_motion
@@ -22,8 +24,7 @@ def told(state, command):
     return found, [(fault.what, fault.joint) for fault in found.faults]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("motions", [1, 3, 10])
+@pytest.mark.parametrize(("motions", "seed"), some(product((3, 1, 10), (1, 2, 3)), 9))
 def test_a_sound_log_has_no_fault_and_stays_as_it_is(motions, seed):
     whole = log(*tables(motions, seed=seed))
     found = find_faults(whole)
@@ -60,7 +61,7 @@ def test_a_joint_that_is_turned_round_is_turned_back(along):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("motions", "rate"), [(3, 1.02), (10, 1.02), (10, 0.99), (6, 1.003)])
+@pytest.mark.parametrize(("motions", "rate"), some([(3, 1.02), (10, 1.02), (10, 0.99), (6, 1.003)], 4))
 def test_the_rate_of_a_clock_is_recovered_within_its_error(motions, rate):
     state, command = tables(motions, seconds=40.0)
     found, said = told(state.assign(time=state.time / rate), command)
@@ -155,6 +156,7 @@ def test_a_joint_in_a_unit_that_nothing_tells_is_left_out():
     assert found.joints == JOINTS[1:]
 
 
+@pytest.mark.slow
 def test_several_faults_at_once_are_told_apart():
     state, command = tables(10, seconds=40.0)
     state[Q[:2]] = state[[Q[1], Q[0]]].to_numpy()

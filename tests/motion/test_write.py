@@ -85,6 +85,7 @@ def test_a_delay_of_every_joint_is_held_by_the_actuators():
     assert float(np.abs(own - faulty.position).max()) < 1e-4
 
 
+@pytest.mark.slow
 def test_friction_that_is_written_sticks_as_the_servo_models_does():
     world = strong(a_world(rows=300, motions=5))
     faulty = world.simulated(Fault("coulomb", JOINT, 0.15))

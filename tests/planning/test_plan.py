@@ -3,9 +3,11 @@
 import csv
 import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from helpers import some
 
 from thermal_robot import CampaignError, EffectError, load_robot, observe, read_campaign
 from thermal_robot.campaign import Units
@@ -35,8 +37,9 @@ def test_poses_are_within_limits_and_repeats_are_labelled_and_count_among_the_ro
         assert np.ptp(q[commands.labels["pose"] == name], axis=0).max() == 0.0
 
 
-@pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
-@pytest.mark.parametrize("repeats", [1, 2, 4])
+@pytest.mark.parametrize(
+    ("source", "repeats"), some(product(("builtin:rv_m2", "example-robot-data:ur10"), (2, 1, 4)), 6)
+)
 def test_each_joint_comes_from_both_sides(source, repeats):
     robot = load_robot(source, "tool0")
     for seed in range(2):
@@ -280,7 +283,9 @@ def fitted_errors(commands, effect, sizes, rng):
     return np.array(errors)
 
 
-@pytest.mark.parametrize("name", ["joint_offset", "joint_gain", "backlash", "thermal_elongation", "joint_compliance"])
+@pytest.mark.parametrize(
+    "name", some(["thermal_elongation", "joint_offset", "joint_gain", "backlash", "joint_compliance"], 5)
+)
 def test_fits_scatter_as_expected(rv_m2, name):
     found = plan(rv_m2, 60, [name], target=TARGET, seed=3)
     parameters = found.effect(name).parameters

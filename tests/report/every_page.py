@@ -29,8 +29,8 @@ EVERY = {
     "blind": (blind_html, lambda: score([*trial(), *trial_of_several()])),
 }
 """By the page's kind what writes it, and what it is of."""
-ALIKE = ("found", "nothing", "confounded", "contained", "law", "unexplained")
-"""Kinds whose parts others have, too."""
+FEW = ("motion", "fleet")
+"""Kinds of every commit, beside the diagnosis with its arm."""
 
 
 def page(kind):

@@ -24,6 +24,7 @@ def test_the_json_has_what_is_expected_of_each_file(zeros):
     assert left["ticks"] > left["zeros"], "an encoder's step is coarser than the zeros are known"
 
 
+@pytest.mark.slow
 def test_the_page_says_what_correct_says_of_the_file(zeros):
     page = html(zeros)
     assert ASKED in headings(page)
@@ -35,6 +36,7 @@ def test_the_page_says_what_correct_says_of_the_file(zeros):
     assert cell in Reader(page).words
 
 
+@pytest.mark.slow
 def test_what_no_file_holds_is_said_and_has_no_table(demo):
     assert "files" not in demo.to_dict()
     assert "holds what is constant; nothing here is" in Reader(html(demo)).words

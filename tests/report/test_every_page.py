@@ -13,7 +13,7 @@ from motion.found import found
 from report import every_page
 from report.browser import PROGRAM, Browser
 from report.cases import CASES
-from report.every_page import ALIKE, EVERY, page
+from report.every_page import EVERY, FEW, page
 from report.looking import texts
 from wear_cases import by_hand
 
@@ -57,7 +57,7 @@ TEXTS = """(() => {
   }
   return found;
 })()"""
-KINDS = [pytest.param(kind, marks=[pytest.mark.slow] * (kind in ALIKE)) for kind in EVERY]
+KINDS = [pytest.param(kind, marks=[pytest.mark.slow] * (kind not in FEW)) for kind in EVERY]
 
 
 def views_of(figure):
@@ -108,6 +108,7 @@ def looked_at(browser, shown, tmp_path):
     return {where: found for where, found in wrong.items() if any(found)}
 
 
+@pytest.mark.slow
 def test_a_telephone_sees_every_text_of_a_figure_in_columns():
     """Each text of it stands whole in one of the views that a telephone is shown."""
     d = CASES["repeated"]()
@@ -165,7 +166,7 @@ def test_what_is_cut_is_noticed(browser, tmp_path):
 
 
 @needs_reader
-@pytest.mark.parametrize("kind", ["wear", *(pytest.param(k, marks=pytest.mark.slow) for k in EVERY if k != "wear")])
+@pytest.mark.parametrize("kind", ["misfit", *(pytest.param(k, marks=pytest.mark.slow) for k in EVERY if k != "misfit")])
 def test_a_pdf_holds_every_cell(kind, tmp_path):
     pytest.importorskip("weasyprint", exc_type=(ImportError, OSError))
     shown = page(kind)

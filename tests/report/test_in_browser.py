@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 import threading
-from functools import partial
+from functools import cache, partial
 from html import unescape
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
@@ -97,8 +97,13 @@ def served(tmp_path_factory, demo):
     server.server_close()
 
 
-def seen(served, width, profile):
-    """What the browser measures, and what it complains of."""
+@pytest.fixture(scope="module")
+def seen(served, tmp_path_factory):
+    """What the browser measures at a width, and what it complains of: looked at once."""
+    return cache(lambda width: looked_at(served, width, tmp_path_factory.mktemp("profile")))
+
+
+def looked_at(served, width, profile):
     folder, address = served
     (folder / f"at_{width}.html").write_text(WRAPPER.replace("WIDTH", str(width)), encoding="utf-8")
     command = [BROWSER, *OPTIONS, f"--user-data-dir={profile}", "--window-size=1600,2100", "--dump-dom"]
@@ -112,8 +117,8 @@ def seen(served, width, profile):
 
 
 @pytest.mark.parametrize("width", [1400, 400])
-def test_the_arm_is_seen_and_turns_and_nothing_complains(served, width, tmp_path):
-    page, complaints = seen(served, width, tmp_path)
+def test_the_arm_is_seen_and_turns_and_nothing_complains(seen, width):
+    page, complaints = seen(width)
     assert page["seen"] <= width
     assert page["smallest"] >= 8.0, "letters of less than 8 pixels"
     assert 0.05 < page["filled"] < 0.6, "the arm fills a part of its drawing"
@@ -123,8 +128,8 @@ def test_the_arm_is_seen_and_turns_and_nothing_complains(served, width, tmp_path
     assert [line for line in complaints if "favicon" not in line] == []
 
 
-def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(served, tmp_path):
-    page, _ = seen(served, 1400, tmp_path)
+def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(seen):
+    page, _ = seen(1400)
     words = " ".join(page["paper"].split())
     assert page["told"][1] in words
     assert re.search(r"gap before after arrows [\d ]+ times larger", words)
@@ -134,8 +139,8 @@ def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(served, tmp_
     assert "gap before arrows" in " ".join(page["without"].split()), "arrows that are switched off have no key"
 
 
-def test_nothing_else_is_fetched(served, tmp_path):
-    seen(served, 400, tmp_path)
+def test_nothing_else_is_fetched(seen):
+    seen(400)
     assert {re.sub(r"at_\d+", "at", path) for path in Handler.asked} <= {"/at.html", "/page.html", "/favicon.ico"}
 
 

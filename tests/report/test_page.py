@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from compared import diagnosed, moved
+from helpers import some
 from lxml.html import document_fromstring
 from report.cases import HARD, case, rows, with_first
 from report.fleets import EMPTY, SUMMARY
@@ -98,7 +99,7 @@ def write(request):
     return request.param
 
 
-@pytest.mark.parametrize("kind", ["found", "nothing", "unexplained", "confounded"])
+@pytest.mark.parametrize("kind", some(["found", "nothing", "unexplained", "confounded"], 4))
 def test_a_page_needs_nothing_from_outside_and_its_references_find_their_targets(write, written, kind):
     shown = written(write, kind)
     assert "//" not in re.sub(r"data:image/png;base64,[\w+/=\s]*", "", shown)
@@ -201,6 +202,7 @@ def test_a_notebook_shows_the_fragment(written):
     assert all(".thermal-robot" in selector for selector in selectors if not selector.startswith("@media"))
 
 
+@pytest.mark.slow
 def test_a_long_campaign_stays_small():
     assert len(html(case("unexplained", samples=12000, rows=rows(12000)))) < 2_000_000
 

@@ -95,6 +95,7 @@ def test_of_a_long_campaign_some_thousand_points_are_drawn(plot_of_rows):
         assert all(len(arrows.U) <= 250 for arrows in axes.collections if hasattr(arrows, "U"))
 
 
+@pytest.mark.slow
 def test_hardly_any_row_and_no_gap_at_all_are_no_failure(plot_of_rows):
     for aside in ((2, 3, 4), (2, 3), ()):
         plot_of_rows(case("unexplained", rows=rows(3, aside=aside), outliers=aside)).draw_without_rendering()
@@ -379,6 +380,7 @@ def test_an_axis_bears_the_unit_of_what_was_recorded(name, label):
     assert plot_remainder(follows(name, joint_names=tuple(joints), rows=known)).axes[5].get_xlabel() == label
 
 
+@pytest.mark.slow
 def test_a_diagnosis_knows_the_unit_of_a_joint_that_slides(awkward):
     found = diagnose(simulate(awkward, ["drift"], seed=3, moving=True)[0], only=["drift"])
     for joint, kind in zip(awkward.joint_names, awkward.joint_types, strict=True):

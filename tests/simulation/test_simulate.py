@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import some
 from pages import blocks
 from several import FLAT, simulated
 
@@ -109,10 +110,19 @@ def test_it_reads_back_as_it_was_written(rv_m2, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("robot", "effects"),
-    [("rv_m2", {"backlash": {"joint_3": 4e-4}}), ("ur10", {"joint_offset": {"elbow_joint": 8e-4}})],
+    ("robot", "effects", "seed"),
+    some(
+        [
+            (robot, effects, seed)
+            for robot, effects in (
+                ("rv_m2", {"backlash": {"joint_3": 4e-4}}),
+                ("ur10", {"joint_offset": {"elbow_joint": 8e-4}}),
+            )
+            for seed in range(2)
+        ],
+        4,
+    ),
 )
-@pytest.mark.parametrize("seed", range(2))
 def test_a_diagnosis_finds_what_was_simulated(diagnosed_once, robot, effects, seed):
     arm = load_arm(robot)
     base = exp6(np.array([1.0, -2.0, 0.5, 0.1, 0.2, 2.0]))

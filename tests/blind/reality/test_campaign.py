@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import some
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
@@ -53,10 +54,13 @@ def test_a_campaign_can_be_read_and_holds_what_was_asked(case, tmp_path):
 
 @pytest.mark.parametrize(
     "asked",
-    [
-        {"effects": ("joint_gain",)},
-        {"kind": "changed", "effects": ("joint_gain",), "several": Several((2, 2), "changes", "joint_gain")},
-    ],
+    some(
+        [
+            {"effects": ("joint_gain",)},
+            {"kind": "changed", "effects": ("joint_gain",), "several": Several((2, 2), "changes", "joint_gain")},
+        ],
+        2,
+    ),
 )
 def test_the_same_seed_makes_the_same_files(case, tmp_path, asked):
     asked = case(samples=(30, 34), **asked)
@@ -106,6 +110,7 @@ def test_an_unlisted_cause_comes_with_its_places_and_quantities(case, tmp_path):
     assert truth["parts"]["slip"]["places"] == [place]
 
 
+@pytest.mark.slow
 def test_motors_wheels_come_with_the_ratio_that_shows_them(case, tmp_path):
     """A draw with a disc on the motor's side states its ratio; one on the joint's side states none."""
     stated = set()
@@ -208,6 +213,7 @@ def test_nothing_changes_where_nothing_is_to(several):
     assert all(1.0 < part["ratio"] < 12.0 for part in truth["parts"].values())
 
 
+@pytest.mark.slow
 def test_a_change_that_no_draw_can_show_is_withdrawn_and_says_why(several, tmp_path):
     huge = several("series", ("joint_gain",), "jumps", "joint_gain", change=(4e4, 4e4))
     assert "would have to be large" in make(huge, tmp_path / "x")["withdrawn"]

@@ -57,6 +57,7 @@ def test_noise_is_as_large_as_it_says_whatever_its_tails(day, seen, tails):
     assert bool(kurtosis(scatter.ravel()) > 0.5) is bool(np.isfinite(tails))
 
 
+@pytest.mark.slow
 def test_tails_are_heavier_with_fewer_degrees_of_freedom(day, seen):
     beyond = [(np.abs(errors(other(day, tails=t), seen)) > 4.0).mean() for t in (3.0, 8.0, np.inf)]
     assert beyond[0] > 2.0 * beyond[1] > 4.0 * beyond[2]

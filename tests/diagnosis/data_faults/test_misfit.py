@@ -7,7 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 from conftest import load_arm
-from diagnosis.simulated import some
+from helpers import some
 from other_robots import base_moved, lengthened, measured, read_with
 from simulate import simulate
 from spoilt_tables import SPOILT, measured_at
@@ -69,6 +69,7 @@ def test_a_fault_that_mends_the_table_comes_before_another_robot(sound):
     assert mismatch(sound) is None
 
 
+@pytest.mark.slow
 def test_another_robot_that_leaves_less_comes_before_a_unit_that_is_nearly_the_ratio_of_the_arms():
     large, small = (load_robot(f"example-robot-data:{name}", "tool0") for name in ("ur10", "ur3"))
     found = mismatch(read_with(measured(large, 1, measures="pose"), small))
@@ -112,7 +113,7 @@ PAIRS = [(a, b) for a in EXAMPLES for b in EXAMPLES if a != b] + [("panda", "xar
 
 
 @pytest.mark.parametrize(
-    ("own", "other", "measures"), some(((*pair, kind) for pair in PAIRS for kind in ("position", "pose")), 3)
+    ("own", "other", "measures"), some(((*pair, kind) for pair in PAIRS for kind in ("position", "pose")), 7)
 )
 def test_another_robot_of_the_family_is_told(own, other, measures):
     campaign = measured(example(own), 1, measures=measures, geometric=5e-4, joint_offset=1e-3)
@@ -125,10 +126,13 @@ def test_another_robot_of_the_family_is_told(own, other, measures):
 
 @pytest.mark.parametrize(
     ("name", "joint", "times", "measures"),
-    [
-        *(("rv_m2", f"joint_{3 + k % 2}", 1.2 + 0.1 * k, ("position", "pose")[k // 5]) for k in range(6)),
-        ("ur10", "wrist_2_joint", 1.5, "position"),  # told of any one of the joints with parallel axes
-    ],
+    some(
+        [
+            *(("rv_m2", f"joint_{3 + k % 2}", 1.2 + 0.1 * k, ("position", "pose")[k // 5]) for k in range(6)),
+            ("ur10", "wrist_2_joint", 1.5, "position"),  # told of any one of the joints with parallel axes
+        ],
+        3,
+    ),
 )
 def test_one_link_that_is_longer_is_told_with_its_joint(name, joint, times, measures):
     arm = load_arm(name)
@@ -139,7 +143,7 @@ def test_one_link_that_is_longer_is_told_with_its_joint(name, joint, times, meas
     assert found.model.off == pytest.approx((times - 1.0) * length, rel=0.05)
 
 
-@pytest.mark.parametrize("factor", [0.6, 0.9, 1.3, 1.9])
+@pytest.mark.parametrize("factor", some([0.6, 0.9, 1.3, 1.9], 2))
 def test_a_common_factor_of_the_links_is_told(rv_m2, factor):
     sister = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), factor))
     found = another_robot(read_with(measured(sister, 3, geometric=2e-4), rv_m2))
@@ -156,14 +160,14 @@ COARSE = [
 ]
 
 
-@pytest.mark.parametrize(("sizes", "seed"), some(((sizes, seed) for seed in range(3) for sizes in COARSE), 2))
+@pytest.mark.parametrize(("sizes", "seed"), some(((sizes, seed) for seed in range(3) for sizes in COARSE), 4))
 def test_a_coarse_robot_is_no_other_robot(rv_m2, sizes, seed):
     share, lever = (1.0, 0.5, 1.0)[seed], (0.15, 0.15, 0.5)[seed]
     campaign = measured(rv_m2, seed, rows=(60, 40, 120)[seed], share=share, lever=lever, **sizes)
     assert another_robot(campaign) is None
 
 
-@pytest.mark.parametrize("row", [20, 55])
+@pytest.mark.parametrize("row", some([20, 55], 2))
 def test_a_base_that_moved_is_no_other_robot(rv_m2, row):
     campaign = base_moved(measured(rv_m2, 2, rows=100, joint_offset=5e-3), row, seed=row)
     assert another_robot(campaign) is None

@@ -40,7 +40,7 @@ def test_chances_are_even_where_nothing_changes(chances):
     assert (chances[:, 2] > 0.5).all()
 
 
-@pytest.mark.parametrize("size", [2e-4, 4e-4])
+@pytest.mark.parametrize("size", [2e-4, pytest.param(4e-4, marks=pytest.mark.slow)])
 def test_play_that_begins_is_seen_and_named(stream, size):
     worn = {**EFFECTS, "backlash": {**EFFECTS["backlash"], "joint_4": size}}
     agreement = look(stream, in_full(measured(60, seed=7, effects=worn)), Agreement())

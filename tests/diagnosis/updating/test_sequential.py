@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.simulated import some
+from helpers import some
 from updating_cases import ALL, OLD, far, in_full, measured
 
 import thermal_robot as tr
@@ -135,6 +135,7 @@ def test_no_step_makes_the_cost_less(grown):
         assert cost(grown, fitted, there) > least
 
 
+@pytest.mark.slow
 def test_a_noise_that_is_not_stated_is_found():
     campaign = replace(measured(200, seed=8), noise_position=None)
     fitted = fixed_point(tr.diagnose(campaign, only=["joint_offset", "backlash"]).fit).fitted

@@ -124,6 +124,7 @@ def test_what_is_new_in_the_rows_makes_the_choice_fall(known):
     assert any("outside of what was measured, in joint_1" in reason for reason in said)
 
 
+@pytest.mark.slow
 def test_an_effect_that_can_be_tested_now_makes_it_fall():
     campaign = measured(240, seed=51)
     hall = replace(
