@@ -1,12 +1,12 @@
-"""Discs by every engine: the cheap integrals, graded panels and compiled loops find the same chances."""
+"""Discs by every engine: the edge, chords and compiled loops find the same chances."""
 
 import numpy as np
 import pytest
 from scipy.stats import ncx2
 
 from thermal_robot import compiling
-from thermal_robot.assembly.probability import compiled, failing_probability, joining_probability, required_clearance
-from thermal_robot.assembly.probability.planar import TOLD, Principal, _graded, disc_chances
+from thermal_robot.assembly.probability import failing_probability, joining_probability, planar, required_clearance
+from thermal_robot.assembly.probability.planar import Principal, by_chords, disc_chances
 
 needs_loops = pytest.mark.skipif(
     not compiling.loads("thermal_robot.assembly.probability.loops"),
@@ -32,15 +32,17 @@ def cases(seed, ratio, segments, count=300):
 
 @pytest.mark.parametrize("segments", [False, True])
 @pytest.mark.parametrize("ratio", [3.0, 100.0, 1e4, 1e8, 0.0])
-def test_what_is_told_is_what_graded_panels_find(ratio, segments):
+def test_what_is_told_is_what_halved_panels_find(ratio, segments):
     matrices, means, radii, ends = cases(1, ratio, segments)
-    principal = Principal.of(matrices)
-    found = disc_chances(principal, means, radii, ends)
-    inside, outside = (_graded(principal, means, 2.0 * radii[:, None], "circle", ends, out) for out in (False, True))
-    told, digits = np.isfinite(found.inside), np.isfinite(found.outside)
-    np.testing.assert_allclose(found.inside[told], inside[told], rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(found.outside[digits], outside[digits], rtol=1e-10)
-    assert np.all(digits[told & (outside > 1.01 * TOLD)])
+    principal, ends = Principal.of(matrices), np.zeros_like(means) if ends is None else ends
+    found, beyond = disc_chances(principal, means, radii, ends)
+    case = (principal, means, 2.0 * radii[:, None], ends, "circle")
+    inside, outside = (by_chords(*case, out) for out in (False, True))
+    told, digits = np.isfinite(found), np.isfinite(beyond)
+    np.testing.assert_allclose(inside + outside, 1.0, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(found[told], inside[told], rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(beyond[digits], outside[digits], rtol=1e-10)
+    assert np.all(digits[told & (outside > 1.01e-5)])
     assert told.all() or segments, "without a segment every disc is resolved"
 
 
@@ -62,14 +64,14 @@ def test_many_clearances_fail_as_often_as_is_asked_and_are_as_one_by_one(ratio, 
 @pytest.fixture
 def always(monkeypatch):
     """Compiled loops, however few cases there are."""
-    monkeypatch.setattr(compiled, "MANY", 1)
+    monkeypatch.setattr(planar, "MANY", 1)
 
 
 def both(monkeypatch, *case):
     """Return the chances inside and outside, by the loops and without them."""
     found = []
     for many in (1, 10**9):
-        monkeypatch.setattr(compiled, "MANY", many)
+        monkeypatch.setattr(planar, "MANY", many)
         found.append((joining_probability(*case), failing_probability(*case)))
     return found
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
 from thermal_robot.arrays import Array
@@ -17,14 +15,14 @@ from thermal_robot.assembly.probability.joining import (
     Shape,
     Thermal,
     check_covariance,
-    failing_probability,
 )
-from thermal_robot.assembly.probability.planar import disc_clearances
 from thermal_robot.assembly.probability.spread import UniformSpread
 
 Convention = Literal["two_sided", "one_sided"]
 
-_SMALLEST = 700.0  # factors of e below the size of the errors at which a clearance is taken for zero
+_CLOSE, _NOISE = 1e-11, 1e-13  # relative of a clearance, and of a quantile, below which nothing is left to find
+_STEPS, _SECANTS = 120, 12  # before a bounded law, whose failing probability may end abruptly, is halved
+_SURE = 40.0  # standard deviations beyond which nothing fails in double precision
 
 
 def capability(
@@ -173,66 +171,42 @@ def required_clearance(
     law = law.flat(leading)
     found = np.full(len(law.means), 0.0 if target == 0.0 else np.inf)
     if target < 0.0 and np.isfinite(target):
-        found = _clearances(law, target, shape, proportion)
+        found = _clearances(law, target, shape, np.ones(1) if shape == "circle" else proportion)
     return found.reshape(leading) if leading else float(found[0])
 
 
-def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Array:
-    """Return the required clearances ``(N,)``: in batch where cheap integrals suffice, by Brent's method elsewhere."""
-    found = np.full(len(law.means), np.nan)
-    pieces = () if law.spread is None else law.spread.pieces
-    if shape == "circle" and len(pieces) < 2 and all(piece.generators.shape[1] < 2 for piece in pieces):
-        means, segments = law.means, law.segments
-        for piece in pieces:
-            means = means + piece.centre
-            segments = np.broadcast_to(piece.generators[:, 0], means.shape) if piece.generators.shape[1] else segments
-        found = disc_clearances(law.matrices, means, target, segments)
-    for k in np.flatnonzero(np.isnan(found)):
-        found[k] = _one_clearance(law.rows(np.array([k])), target, shape, proportion)
-    return found
+def _clearances(law: Law, log_failing: float, shape: Shape, proportion: Array) -> Array:
+    """Solve for the factors on ``proportion`` by the secant method within a bracket, all at once.
 
-
-def _one_clearance(law: Law, target: float, shape: Shape, proportion: Array) -> float:
-    """Return the required clearance of a single law, by Brent's method."""
-
-    def excess(log_size: float) -> float:
-        size = np.exp(log_size) * (1.0 if shape == "circle" else proportion)
-        fails = float(
-            failing_probability(
-                law.matrices[0], size, law.means, shape=shape, thermal=law.spread, segments=law.segments
-            )[0]
-        )
-        # Bounded below so that a bounded law, which stops failing altogether, still has a change of sign.
-        return max(float(np.log(fails)) if fails > 0.0 else -np.inf, -1e4) - target
-
-    return _solve(excess, np.log(_typical_size(law)))
-
-
-def _typical_size(law: Law) -> float:
-    """Start value of the search: the size of the errors."""
-    square = float(np.trace(law.matrices[0])) + float(np.sum(np.square(law.means)))
-    if law.spread is not None:
-        square += float(np.trace(law.spread.covariance) + np.sum(law.spread.mean**2))
-    if law.segments is not None:
-        square += float(np.sum(np.square(law.segments)))
-    if square == 0.0:
+    The failing probability as a standard normal quantile is nearly a straight line in the size wherever little fails,
+    so that few steps are enough. The first comes from Wilson and Hilferty's approximation of the squared error.
+    """
+    wanted = -float(ndtri_exp(log_failing))
+    mean, variance = law.square()
+    if not np.all(mean > 0.0):
         raise ValueError("without any error every clearance will do")
-    return 4.0 * float(np.sqrt(square))
-
-
-def _solve(excess: Callable[[float], float], start: float) -> float:
-    """Root of a decreasing function of the log size: bracket by doubling, then Brent's method."""
-    low = high = start
-    step = np.log(2.0)
-    while excess(high) > 0.0:
-        low, high, step = high, high + step, 1.5 * step
-    step = np.log(2.0)
-    while excess(low) < 0.0:
-        high, low, step = low, low - step, 1.5 * step
-        if low < start - _SMALLEST:
-            return 0.0
-    # The failing probability carries rounding of its own; asking for less than 1e-14 of the size finds nothing more.
-    return float(np.exp(brentq(excess, low, high, xtol=1e-15, rtol=1e-15 * 8)))
+    ratio = np.maximum(variance / (9.0 * mean * mean), 1e-3)
+    share = np.maximum(1.0 - ratio + wanted * np.sqrt(ratio), 0.05)
+    size = 2.0 * np.sqrt(mean) * share**1.5 / np.mean(proportion)
+    slope = share / (1.5 * np.sqrt(ratio) * size)
+    low, high = np.zeros_like(size), np.full_like(size, np.inf)
+    last, value, left = size.copy(), np.empty_like(size), np.arange(len(size))
+    for number in range(_STEPS):
+        here = size[left]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fails = np.log(law.rows(left).probability(here[:, None] * proportion, shape, True))
+            now = np.clip(-ndtri_exp(np.minimum(fails, 0.0)), -_SURE, _SURE) - wanted
+            slope[left] = (now - value[left]) / (here - last[left]) if number else slope[left]
+            following = here - now / slope[left]
+        low[left], high[left] = np.where(now < 0.0, here, low[left]), np.where(now < 0.0, high[left], here)
+        last[left], value[left] = here, now
+        lost = ~((following > low[left]) & (following < high[left])) | (number > _SECANTS)
+        halved = np.where(np.isinf(high[left]), 2.0 * here, 0.5 * (low[left] + high[left]))
+        size[left] = np.where(np.abs(now) < _NOISE, here, np.where(lost, halved, following))
+        left = left[np.abs(size[left] - here) > _CLOSE * here]
+        if not len(left):
+            break
+    return size
 
 
 def _share(value: npt.ArrayLike | None) -> Array:

@@ -6,18 +6,17 @@ Several independent uniform parts are Gauss-Legendre sums, as fine as the normal
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.compiled import circle_chances
 from thermal_robot.assembly.probability.kernels import integrate_panels
 from thermal_robot.assembly.probability.planar import planar_probability
 from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
 
+Shape = Literal["circle", "rectangle"]
 Randomised = Literal["uniform", "normal"]
 Thermal = UniformSpread | npt.ArrayLike | None
 
@@ -82,6 +81,34 @@ class Law:
         ends = self.segments
         return Law(self.matrices[chosen], self.means[chosen], self.spread, None if ends is None else ends[chosen])
 
+    def square(self) -> tuple[Array, Array]:
+        """Mean ``(N,)`` of the squared error of flattened laws, and its variance as if the whole were normal."""
+        matrices, means = self.matrices, self.means
+        if self.spread is not None:
+            matrices, means = matrices + self.spread.covariance, means + self.spread.mean
+        if self.segments is not None:
+            matrices = matrices + self.segments[:, :, None] * self.segments[:, None] / 3.0
+        moved = np.einsum("ni,nij,nj->n", means, matrices, means)
+        variance = 2.0 * np.sum(matrices**2, axis=(1, 2)) + 4.0 * moved
+        return np.trace(matrices, axis1=1, axis2=2) + np.sum(means**2, axis=1), variance
+
+    def probability(self, sizes: Array, shape: Shape, outside: bool) -> Array:
+        """Probability ``(N,)`` of flattened laws in, or out of, regions of diameters ``(N, 1)`` or sides ``(N, 2)``."""
+        result = np.full(len(sizes), 1.0 if outside else 0.0)
+        endless = np.all(np.isinf(sizes), axis=1)
+        result[endless] = 0.0 if outside else 1.0
+        proper = np.flatnonzero(np.all(sizes > 0.0, axis=1) & ~endless)
+        law, sizes = self.rows(proper), sizes[proper]
+        pieces = (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),) if law.spread is None else law.spread.pieces
+        if np.any(np.isinf(sizes)):  # a strip: no error is so long
+            bound = sum(np.abs(p.centre).sum() + np.abs(p.generators).sum() for p in pieces)
+            sizes = np.where(np.isinf(sizes), 2.0 * (bound + _FAR * np.sqrt(law.square()[0])[:, None]), sizes)
+        total = np.zeros(len(sizes))
+        for piece in pieces:
+            total += piece.weight * _piece(law, law.means + piece.centre, sizes, shape, piece.generators, outside)
+        result[proper] = np.minimum(total, 1.0)
+        return result
+
 
 def _vectors(value: npt.ArrayLike, name: str) -> Array:
     array = np.asarray(value, dtype=float)
@@ -106,9 +133,12 @@ def check_covariance(covariance: npt.ArrayLike) -> Array:
 
 
 _LARGEST, _LARGEST_GRID = 400_000, 10_000  # nodes
+_REACH, _REACH_MANY = 38.0, 9.0
 # Standard deviations of the normal part within which the sums are exact to rounding: all of double precision for one
 # generator, and as far as a failing probability of 1e-20 where sums multiply.
-_REACH, _REACH_MANY = 38.0, 9.0
+_FAR = 50.0  # standard deviations beyond which the normal part is zero in double precision, for an infinite clearance
+_SMOOTH = 6.0
+# Longest second generator, in standard deviations of the normal part, for which a fixed sum is the cheaper way.
 
 
 def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
@@ -118,14 +148,19 @@ def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
     length and the reach in standard deviations; panels and nodes follow from that. Refused where the normal part is too
     narrow for a sum of reasonable length.
     """
-    reach = _REACH if generators.shape[1] == 1 else _REACH_MANY
     lengths = generator_lengths(covariance, generators)
+    rates = lengths * ((_REACH if len(lengths) == 1 else _REACH_MANY) + lengths)
+    panels = np.maximum(np.ceil(rates / 12.0), 1.0)
+    counts = _node_count(rates / panels)
     # Counted before any node is made: next to a vanishing normal part there would be 1e12 of them.
-    if np.prod([panels * count for panels, count in (_rule_size(v, reach) for v in lengths)], dtype=float) > _LARGEST:
-        raise ValueError(_too_narrow(len(lengths) + 1))
-    rules = [_rule(length, reach) for length in lengths]
-    units = np.array(list(product(*(rule[0] for rule in rules)))).reshape(-1, len(rules))
-    weights = np.array([np.prod(w) for w in product(*(rule[1] for rule in rules))])
+    _refuse(float(np.prod(panels * counts)), _LARGEST, len(lengths))
+    units, weights = np.zeros((1, 0)), np.ones(1)
+    for parts, count in zip(panels.astype(int), counts.astype(int), strict=True):
+        points, shares = np.polynomial.legendre.leggauss(int(count))
+        centres = (2.0 * np.arange(parts) + 1.0) / parts - 1.0
+        rule = (centres[:, None] + points / parts).ravel()
+        units = np.column_stack([np.repeat(units, len(rule), axis=0), np.tile(rule, len(units))])
+        weights = np.outer(weights, np.tile(shares / (2.0 * parts), parts)).ravel()
     return units @ generators.T, weights
 
 
@@ -144,72 +179,45 @@ def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Arra
     half = np.sum(np.abs(components), axis=1)
     half[half <= 1e-13 * np.max(half)] = 0.0
     lengths = generator_lengths(covariance, axes * half)
-    counts = [
-        1 if h == 0.0 else _node_count(length * (_REACH_MANY + length)) for h, length in zip(half, lengths, strict=True)
-    ]
-    if counts[0] * counts[1] > _LARGEST_GRID:
-        raise ValueError(_too_narrow(generators.shape[1] + 1))
-    angles = [np.pi * (np.arange(n) + 0.5) / n for n in counts]
-    to_grid = [np.cos(np.outer(np.arange(n), angle)) * (2.0 / n) for n, angle in zip(counts, angles, strict=True)]
+    counts = np.where(half > 0.0, _node_count(lengths * (_REACH_MANY + lengths)), 1.0)
+    _refuse(float(np.prod(counts)), _LARGEST_GRID, generators.shape[1])
+    cosines = [np.cos(np.pi * (np.arange(n) + 0.5) / n) for n in counts.astype(int)]
+    to_grid = [np.polynomial.chebyshev.chebvander(c, len(c) - 1).T * (2.0 / len(c)) for c in cosines]
     for matrix in to_grid:
         matrix[0] *= 0.5
-    units, unit_weights = np.polynomial.legendre.leggauss(max(counts))
+    units, unit_weights = np.polynomial.legendre.leggauss(int(counts.max()))
     points, weights, reached = np.zeros((1, 2)), np.ones(1), np.zeros(2)
-    for k in range(generators.shape[1]):
-        points = (points[:, None, :] + units[:, None] * components[:, k]).reshape(-1, 2)
+    for column in components.T:
+        points = (points[:, None, :] + units[:, None] * column).reshape(-1, 2)
         weights = np.outer(weights, 0.5 * unit_weights).ravel()
         # The box of the sum so far; it must hold all points, since the next sum starts from its grid.
-        reached = reached + np.where(half > 0.0, np.abs(components[:, k]), 0.0)
-        bases = []
-        for axis in (0, 1):
-            scaled = points[:, axis] / reached[axis] if reached[axis] > 0.0 else np.zeros(len(points))
-            bases.append(np.cos(np.outer(np.arccos(np.clip(scaled, -1.0, 1.0)), np.arange(counts[axis]))))
-        weights = (to_grid[0].T @ (bases[0].T @ (weights[:, None] * bases[1])) @ to_grid[1]).ravel()
-        axes_points = [reach * np.cos(angle) for reach, angle in zip(reached, angles, strict=True)]
-        points = np.stack(np.meshgrid(*axes_points, indexing="ij"), -1).reshape(-1, 2)
+        reached = reached + np.where(half > 0.0, np.abs(column), 0.0)
+        scaled = np.clip(points / np.where(reached > 0.0, reached, np.inf), -1.0, 1.0)
+        one, two = (np.polynomial.chebyshev.chebvander(scaled[:, k], len(cosines[k]) - 1) for k in (0, 1))
+        weights = (to_grid[0].T @ (one.T @ (weights[:, None] * two)) @ to_grid[1]).ravel()
+        grid = np.meshgrid(*(r * c for r, c in zip(reached, cosines, strict=True)), indexing="ij")
+        points = np.stack(grid, -1).reshape(-1, 2)
     return points @ axes.T, weights
 
 
-def generator_lengths(covariance: Array, generators: Array) -> list[float]:
+def generator_lengths(covariance: Array, generators: Array) -> Array:
     """Length of every generator in standard deviations of the normal part along it."""
     values, vectors = np.linalg.eigh(covariance)
-    components = vectors.T @ generators
     floor = 1e-12 * max(float(values[-1]), float(np.max(np.sum(generators**2, axis=0))))
-    return [float(v) for v in np.sqrt(np.sum(components**2 / np.maximum(values, floor)[:, None], axis=0))]
+    return np.linalg.norm((vectors / np.sqrt(np.maximum(values, floor))).T @ generators, axis=0)
 
 
-def _rule(length: float, reach: float) -> tuple[Array, Array]:
-    """Composite Gauss rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
-    panels, count = _rule_size(length, reach)
-    points, weights = np.polynomial.legendre.leggauss(count)
-    centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
-    return (centres[:, None] + points / panels).ravel(), np.tile(weights / (2.0 * panels), panels)
-
-
-def _rule_size(length: float, reach: float) -> tuple[int, int]:
-    """Return the number of panels of :func:`_rule`, and of points on each."""
-    panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
-    return panels, _node_count(length / panels * (reach + length))
-
-
-def _node_count(rate: float) -> int:
+def _node_count(rate: Array) -> Array:
     """Points per panel [-1, 1] for functions that grow like ``exp(rate * u)``, to rounding."""
-    return int(np.ceil(7.0 + 0.8 * rate))
+    return np.ceil(7.0 + 0.8 * rate)
 
 
-def _too_narrow(count: int) -> str:
-    return (
-        f"{count} independent uniform links next to so narrow a normal part need too many nodes; "
-        "use a segment, a box, or a zonotope with over='area'"
-    )
-
-
-Shape = Literal["circle", "rectangle"]
-
-# Beyond this many standard deviations the normal part is zero in double precision; stands for an infinite clearance.
-_FAR = 50.0
-# Longest second generator, in standard deviations of the normal part, for which a fixed sum is the cheaper way.
-_SMOOTH = 6.0
+def _refuse(nodes: float, most: int, count: int) -> None:
+    if nodes > most:
+        raise ValueError(
+            f"{count + 1} independent uniform links next to so narrow a normal part need too many nodes; "
+            "use a segment, a box, or a zonotope with over='area'"
+        )
 
 
 def joining_probability(
@@ -288,36 +296,11 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
-    """Validate, broadcast and integrate all cases; large batches of plain ones go to compiled loops."""
-    plain = shape == "circle" and thermal is None and segments is None
-    chances = circle_chances(covariance, clearance, mean) if plain else None
-    quick: Array | None = None if chances is None else chances[int(outside)]
-    if quick is not None and not np.any(np.isnan(quick)):
-        return quick
     law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
     leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
-    law = law.flat(leading)
     sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
-    if quick is None:
-        return _integrated(law, sizes, shape, outside).reshape(leading)
-    result: Array = quick.reshape(-1)
-    left = np.isnan(result)
-    result[left] = _integrated(law.rows(left), sizes[left], shape, outside)
-    return np.asarray(result.reshape(leading))
-
-
-def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Integrate validated cases, together or, with several generators, by groups of equal covariance."""
-    if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
-        return _cases(law, sizes, shape, outside)
-    # sums over several generators are as fine as the normal part demands: one covariance after the other
-    kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
-    result = np.empty(len(sizes))
-    for number in range(len(kinds)):
-        chosen = kind.reshape(-1) == number
-        result[chosen] = _cases(law.rows(chosen), sizes[chosen], shape, outside)
-    return result
+    return law.flat(leading).probability(sizes, shape, outside).reshape(leading)
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
@@ -336,70 +319,52 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
     return sizes
 
 
-def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
-    """Integrate flattened cases; zero and infinite clearances have probability 0 and 1."""
-    result = np.full(len(sizes), 1.0 if outside else 0.0)
-    pieces = law.spread.pieces if law.spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
-    reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)
-    far = _FAR * np.sqrt(np.trace(law.matrices, axis1=1, axis2=2)) + reach + np.linalg.norm(law.means, axis=1)
-    if law.segments is not None:
-        far = far + np.linalg.norm(law.segments, axis=1)
-    endless = np.all(np.isinf(sizes), axis=1)
-    result[endless] = 0.0 if outside else 1.0
-    sizes = np.where(np.isinf(sizes), 2.0 * far[:, None], sizes)
-    proper = np.all(sizes > 0.0, axis=1) & ~endless
-    if np.any(proper):
-        law, sizes, total = law.rows(proper), sizes[proper], np.zeros(int(np.sum(proper)))
-        for piece in pieces:
-            means = law.means + piece.centre
-            if piece.generators.shape[1] < 2:
-                ends = piece.generators[:, 0] if piece.generators.shape[1] else law.segments
-                found = planar_probability(law.matrices, means, sizes, shape=shape, segment=ends, outside=outside)
-            else:
-                found = _piece_probability(law.matrices[0], means, sizes, shape, piece.generators, outside)
-            total += piece.weight * found
-        result[proper] = np.minimum(total, 1.0)
+def _piece(law: Law, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
+    """Integrate one parallelotope: longest generator in closed form, the others by quadrature."""
+    count = generators.shape[1]
+    segment = generators[:, 0] if count else law.segments
+    if count < 2:
+        return planar_probability(law.matrices, means, sizes, shape=shape, segment=segment, outside=outside)
+    # Sums over several generators are as fine as the normal part demands: one covariance after the other.
+    kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
+    result = np.empty(len(means))
+    for number, matrix in enumerate(kinds.reshape(-1, 2, 2)):
+        chosen = kind.reshape(-1) == number
+        result[chosen] = _several(matrix, means[chosen], sizes[chosen], shape, generators, outside)
     return result
 
 
-def _piece_probability(
-    covariance: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool
-) -> Array:
-    """Integrate one parallelotope: longest generator in closed form, the others by quadrature."""
-    count = generators.shape[1]
-    segment = generators[:, 0] if count else None
-    if count < 2:
-        return planar_probability(covariance, means, sizes, shape=shape, segment=segment, outside=outside)
-    smooth = generator_lengths(covariance, generators[:, 1:2])[0] < _SMOOTH
-    summed = 1 if smooth else 2
-    if count > summed:
-        shifts, weights = planar_link_nodes(covariance, generators[:, summed:])
-        shifted = (means[:, None, :] + shifts).reshape(-1, 2)
-        repeated = np.repeat(sizes, len(weights), axis=0)
-        values = _piece_probability(covariance, shifted, repeated, shape, generators[:, :summed], outside)
-        return np.asarray(values.reshape(len(means), -1) @ weights)
-    second = generators[:, 1]
+def _several(matrix: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
+    """Sum over all generators but the longest; a second one long beside the normal part by halved panels."""
+    options = {"shape": shape, "segment": generators[:, 0], "outside": outside}
 
-    def shifted_probability(owner: npt.NDArray[np.intp], u: Array) -> Array:
-        centres = (means[owner][:, None, :] + u[..., None] * second).reshape(-1, 2)
-        repeated = np.repeat(sizes[owner], u.shape[1], axis=0)
-        values = planar_probability(covariance, centres, repeated, shape=shape, segment=segment, outside=outside)
-        return 0.5 * values.reshape(u.shape)
+    def shifted(owner: npt.NDArray[np.intp], shifts: Array) -> Array:
+        values = planar_probability(
+            matrix,
+            (means[owner][:, None] + shifts).reshape(-1, 2),
+            np.repeat(sizes[owner], shifts.shape[-2], 0),
+            **options,
+        )
+        return values.reshape(len(owner), -1)
 
-    return integrate_panels(shifted_probability, _second_breakpoints(generators, means, sizes), tolerance=1e-12)
+    every, second = np.arange(len(means)), generators[:, 1]
+    smooth = generator_lengths(matrix, generators[:, 1:2])[0] < _SMOOTH
+    rest = generators[:, 1 if smooth else 2 :]
+    shifts, weights = planar_link_nodes(matrix, rest) if rest.shape[1] else (np.zeros((1, 2)), np.ones(1))
+    if smooth:
+        return shifted(every, shifts) @ weights
 
+    def summed(owner: npt.NDArray[np.intp], u: Array) -> Array:
+        every_shift = (u[:, :, None, None] * second + shifts).reshape(len(u), -1, 2)
+        return 0.5 * shifted(owner, every_shift).reshape(*u.shape, -1) @ weights
 
-def _second_breakpoints(generators: Array, means: Array, sizes: Array) -> Array:
-    """Breakpoints over the second generator, graded to where the first one's segment crosses the centre."""
-    first, second = generators[:, 0], generators[:, 1]
-    normal = np.array([-first[1], first[0]])
-    across = float(second @ normal)
+    # Where the first generator's line passes the centre, and the farther off the fewer steps there are.
+    normal = np.array([-generators[1, 0], generators[0, 0]])
     with np.errstate(divide="ignore", invalid="ignore"):
-        centre = np.clip(np.nan_to_num(-(means @ normal) / across), -1.0, 1.0)[:, None]
-    finest = float(np.min(sizes)) / float(np.linalg.norm(second))
-    steps = int(np.clip(np.ceil(np.log2(4.0 / finest)), 1, 40)) if finest < 4.0 else 1
-    ladder = 2.0 * 2.0 ** -np.arange(steps + 1.0) if steps > 1 else np.array([])
+        centre = np.clip(np.nan_to_num(-(means @ normal) / (second @ normal)), -1.0, 1.0)[:, None]
+    finest = min(float(np.min(sizes)) / float(np.linalg.norm(second)), 4.0)
+    ladder = 2.0 * 2.0 ** -np.arange(np.clip(np.ceil(np.log2(4.0 / finest)), 0, 40) + 1.0)
     points = np.concatenate(
-        [[-1.0, 0.0, 1.0] * np.ones((len(means), 1)), centre, centre - ladder, centre + ladder], axis=1
+        [np.tile([-1.0, 0.0, 1.0], (len(means), 1)), centre, centre - ladder, centre + ladder], axis=1
     )
-    return np.sort(np.clip(points, -1.0, 1.0), axis=1)
+    return integrate_panels(summed, np.sort(np.clip(points, -1.0, 1.0), axis=1), tolerance=1e-12)
