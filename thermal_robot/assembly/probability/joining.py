@@ -204,7 +204,7 @@ def generator_lengths(covariance: Array, generators: Array) -> Array:
     """Length of every generator in standard deviations of the normal part along it."""
     values, vectors = np.linalg.eigh(covariance)
     floor = 1e-12 * max(float(values[-1]), float(np.max(np.sum(generators**2, axis=0))))
-    return np.linalg.norm((vectors / np.sqrt(np.maximum(values, floor))).T @ generators, axis=0)
+    return np.asarray(np.linalg.norm((vectors / np.sqrt(np.maximum(values, floor))).T @ generators, axis=0))
 
 
 def _node_count(rate: Array) -> Array:
@@ -336,15 +336,11 @@ def _piece(law: Law, means: Array, sizes: Array, shape: Shape, generators: Array
 
 def _several(matrix: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
     """Sum over all generators but the longest; a second one long beside the normal part by halved panels."""
-    options = {"shape": shape, "segment": generators[:, 0], "outside": outside}
 
     def shifted(owner: npt.NDArray[np.intp], shifts: Array) -> Array:
-        values = planar_probability(
-            matrix,
-            (means[owner][:, None] + shifts).reshape(-1, 2),
-            np.repeat(sizes[owner], shifts.shape[-2], 0),
-            **options,
-        )
+        centres = (means[owner][:, None] + shifts).reshape(-1, 2)
+        every = np.repeat(sizes[owner], shifts.shape[-2], axis=0)
+        values = planar_probability(matrix, centres, every, shape=shape, segment=generators[:, 0], outside=outside)
         return values.reshape(len(owner), -1)
 
     every, second = np.arange(len(means)), generators[:, 1]

@@ -146,8 +146,8 @@ def planar_probability(
             left = left[np.isnan(found[left])]
         for first in range(0, len(left), _ROWS):
             rows = left[first : first + _ROWS]
-            here = (principal.rows(rows), *(array[start:stop][rows] for array in (means, sizes, ends)))
-            found[rows] = by_chords(*here, shape, outside)
+            middle, size, end = (array[start:stop][rows] for array in (means, sizes, ends))
+            found[rows] = by_chords(principal.rows(rows), middle, size, end, shape, outside)
 
     found = np.empty(count)
     in_pieces(piece, (), count, (found,))
@@ -176,9 +176,9 @@ def disc_chances(principal: Principal, means: Array, radii: Array, segments: Arr
     for k in np.unique(which[which < len(ANGLES)]):
         same, count = which == k, int(ANGLES[k])
         for middle, every in ((True, same & central), (False, same & plain & ~central)):
-            edges = partial(_disc_by_edge, count=count, central=middle, fast=fast)
-            _fill(result, lambda rows, edges=edges: edges(axes[rows], at[rows]), every, count // (4 if middle else 1))
-        _fill(result, lambda rows, n=count: _segment_by_edge(axes[rows], at[rows], ends[rows], n), same & far, count)
+            edges = partial(_disc_by_edge, axes, at, count, middle, fast)
+            _fill(result, edges, every, count // (4 if middle else 1))
+        _fill(result, partial(_segment_by_edge, axes, at, ends, count), same & far, count)
     result[1, far & (result[1] < _TOLD)] = np.nan
     narrow = plain & ~edge & (principal.large > 0.0)
     _fill(result, lambda rows: _disc_by_chords(deviations[rows], centre[rows], radii[rows]), narrow, 64)
@@ -202,12 +202,13 @@ def _fill(result: Array, chance: Callable[[Rows], tuple[Array, Array]], chosen: 
         result[:, part] = chance(part)
 
 
-def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, fast: bool) -> tuple[Array, Array]:
+def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, fast: bool, rows: Rows) -> tuple[Array, Array]:
     """Probabilities in and out of discs about the origin, by ``count`` angles on the edge.
 
     ``axes`` and ``centre`` ``(N, 2)``: radius and mean over standard deviation along both principal axes; where the
     means are zero (``central``) a quarter of the edge says all. ``fast``: by compiled loops.
     """
+    axes, centre = axes[rows], centre[rows]
     angle = (2.0 * np.pi / count) * (np.arange(count // 4 if central else count) + 0.5)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     if fast:
@@ -265,12 +266,13 @@ def _poles(axes: Array, centre: Array, count: int) -> Array:
         return np.asarray(sum((power / (1.0 + power)).real for power in powers))
 
 
-def _segment_by_edge(axes: Array, centre: Array, segment: Array, count: int) -> tuple[Array, Array]:
+def _segment_by_edge(axes: Array, centre: Array, segment: Array, count: int, rows: Rows) -> tuple[Array, Array]:
     """Probabilities in and out of discs about the origin, the mean uniform on a segment about ``centre``.
 
     Arguments as for `_disc_by_edge`; ``segment`` ``(N, 2)`` is half of it over the standard deviations, not short
     beside one: then the angles that a centred disc needs are enough. The absolute error is rounding.
     """
+    axes, centre, segment = axes[rows], centre[rows], segment[rows]
     angle = (2.0 * np.pi / count) * (np.arange(count) + 0.5)
     circle = np.stack([np.cos(angle), np.sin(angle)])
     length = np.hypot(*segment.T)[:, None]
@@ -455,7 +457,8 @@ def by_chords(principal: Principal, means: Array, sizes: Array, segments: Array,
 
     def integrand(owner: Rows, t: Array) -> Array:
         z, probability = chord(owner, t)
-        return np.exp(-0.5 * z * z) / _ROOT_2PI * (window.half[owner, None] * np.cos(t)) * probability
+        density = np.exp(-0.5 * z * z) / _ROOT_2PI
+        return np.asarray(density * (window.half[owner, None] * np.cos(t)) * probability)
 
     strip = length[:, None, None] * ([[-1.0], [0.0], [1.0]] if np.any(length) else [[0.0]])
     strip = (strip + frame.remainder[:, None, None] * _STRIP).reshape(len(means), -1)
