@@ -148,6 +148,7 @@ def planar_probability(
             rows = left[first : first + _ROWS]
             middle, size, end = (array[start:stop][rows] for array in (means, sizes, ends))
             found[rows] = by_chords(principal.rows(rows), middle, size, end, shape, outside)
+        np.clip(found, 0.0, 1.0, out=found)  # sums on the edge are off by rounding
 
     found = np.empty(count)
     in_pieces(piece, (), count, (found,))
