@@ -5,7 +5,12 @@ import pytest
 from scipy.stats import ncx2
 
 from thermal_robot import compiling
-from thermal_robot.assembly.probability import failing_probability, joining_probability, planar, required_clearance
+from thermal_robot.assembly.probability import (
+    compiled,
+    failing_probability,
+    joining_probability,
+    required_clearance,
+)
 from thermal_robot.assembly.probability.planar import Principal, by_chords, disc_chances
 
 needs_loops = pytest.mark.skipif(
@@ -64,14 +69,14 @@ def test_many_clearances_fail_as_often_as_is_asked_and_are_as_one_by_one(ratio, 
 @pytest.fixture
 def always(monkeypatch):
     """Compiled loops, however few cases there are."""
-    monkeypatch.setattr(planar, "MANY", 1)
+    monkeypatch.setattr(compiled, "MANY", 1)
 
 
 def both(monkeypatch, *case):
     """Return the chances inside and outside, by the loops and without them."""
     found = []
     for many in (1, 10**9):
-        monkeypatch.setattr(planar, "MANY", many)
+        monkeypatch.setattr(compiled, "MANY", many)
         found.append((joining_probability(*case), failing_probability(*case)))
     return found
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermal_robot.arrays import Array
+from thermal_robot.assembly.probability.compiled import circle_chances
 from thermal_robot.assembly.probability.kernels import integrate_panels
 from thermal_robot.assembly.probability.planar import planar_probability
 from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
@@ -296,11 +297,20 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
+    """Validate, broadcast and integrate all cases; large batches of plain ones go to compiled loops."""
+    plain = shape == "circle" and thermal is None and segments is None
+    chances = circle_chances(covariance, clearance, mean) if plain else None
+    result = np.array(np.nan) if chances is None else chances[int(outside)]
+    if not np.any(np.isnan(result)):
+        return result
     law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
     leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
     sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
-    return law.flat(leading).probability(sizes, shape, outside).reshape(leading)
+    found = np.broadcast_to(result, leading).flatten()
+    left = np.flatnonzero(np.isnan(found))
+    found[left] = law.flat(leading).rows(left).probability(sizes[left], shape, outside)
+    return found.reshape(leading)
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:

@@ -42,19 +42,17 @@ from scipy.special import ndtr
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.kernels import inside_probability, integrate_panels, outside_probability
-from thermal_robot.compiling import in_pieces, loads
+from thermal_robot.compiling import in_pieces
 
 ANGLES = np.array([32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024])
 """Numbers of angles that are used; multiples of four."""
-_PER_DEVIATION, _BESIDES = 8.0, 16.0
+PER_DEVIATION, BESIDES = 8.0, 16.0
 # Angles per standard deviation, the shorter one, from the disc's farther edge to the mean, and besides: measured
 # against the chords' integral, the absolute error is then below 2e-15 and that of a small 1 - P below 1e-11 of it.
-_MOST = 256  # angles beside which chords are worth their while
-_NEAR = 0.01  # squared distances (halved) of a node from the mean below which (1 - exp(-h)) / h is taken by its series
-_SERIES = np.array([-1.0 / 720.0, 1.0 / 120.0, -1.0 / 24.0, 1.0 / 6.0, -0.5, 1.0])
-_FRACTION = 0.05  # a failing probability above this is one minus the other
-MANY = 20_000
-"""Cases from which compiled loops are worth while: the first call loads numba, which takes a second, and compiles."""
+MOST = 256  # angles beside which chords are worth their while
+NEAR = 0.01  # squared distances (halved) of a node from the mean below which (1 - exp(-h)) / h is taken by its series
+SERIES = (-1.0 / 720.0, 1.0 / 120.0, -1.0 / 24.0, 1.0 / 6.0, -0.5, 1.0)
+FRACTION = 0.05  # a failing probability above this is one minus the other
 _CELLS = 1 << 17  # numbers of an array that stays in cache, eight bytes each
 _TOLD, _TOLD_BY_CHORDS = 1e-5, 2e-6
 # Least 1 - P that an edge with a segment gives as one minus P to ten digits, and that 64 chords give.
@@ -132,8 +130,6 @@ def planar_probability(
     matrices = np.broadcast_to(covariance, (count, 2, 2))
     ends = np.zeros((count, 2)) if segment is None else np.broadcast_to(segment, (count, 2))
 
-    fast = count >= MANY and shape == "circle" and loads("thermal_robot.assembly.probability.loops")
-
     def piece(start: int, stop: int, result: Array) -> None:
         principal, found = Principal.of(matrices[start:stop]), result[start:stop]
         off = np.hypot(*means[start:stop].T) + np.hypot(*ends[start:stop].T)
@@ -142,7 +138,7 @@ def planar_probability(
         left = np.flatnonzero(np.isnan(found))
         if shape == "circle":
             case = (principal.rows(left), means[start:stop][left], 0.5 * sizes[start:stop][left, 0])
-            found[left] = disc_chances(*case, ends[start:stop][left], fast)[int(outside)]
+            found[left] = disc_chances(*case, ends[start:stop][left])[int(outside)]
             left = left[np.isnan(found[left])]
         for first in range(0, len(left), _ROWS):
             rows = left[first : first + _ROWS]
@@ -155,7 +151,7 @@ def planar_probability(
     return found
 
 
-def disc_chances(principal: Principal, means: Array, radii: Array, segments: Array, fast: bool = False) -> Array:
+def disc_chances(principal: Principal, means: Array, radii: Array, segments: Array) -> Array:
     """Probabilities ``(2, N)`` in, to rounding, and out of discs about the origin, to ten digits; NaN where not told.
 
     Means and half segments ``(N, 2)``. A segment that is short beside the deviations is a sum of sixteen means.
@@ -170,14 +166,14 @@ def disc_chances(principal: Principal, means: Array, radii: Array, segments: Arr
         far = heated & (np.hypot(*ends.T) > _SHORT)
         # the farther edge and the mean in the smaller deviation; a segment smooths what is far from its middle
         distance = np.where(far, 0.0, np.hypot(centre[:, 0] / deviations[:, 1], at[:, 1]))
-        needed = _PER_DEVIATION * (axes[:, 1] + distance) + _BESIDES
+        needed = PER_DEVIATION * (axes[:, 1] + distance) + BESIDES
     plain, central = ~heated, ~heated & ~np.any(at, axis=1)
-    edge = np.isfinite(needed) & (far | (needed <= _MOST)) & (principal.large > 0.0)
+    edge = np.isfinite(needed) & (far | (needed <= MOST)) & (principal.large > 0.0)
     which = np.where(edge & (far | plain), np.searchsorted(ANGLES, needed), len(ANGLES))
     for k in np.unique(which[which < len(ANGLES)]):
         same, count = which == k, int(ANGLES[k])
         for middle, every in ((True, same & central), (False, same & plain & ~central)):
-            edges = partial(_disc_by_edge, axes, at, count, middle, fast)
+            edges = partial(_disc_by_edge, axes, at, count, middle)
             _fill(result, edges, every, count // (4 if middle else 1))
         _fill(result, partial(_segment_by_edge, axes, at, ends, count), same & far, count)
     result[1, far & (result[1] < _TOLD)] = np.nan
@@ -203,24 +199,18 @@ def _fill(result: Array, chance: Callable[[Rows], tuple[Array, Array]], chosen: 
         result[:, part] = chance(part)
 
 
-def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, fast: bool, rows: Rows) -> tuple[Array, Array]:
+def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, rows: Rows) -> tuple[Array, Array]:
     """Probabilities in and out of discs about the origin, by ``count`` angles on the edge.
 
     ``axes`` and ``centre`` ``(N, 2)``: radius and mean over standard deviation along both principal axes; where the
-    means are zero (``central``) a quarter of the edge says all. ``fast``: by compiled loops.
+    means are zero (``central``) a quarter of the edge says all.
     """
     axes, centre = axes[rows], centre[rows]
     angle = (2.0 * np.pi / count) * (np.arange(count // 4 if central else count) + 0.5)
     circle = np.stack([np.cos(angle), np.sin(angle)])
-    if fast:
-        from thermal_robot.assembly.probability.loops import edge_sums
-
-        inside, outer = found = np.empty((2, len(axes)))
-        edge_sums(axes, centre, circle, _NEAR, _SERIES, found)
-    else:
-        inside, outer = _edge_sums(axes, centre, circle, central)
+    inside, outer = _edge_sums(axes, centre, circle, central)
     outside = 1.0 - inside
-    small = np.flatnonzero(outside < _FRACTION)
+    small = np.flatnonzero(outside < FRACTION)
     outside[small] = outer[small] + _poles(axes[small], centre[small], count)
     return inside, outside
 
@@ -239,7 +229,7 @@ def _edge_sums(axes: Array, centre: Array, circle: Array, central: bool) -> tupl
     half += second
     half *= 0.5  # h
     decay = np.exp(np.negative(half, out=second), out=second)
-    close = np.min(half, axis=1) < _NEAR
+    close = np.min(half, axis=1) < NEAR
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.divide(weight, half, out=None if np.any(close) else half)
     outer = 0.5 * np.einsum("nk,nk->n", share, decay) / count
@@ -247,7 +237,7 @@ def _edge_sums(axes: Array, centre: Array, circle: Array, central: bool) -> tupl
     if np.any(close):
         near = half[close]
         with np.errstate(divide="ignore", invalid="ignore"):
-            mean = np.where(near < _NEAR, np.polyval(_SERIES, near), (1.0 - np.exp(-near)) / near)
+            mean = np.where(near < NEAR, np.polyval(SERIES, near), (1.0 - np.exp(-near)) / near)
         inside[close] = 0.5 * np.mean(np.broadcast_to(weight, half.shape)[close] * mean, axis=1)
     return inside, outer
 
