@@ -84,9 +84,9 @@ class ModelSearch:
         # products with all columns are kept, but not those of per-pose kernels, which have too many
         both = zip(self.kernels, self._spectra, strict=True)
         self._projections = [None if kernel.grouped else spectrum.along(self._stack) for kernel, spectrum in both]
-        for number in range(len(self.kernels)):
+        if self.kernels:
             each = float(np.log(share / max(self.among, len(self.kernels)))) - float(np.log(len(settings.TAUS)))
-            self._priors |= {(number, tau): each for tau in settings.TAUS}
+            self._priors |= {(k, tau): each for k in range(len(self.kernels)) for tau in settings.TAUS}
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
     def without(self, out: frozenset[int]) -> ModelSearch:
