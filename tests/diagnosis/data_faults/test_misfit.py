@@ -167,6 +167,12 @@ def test_a_coarse_robot_is_no_other_robot(rv_m2, sizes, seed):
     assert another_robot(campaign) is None
 
 
+@pytest.mark.parametrize("seed", [2, 5])
+def test_places_that_few_poses_do_not_determine_make_no_other_robot(rv_m2, seed):
+    coarse = {"geometric": 4e-3, "joint_offset": 0.02, "backlash": 0.004}
+    assert another_robot(measured(rv_m2, seed, rows=24, share=0.15, **coarse)) is None
+
+
 @pytest.mark.parametrize("row", some([20, 55], 2))
 def test_a_base_that_moved_is_no_other_robot(rv_m2, row):
     campaign = base_moved(measured(rv_m2, 2, rows=100, joint_offset=5e-3), row, seed=row)

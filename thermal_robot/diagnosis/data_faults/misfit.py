@@ -96,16 +96,25 @@ class Recalibrated:
         shift = (back @ (own.translations[index] - was.translations[index])[:, :, None])[:, :, 0]
         return shift, log3(back @ own.rotations[index])
 
-    def farthest(self) -> tuple[str, float, float]:
-        """Joint that is displaced most from the URDF, by how much, m, and the ratio to the median joint.
+    def farthest(self) -> tuple[str, float, float, float]:
+        """Joint that is displaced most from the URDF, by how much, m, its standard deviation, and times the median.
 
         A slide's own way is its zero and does not count.
         """
         (shift, _), index, chain = self.moved, self._elements, self.robot.chain
         axes = chain.axes[index] * (chain.kinds[index] == PRISMATIC)[:, None]
-        far = np.linalg.norm(shift - axes * (shift * axes).sum(axis=1)[:, None], axis=1)
+        across = shift - axes * (shift * axes).sum(axis=1)[:, None]
+        far = np.linalg.norm(across, axis=1)
         j = int(np.argmax(far))
-        return chain.names[index[j]], float(far[j]), float(far[j] / max(np.median(far), settings.LEAST_GAP))
+        matrix, first = self._normal_equations(self._scale)[0], -len(self.prior) + 6 * j
+        covariance = np.linalg.inv(matrix)[first:, first:][:3, :3]
+        deviation = np.sqrt(across[j] @ covariance @ across[j]) / max(far[j], settings.LEAST_GAP)
+        return (
+            chain.names[index[j]],
+            float(far[j]),
+            float(deviation),
+            float(far[j] / max(np.median(far), settings.LEAST_GAP)),
+        )
 
     def left(self) -> tuple[float, float, float]:
         """Robust residual size, corrected for the unknowns: distance, m, rotation, rad, and both, m.
@@ -136,20 +145,29 @@ class Recalibrated:
             gap = np.hstack([gap, inference.LEVER * turned])
         return frames, point, gap
 
-    def _stepped(self) -> tuple[Recalibrated, bool]:
-        """Calibration after one descent step, and whether it has converged or no step descends."""
+    @property
+    def _scale(self) -> float:
+        """Robust standard deviation of the gap, m, from its median distance."""
+        return max(float(middle(np.linalg.norm(self._seen[2], axis=1))) / settings.MEDIAN, settings.LEAST_GAP)
+
+    def _normal_equations(self, scale: float) -> tuple[Array, Array]:
+        """Normal equations of frames and joints with their prior, in units of a standard deviation of the gap, m."""
         gap = self._seen[2]
-        distance = np.linalg.norm(gap, axis=1)
-        scale = max(float(middle(distance)) / settings.MEDIAN, settings.LEAST_GAP)
-        weight = np.sqrt(cauchy_weights(distance))[:, None] / scale
-        columns = self._columns() * weight[:, :, None]
-        design = columns.reshape(gap.size, -1)
+        weight = np.sqrt(cauchy_weights(np.linalg.norm(gap, axis=1)))[:, None] / scale
+        design = (self._columns() * weight[:, :, None]).reshape(gap.size, -1)
         matrix, vector = design.T @ design, design.T @ (gap * weight).ravel()
         frames = len(matrix) - len(self.prior)
         own = np.arange(frames)
         matrix[own, own] += settings.ROUNDED * matrix.diagonal()[:frames].max()
         matrix[frames:, frames:] += self.prior
         vector[frames:] -= self.prior @ np.hstack(self.moved).ravel()
+        return matrix, vector
+
+    def _stepped(self) -> tuple[Recalibrated, bool]:
+        """Calibration after one descent step, and whether it has converged or no step descends."""
+        scale = self._scale
+        matrix, vector = self._normal_equations(scale)
+        frames = len(matrix) - len(self.prior)
         step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
         for share in settings.STEP_SHARES:
             ahead = self._ahead(share * np.asarray(step, dtype=float), frames)
@@ -309,14 +327,14 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
     """Verdict of a calibration: another motion, another model, or ``None`` where a robot may err so much."""
-    (away, turned, both), (joint, far, times) = found.left(), found.farthest()
+    (away, turned, _), (joint, far, deviation, times) = found.left(), found.farthest()
     if turned > settings.ANOTHER_TURN:
         places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
         return _judged(places, factor) or Misfit(turned=turned)
     if away > settings.ANOTHER_MOTION * found.readings.spread:
         return Misfit(away=away, model=None if factor is None else AnotherModel(factor))
     most = settings.FARTHEST * (0.5 if times > settings.ALONE else 1.0) * arm_length(found.readings.robot)
-    off = far > max(most, settings.CLEARLY * both)
+    off = far - settings.CLEARLY * deviation > most
     return Misfit(away=away, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
 
 

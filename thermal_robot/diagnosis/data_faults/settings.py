@@ -98,7 +98,8 @@ FARTHEST, ALONE = 0.02, 10.0
 hundredth; half of it where the joint is alone with it, so many times farther off than the median of all: chance makes
 that two or three."""
 CLEARLY = 5.0
-"""Ratio of a joint's misplacement to a calibration's residual from which it counts: nongeometric errors feign less."""
+"""Standard deviations by which a joint's misplacement exceeds what robots err by: few poses determine it to
+centimetres, and nongeometric errors make it wrong by more than one."""
 PARTS, PART_ROWS = 4, 12
 """Largest number of parts of rows in their order with frames of their own, and fewest rows of each: a base that was
 moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
