@@ -15,8 +15,8 @@ from thermal_robot import diagnose
 from thermal_robot.blind import real as faults
 from thermal_robot.blind.real import REMAINDERS, RealCase, judged, real_cases
 from thermal_robot.campaign import read_campaign, read_samples
+from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import placement_sensitivities
-from thermal_robot.observations import observe
 
 UM = 1e-6
 
@@ -109,7 +109,7 @@ def test_an_offset_is_in_the_commands_of_one_joint(made, control):
     assert fresh.position is None
     assert fresh.samples == len(answers["fresh_position"])
     # after the best frames it leaves what it should
-    seen = observe(control["ur5_jacobi"][0], faults.registered(control["ur5_jacobi"][0]))
+    seen = faults.seen_in_position(control["ur5_jacobi"][0])
     left = faults.leaves(seen, seen.joint_sensitivity[:, :3, joint] * part["size"])
     assert left == pytest.approx(part["ratio"] * REMAINDERS["ur5_jacobi"], rel=0.1)
 
@@ -147,7 +147,7 @@ def test_a_slip_starts_once_and_stays(made, measured_campaigns):
     np.testing.assert_allclose(shift[start:, joint], -part["size"], atol=1e-12)
     assert np.abs(shift[:start]).max() < 1e-12
     # what the frames leave of it is to be seen beside what a full geometry leaves
-    seen = observe(campaign, faults.registered(campaign))
+    seen = faults.seen_in_position(campaign)
     slipped = np.arange(campaign.samples) >= start
     left = faults.leaves(seen, seen.joint_sensitivity[:, :3, joint] * (part["size"] * slipped)[:, None])
     assert left == pytest.approx(part["ratio"] * REMAINDERS["ur5_jacobi"], rel=0.1)
@@ -306,20 +306,13 @@ def own(rv_m2):
 
 
 def test_what_frames_can_do_leaves_nothing(own):
-    seen = observe(own, faults.registered(own))
-    columns = faults.frame_columns(seen)
+    seen = faults.seen_in_position(own)
+    columns = frame_columns(seen)[0]
     assert faults.leaves(seen, columns @ np.array([1e-3, 0, 0, 0, 2e-4, 0, 0, 0, -1e-3])) < 1e-12
     one_row = np.zeros((40, 3))
     one_row[7, 1] = 1e-3
     # never more than there was, and of one row alone nearly all of it
     assert 0.7 * 1e-3 / np.sqrt(40.0) < faults.leaves(seen, one_row) <= 1e-3 / np.sqrt(40.0)
-
-
-def test_frames_are_fitted_to_the_best(ur5):
-    seen = observe(ur5, faults.registered(ur5))
-    slope = np.einsum("nik,ni->k", faults.frame_columns(seen), seen.gap[:, :3])
-    assert np.abs(slope).max() < 1e-9
-    assert np.sqrt((seen.gap**2).sum(axis=1).mean()) == pytest.approx(0.72e-3, abs=0.05e-3)
 
 
 def test_lost_motion_follows_the_side_of_the_approach(ur5):
@@ -336,7 +329,7 @@ def test_links_grow_along_their_segments(ur5):
     per_metre = placement_sensitivities(ur5.robot, ur5.q)[:, :3, :, :3]
     elongations = [strains[s] * warmer[:, None] * g.length * g.direction for s, g in enumerate(ur5.robot.segments)]
     expected = np.einsum("nisk,nsk->ni", per_metre, np.stack(elongations, axis=1))
-    frames = faults.registered(ur5)
+    frames = faults.seen_in_position(ur5).frames
     np.testing.assert_allclose(moved, expected @ frames.base[:3, :3].T, atol=1e-12)
     assert 1e-4 < np.linalg.norm(moved, axis=1).max() < 1e-3
 

@@ -39,9 +39,11 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
+from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.grouping import in_order
-from thermal_robot.kinematics import Displacement, align, exp6, tool_poses
-from thermal_robot.observations import Frames, Observations, observe
+from thermal_robot.inference.registration import register
+from thermal_robot.kinematics import Displacement, tool_poses
+from thermal_robot.observations import Observations, observe
 from thermal_robot.percents import percent
 
 _STILL = 1e-4  # rad: a joint that is told to move less does not arrive from any side
@@ -75,7 +77,7 @@ def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
 
     Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
     """
-    robot, frames = campaign.robot, registered(campaign)
+    robot, frames = campaign.robot, seen_in_position(campaign).frames
     along = np.array([np.append(s.direction * s.length * (s.length > _SHORTEST), np.zeros(3)) for s in robot.segments])
     grown = Displacement(segment=warmer[:, None, None] * strains[:, None] * along)
     # the growth of a segment turns nothing: the tool frame's origin and the target move alike
@@ -98,32 +100,15 @@ def warm_up(rng: np.random.Generator, samples: int) -> Array:
     return np.asarray(rng.uniform(10.0, 20.0) * warm / warm.max())
 
 
-def registered(campaign: Campaign) -> Frames:
-    """Least-squares registration of base and target to the nominal robot."""
-    frames = Frames.declared(campaign)
-    predicted = observe(campaign, frames).position
-    frames = Frames(align(predicted, measured(campaign), np.ones(campaign.samples)), frames.tool)
-    for _ in range(30):
-        seen = observe(campaign, frames)
-        columns = frame_columns(seen).reshape(-1, 9)
-        length = np.linalg.norm(columns, axis=0)
-        step = np.linalg.lstsq(columns / length, seen.gap[:, :3].ravel(), rcond=1e-9)[0] / length
-        tool = frames.tool.copy()
-        tool[:3, 3] += step[6:]
-        frames = Frames(frames.base @ exp6(step[:6]), tool)
-        if np.abs(step).max() < 1e-10:
-            break
-    return frames
-
-
-def frame_columns(seen: Observations) -> Array:
-    """Displacement (N, 3, 9) of the target per unit twist of the base and unit shift of the target, root frame."""
-    return np.concatenate([seen.base_sensitivity[:, :3], seen.tool_sensitivity[:, :3, :3]], axis=2)
+def seen_in_position(campaign: Campaign) -> Observations:
+    """Observations of the positions alone, base and target registered to the nominal robot by least squares."""
+    alone = replace(campaign, orientation=None)
+    return observe(alone, register(alone, np.ones(campaign.samples, dtype=bool)))
 
 
 def leaves(seen: Observations, shift: Array) -> float:
     """Residual rms, m, of (N, 3) shifts in the root frame after registration."""
-    columns = frame_columns(seen).reshape(-1, 9)
+    columns = frame_columns(seen)[0].reshape(shift.size, -1)
     columns = columns / np.linalg.norm(columns, axis=0)
     rest = shift.ravel() - columns @ np.linalg.lstsq(columns, shift.ravel(), rcond=1e-9)[0]
     return float(np.sqrt((rest**2).sum() / len(shift)))
@@ -223,24 +208,8 @@ Answers = dict[str, Any]
 REMAINDERS = {"ur5_jacobi": 0.113e-3, "wam_jacobi": 2.567e-3, "ipa_ur10_a": 0.436e-3, "ipa_ur10_b": 0.421e-3}
 """Campaigns, with the rms distance (m) that a full geometry leaves on random held-out rows, as their READMEs say."""
 
-# how often each is asked, and of whom: the WAM's cables leave ten times what its links could grow
 _STIFF = tuple(name for name in REMAINDERS if name != "wam_jacobi")
-_PLAN: dict[Fault, tuple[int, tuple[str, ...]]] = {
-    "offset": (2, tuple(REMAINDERS)),
-    "scale": (1, tuple(REMAINDERS)),
-    "backlash": (2, tuple(REMAINDERS)),
-    "slip": (2, tuple(REMAINDERS)),
-    "temperature": (2, _STIFF),
-    "hidden": (2, _STIFF),
-    "later": (2, _STIFF),
-}
-# what a fault leaves after the best frames, over the campaign's remainder: drawn between the two
-_RATIO: dict[Fault, tuple[float, float]] = {
-    "offset": (3.0, 6.0),
-    "scale": (3.0, 6.0),
-    "backlash": (1.0, 3.0),
-    "slip": (1.5, 4.0),
-}
+"""The WAM's cables leave ten times what its links could grow."""
 _ROWS = (600, 1200)
 _SPELLS = 20  # of equal length: a fifth of them is kept from the diagnosis
 _EARLY = 0.7
@@ -279,7 +248,7 @@ class RealCase:
         # in the order of measurement, from here on
         whole = _drawn_rows(read_campaign(self.data / self.campaign), self.seed, self.campaign)
         rng = np.random.default_rng([self.seed, self.draw, 2])
-        changed, truth, asked = _FAULTS[self.fault](whole, rng, REMAINDERS[self.campaign])
+        changed, truth, asked = _FAULTS[self.fault][2](whole, rng, REMAINDERS[self.campaign])
         fresh_rows = _kept(whole.samples, self.seed, self.campaign)
         if self.fault == "later":
             fresh_rows = np.arange(whole.samples) >= _EARLY * whole.samples
@@ -301,7 +270,7 @@ class RealCase:
         }
         if fresh.samples:
             write_table(replace(fresh, position=None, orientation=None), folder / "fresh.csv")
-            alone = observe(fresh, registered(given)).predicted_position
+            alone = observe(fresh, seen_in_position(given).frames).predicted_position
             answers |= {"fresh_position": measured(fresh).tolist(), "fresh_before": alone.tolist()}
         return answers
 
@@ -319,7 +288,7 @@ def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCas
     present = [name for name in REMAINDERS if (data / name / "campaign.toml").is_file()]
     rng = np.random.default_rng([seed, 0])
     planned: list[tuple[Fault, str]] = []
-    for fault, (times, campaigns) in _PLAN.items():
+    for fault, (times, campaigns, _) in _FAULTS.items():
         fit = [name for name in campaigns if name in present]
         planned += [(fault, str(name)) for name in rng.permutation(fit)[:times]]
     cases: list[RealCase] = []
@@ -374,8 +343,10 @@ def _nothing(campaign: Campaign, rng: np.random.Generator, remainder: float, ask
     return campaign, _truth(), asked
 
 
-def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float, fault: Fault) -> Made:
-    """Add an offset, backlash or a slip to one joint, scaled to a random multiple of the residual."""
+def _joint_fault(
+    campaign: Campaign, rng: np.random.Generator, remainder: float, fault: Fault, leaving: tuple[float, float]
+) -> Made:
+    """Add an offset, backlash or a slip to one joint, which leaves a random multiple of the remainder."""
     joint = int(rng.integers(1, campaign.robot.n - 2))
     name = campaign.robot.joint_names[joint]
     shape = np.ones(campaign.samples)
@@ -385,8 +356,8 @@ def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float,
         shape = -0.5 * campaign.covariates[f"approach.{name}"]
     elif fault == "slip":
         shape = (np.arange(campaign.samples) >= share * campaign.samples).astype(float)
-    seen = _seen(campaign)
-    ratio = float(rng.uniform(*_RATIO[fault]))
+    seen = seen_in_position(campaign)
+    ratio = float(rng.uniform(*leaving))
     size = ratio * remainder / leaves(seen, seen.joint_sensitivity[:, :3, joint] * shape[:, None])
     if fault != "backlash":
         size *= rng.choice([-1.0, 1.0])
@@ -401,8 +372,8 @@ def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float,
     return changed, _truth("joint_offset", ratio, size, name), f"zero of {name} off by {1e3 * size:.2g} mrad"
 
 
-def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float) -> Made:
-    seen, ratio = _seen(campaign), float(rng.uniform(*_RATIO["scale"]))
+def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float, leaving: tuple[float, float]) -> Made:
+    seen, ratio = seen_in_position(campaign), float(rng.uniform(*leaving))
     shift = measured(campaign) @ seen.frames.base[:3, :3]
     size = float(rng.choice([-1.0, 1.0])) * ratio * remainder / leaves(seen, shift)
     asked = f"instrument off by {1e6 * size:.0f} µm/m"
@@ -411,7 +382,7 @@ def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float) -> Ma
 
 
 def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told: bool) -> Made:
-    seen = _seen(campaign)
+    seen = seen_in_position(campaign)
     warmer = warm_up(rng, campaign.samples)
     strains = rng.uniform(1.2e-5, 2.3e-5, len(campaign.robot.segments))
     changed = with_growth(campaign, strains, warmer)
@@ -427,17 +398,15 @@ def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told
     return changed, truth, f"links grow by up to {highest:.0f} K, {'recorded' if told else 'temperature not recorded'}"
 
 
-def _seen(campaign: Campaign) -> Observations:
-    return observe(campaign, registered(campaign))
-
-
-_FAULTS: dict[Fault, Callable[[Campaign, np.random.Generator, float], Made]] = {
-    "nothing": _nothing,
-    "offset": partial(_joint_fault, fault="offset"),
-    "scale": _scale,
-    "backlash": partial(_joint_fault, fault="backlash"),
-    "slip": partial(_joint_fault, fault="slip"),
-    "temperature": partial(_growth, told=True),
-    "hidden": partial(_growth, told=False),
-    "later": partial(_nothing, asked="first 70 % by time, rest predicted"),
+_FAULTS: dict[Fault, tuple[int, tuple[str, ...], Callable[[Campaign, np.random.Generator, float], Made]]] = {
+    "nothing": (0, (), _nothing),
+    "offset": (2, tuple(REMAINDERS), partial(_joint_fault, fault="offset", leaving=(3.0, 6.0))),
+    "scale": (1, tuple(REMAINDERS), partial(_scale, leaving=(3.0, 6.0))),
+    "backlash": (2, tuple(REMAINDERS), partial(_joint_fault, fault="backlash", leaving=(1.0, 3.0))),
+    "slip": (2, tuple(REMAINDERS), partial(_joint_fault, fault="slip", leaving=(1.5, 4.0))),
+    "temperature": (2, _STIFF, partial(_growth, told=True)),
+    "hidden": (2, _STIFF, partial(_growth, told=False)),
+    "later": (2, _STIFF, partial(_nothing, asked="first 70 % by time, rest predicted")),
 }
+"""Of each fault: how often and of which campaigns it is asked, and how it is put in; what it leaves after the best
+frames is drawn between two multiples of the campaign's remainder."""
