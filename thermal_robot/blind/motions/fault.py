@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,34 +57,52 @@ class Fault:
 
     def built(self, spec: Any, arm: Arm) -> None:
         """Change a ``mujoco.MjSpec`` whose actuators are the arm's servos, in the order of its joints."""
-        change: Callable[[Any, Arm, Fault], None] | None = _BUILT.get(self.name)
-        if change:
-            change(spec, arm, self)
+        joint, servo = spec.joint(arm.joints[self.joint]), spec.actuators[self.joint]
+        match self.name:
+            case "coulomb" | "uneven friction":
+                joint.frictionloss = self.size
+            case "armature":
+                joint.armature = self.size
+            case "viscous":
+                set_damping(joint, self.size)
+            case "kp":
+                servo.gainprm[0] *= 1.0 + self.size
+                servo.biasprm[1] *= 1.0 + self.size
+            case "torque limit":
+                servo.forcerange = [-self.size, self.size]
+            case "end stop":
+                joint.limited = True
+                joint.range = [-10.0, self.size] if self.turn > 0.0 else [self.size, 10.0]
+            case "payload":
+                load = spec.body(TOOL).add_body(name="load")
+                load.explicitinertial, load.mass, load.inertia = True, self.size, [1e-9, 1e-9, 1e-9]
+            case "table":
+                _add_table(spec, self.size)
 
     def commanded(self, command: Array, position: Array) -> Array:
         """Command (J,) as the servos receive it, their joints being at a position."""
-        if self.name not in ("zero", "gain", "dead zone"):
-            return command
         own, j = command.copy(), self.joint
-        if self.name == "zero":
-            own[j] += self.size
-        elif self.name == "gain":
-            own[j] *= 1.0 + self.size
-        else:
-            error = own[j] - position[j]
-            own[j] = position[j] + np.sign(error) * max(abs(error) - self.size, 0.0)
+        match self.name:
+            case "zero":
+                own[j] += self.size
+            case "gain":
+                own[j] *= 1.0 + self.size
+            case "dead zone":
+                error = own[j] - position[j]
+                own[j] = position[j] + np.sign(error) * max(abs(error) - self.size, 0.0)
         return own
 
     def acts(self, model: Any, position: Array, torque: Array) -> None:
         """Add the torques of a step to ``torque`` (J,), or change friction, at a position (J,)."""
         j = self.joint
-        if self.name == "ripple":
-            torque[j] = self.size * np.sin(round(self.turn) * position[j])
-        elif self.name == "spring":
-            torque[j - 1] = self.size * (position[j] - position[j - 1])
-            torque[j] = -torque[j - 1]
-        elif self.name == "uneven friction":
-            model.dof_frictionloss[j] = self.size * (1.0 + np.sin(3.0 * position[j] + self.turn))
+        match self.name:
+            case "ripple":
+                torque[j] = self.size * np.sin(round(self.turn) * position[j])
+            case "spring":
+                torque[j - 1] = self.size * (position[j] - position[j - 1])
+                torque[j] = -torque[j - 1]
+            case "uneven friction":
+                model.dof_frictionloss[j] = self.size * (1.0 + np.sin(3.0 * position[j] + self.turn))
 
     @property
     def delay(self) -> float:
@@ -93,60 +110,14 @@ class Fault:
         return self.size if self.name == "delay" else 0.0
 
 
-def _frictionloss(spec: Any, arm: Arm, fault: Fault) -> None:
-    spec.joint(arm.joints[fault.joint]).frictionloss = fault.size
-
-
-def _armature(spec: Any, arm: Arm, fault: Fault) -> None:
-    spec.joint(arm.joints[fault.joint]).armature = fault.size
-
-
-def _damping(spec: Any, arm: Arm, fault: Fault) -> None:
-    set_damping(spec.joint(arm.joints[fault.joint]), fault.size)
-
-
-def _kp(spec: Any, arm: Arm, fault: Fault) -> None:
-    actuator = spec.actuators[fault.joint]
-    actuator.gainprm[0] *= 1.0 + fault.size
-    actuator.biasprm[1] *= 1.0 + fault.size
-
-
-def _limit(spec: Any, arm: Arm, fault: Fault) -> None:
-    spec.actuators[fault.joint].forcerange = [-fault.size, fault.size]
-
-
-def _stop(spec: Any, arm: Arm, fault: Fault) -> None:
-    joint = spec.joint(arm.joints[fault.joint])
-    joint.limited = True
-    joint.range = [-10.0, fault.size] if fault.turn > 0.0 else [fault.size, 10.0]
-
-
-def _payload(spec: Any, arm: Arm, fault: Fault) -> None:
-    load = spec.body(TOOL).add_body(name="load")
-    load.explicitinertial, load.mass, load.inertia = True, fault.size, [1e-9, 1e-9, 1e-9]
-
-
-def _table(spec: Any, arm: Arm, fault: Fault) -> None:
+def _add_table(spec: Any, height: float) -> None:
+    """Add a plane, m above the base, and a tip of the tool that touches it."""
     import mujoco
 
     own = {"condim": 3, "friction": [sizes.FRICTION, 0.0, 0.0]}
-    spec.worldbody.add_geom(
-        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 1], pos=[0, 0, fault.size - 1e-3], **own
-    )
-    spec.body(TOOL).add_geom(name="tip", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-3, 0, 0], **own)
-
-
-_BUILT = {
-    "coulomb": _frictionloss,
-    "uneven friction": _frictionloss,
-    "armature": _armature,
-    "viscous": _damping,
-    "kp": _kp,
-    "torque limit": _limit,
-    "end stop": _stop,
-    "payload": _payload,
-    "table": _table,
-}
+    plane, tip = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE
+    spec.worldbody.add_geom(name="table", type=plane, size=[5, 5, 1], pos=[0, 0, height - 1e-3], **own)
+    spec.body(TOOL).add_geom(name="tip", type=tip, size=[1e-3, 0, 0], **own)
 
 
 def draw_fault(rng: np.random.Generator, name: str, arm: Arm, sound: Sound, larger: float = 1.0) -> Fault:
@@ -162,16 +133,15 @@ def draw_fault(rng: np.random.Generator, name: str, arm: Arm, sound: Sound, larg
     if name in sizes.USUAL:
         unit = {"payload": arm.rated, "viscous": servo.kd, "spring": servo.kp}.get(name) or 1.0
         size = factor * sizes.USUAL[name] * unit
-        if name in ("zero", "gain"):
-            size *= sign
-        elif name == "kp":  # as likely too soft as too stiff
-            size = float((1.0 + size) ** sign - 1.0)
-        return Fault(name, j, size)
+        if name == "kp":  # as likely too soft as too stiff
+            return Fault(name, j, float((1.0 + size) ** sign - 1.0))
+        return Fault(name, j, size * sign if name in ("zero", "gain") else size)
     share = float(rng.uniform(*(sizes.ABOVE if name == "table" else sizes.BEYOND)))
-    if name == "table":
-        return Fault(name, j, float(np.quantile(sound.height, share)))
-    if name == "torque limit":
-        return Fault(name, j, float(np.quantile(np.abs(sound.torque[:, j]), 1.0 - share)))
-    if name == "end stop":
-        return Fault(name, j, float(np.quantile(sound.position[:, j], 1.0 - share if sign > 0.0 else share)), sign)
+    match name:
+        case "table":
+            return Fault(name, j, float(np.quantile(sound.height, share)))
+        case "torque limit":
+            return Fault(name, j, float(np.quantile(np.abs(sound.torque[:, j]), 1.0 - share)))
+        case "end stop":
+            return Fault(name, j, float(np.quantile(sound.position[:, j], 1.0 - share if sign > 0.0 else share)), sign)
     return Fault(name)

@@ -142,32 +142,23 @@ def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
     return rows
 
 
-def blamed(answers: Sequence[Answer]) -> float:
-    """Rate of false attribution: share of unlisted faults for which a listed effect is reported."""
-    own = [bool(one.reported) for one in answers if one.case.fault in UNLISTED and not one.failure]
-    return float(np.mean(own)) if own else 0.0
-
-
-def silent(answers: Sequence[Answer]) -> float:
-    """Specificity: share of fault-free arms for which nothing is reported."""
-    own = [not one.reported for one in answers if one.case.fault == NOTHING and not one.failure]
-    return float(np.mean(own)) if own else 0.0
-
-
 def text(answers: Sequence[Answer]) -> str:
     """Format the result of the trial: a table of faults, and the wrong answers."""
     lines = [f"{'fault':16} asked  named  first  alone  place  unexplained"]
     for row in table(answers):
         shares = "".join(f"{100 * float(str(row[mark])):6.0f}%" for mark in MARKS)
         lines.append(f"{row['fault']!s:16} {row['asked']!s:>5}{shares}")
-    listed = [one for one in answers if one.case.fault in FAULTS and not one.failure]
+    told = [one for one in answers if not one.failure]
+    listed = [one for one in told if one.case.fault in FAULTS]
     if listed:
         named, first = (np.mean([getattr(one, mark) for one in listed]) for mark in ("named", "first"))
         lines.append(f"of {len(listed)} faults that an effect knows: named {named:.0%}, first {first:.0%}")
-    for name, share, what in ((NOTHING, silent, "silent"), ("unlisted", blamed, "blamed on an effect")):
-        own = UNLISTED if name == "unlisted" else (name,)
-        if any(one.case.fault in own for one in answers if not one.failure):
-            lines.append(f"{name}: {what} {share(answers):.0%}")
+    silent = [not one.reported for one in told if one.case.fault == NOTHING]
+    if silent:
+        lines.append(f"{NOTHING}: silent {np.mean(silent):.0%}")
+    blamed = [bool(one.reported) for one in told if one.case.fault in UNLISTED]
+    if blamed:
+        lines.append(f"unlisted: blamed on an effect {np.mean(blamed):.0%}")
     for one in answers:
         if one.failure or not one.named:
             said = one.failure or ", ".join(one.verdict) or "no effect"
