@@ -88,12 +88,11 @@ def run(options: argparse.Namespace) -> None:
     tell(f"Seed {seed}: {len(cases)} cases in {directory}")
     from thermal_robot.blind.trial import run_trial
 
-    def sealed(commitment: str) -> None:
-        tell(f"Answers sealed before the first diagnosis: sha256 {commitment}")
-
+    seal = "Answers sealed before the first diagnosis: sha256"
     try:
         with counted(options.loudness) as progress:
-            records = run_trial(cases, directory, workers=options.workers, progress=progress, sealed=sealed)
+            told: dict[str, Any] = {"progress": progress, "sealed": lambda commitment: tell(f"{seal} {commitment}")}
+            records = run_trial(cases, directory, workers=options.workers, **told)
     except KeyboardInterrupt:
         again = f"--seed {seed} --directory {directory}"
         print(f"thermal-robot: stopped; the same command with {again} continues", file=sys.stderr)
@@ -102,7 +101,6 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _motions(options: argparse.Namespace, seed: int) -> None:
-    """Run the trial of motions, print its score and write its answers."""
     from thermal_robot.blind.motions.trial import plan, run, text
 
     others = ("size", "count", "robot", "effect", "fault", "data", "directory", "report", "markdown")
@@ -121,7 +119,6 @@ def _motions(options: argparse.Namespace, seed: int) -> None:
 
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
-    """Print the score and write its files."""
     from thermal_robot.blind.report.page import html
     from thermal_robot.blind.report.text import markdown, text
     from thermal_robot.blind.score import score

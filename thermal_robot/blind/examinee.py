@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.blind.cases import LISTED
@@ -34,11 +35,12 @@ from thermal_robot.datasets import demo_directory
 from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import library
 from thermal_robot.fleet.compare import compare
-from thermal_robot.fleet.listed import campaigns
+from thermal_robot.fleet.listed import Listed, campaigns
 from thermal_robot.fleet.many import TABLE, diagnosed
 from thermal_robot.fleet.rows import write_rows
 from thermal_robot.fleet.summary import summarise
 from thermal_robot.fleet.wear import wear
+from thermal_robot.inference.algebra import equations_of, ridge
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.registration import register
 from thermal_robot.observations import Observations, observe
@@ -68,15 +70,16 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
     frames = register(campaign, kept)
     given = observe(campaign, frames)
     asked = observe(_measured(samples, model), frames)
-    columns, fresh, tight, slices = _design(model, given, asked)
-    columns, gap, left = columns[kept], given.gap[kept], found.rows.remainder[kept]
-    noise = np.maximum(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))), 1e-9)
+    columns, fresh, prior, ends = _design(model, given, asked)
+    columns, gap = columns[kept], given.gap[kept]
+    noise = np.maximum(_level(found.rows.remainder[kept]), 1e-9)
     nominal, base = asked.predicted_position, frames.base[:3, :3]
     predicted = {"+".join(effect.name for effect, _ in model.effects): model.prediction(samples)[0]}
-    for size in range(len(slices)):
-        for chosen in combinations(range(len(slices)), size):
-            used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
-            fitted = _ridge(columns[:, :, used], gap, noise, tight[used])
+    for size in range(len(model.effects)):
+        for chosen in combinations(range(len(model.effects)), size):
+            effects = [np.arange(ends[k], ends[k + 1]) for k in chosen]
+            used = np.concatenate([np.arange(ends[0]), *effects])
+            fitted = _fitted(columns[:, :, used], gap, noise, prior[used[ends[0] :] - ends[0]])
             names = "+".join(model.effects[k][0].name for k in chosen)
             predicted[names] = nominal + fresh[:, :, used] @ fitted @ base.T
     return predicted
@@ -92,43 +95,41 @@ def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
 
 def _design(
     model: CorrectedModel, given: Observations, asked: Observations
-) -> tuple[Array, Array, Array, tuple[slice, ...]]:
-    """Columns (N, m, K) and (M, 3, K) of frames and effects, prior deviations (K,), and each effect's columns.
+) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+    """Columns (N, m, K) and (M, 3, K) of frames and effects, priors of the effects' columns, and where each block ends.
 
-    A parameter is held to the rms of its effect's parameters, in units of their expected sizes.
+    A prior is one over the variance: a parameter is held to the rms of its effect's parameters, in units of their
+    expected sizes.
     """
-    frames = frame_columns(given)[0]
-    here, there, tight, slices = [frames], [frame_columns(asked)[0]], [np.zeros(frames.shape[2])], []
-    start = frames.shape[2]
+    here, there, prior = [frame_columns(given)[0]], [frame_columns(asked)[0]], [np.zeros(0)]
     for effect, values in model.effects:
         own = block(given, effect)
         here.append(own.columns)
         there.append(block(asked, effect).columns)
         scale = np.sqrt(np.mean((values / own.sizes) ** 2)) if len(values) else 1.0
-        tight.append(1.0 / (own.sizes * max(scale, 1e-6)))
-        slices.append(slice(start, start + len(values)))
-        start += len(values)
-    columns, fresh = np.concatenate(here, axis=2), np.concatenate(there, axis=2)[:, :3]
-    return columns, fresh, np.concatenate(tight), tuple(slices)
+        prior.append((own.sizes * max(scale, 1e-6)) ** -2.0)
+    ends = np.cumsum([part.shape[2] for part in here])
+    return np.concatenate(here, axis=2), np.concatenate(there, axis=2)[:, :3], np.concatenate(prior), ends
 
 
-def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
-    """Ridge regression with the noise and the residual of each kind estimated together.
+def _level(left: Array) -> Array:
+    """Rms (m/3,) per axis of positions and of orientations (N, m)."""
+    return np.asarray(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))))
 
-    (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad.
+
+def _fitted(columns: Array, gap: Array, noise: Array, prior: Array) -> Array:
+    """Ridge regression (K,) with the noise and the residual of each kind estimated together.
+
+    (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad; ``prior`` is one over the
+    variance of the last columns, those of effects.
     """
-    rows = np.diag(tight)[tight > 0]
-    level = np.maximum(np.sqrt((gap.reshape(len(gap), -1, 3) ** 2).mean(axis=(0, 2))), noise)
+    level = np.maximum(_level(gap), noise)
     for _ in range(_ROUNDS):
         each = np.repeat(level, 3)
-        both = np.vstack([(columns / each[:, None]).reshape(gap.size, columns.shape[2]), rows])
-        size = np.linalg.norm(both, axis=0)
-        size[size == 0.0] = 1.0
-        padded = np.concatenate([(gap / each).ravel(), np.zeros(len(rows))])
-        fitted = np.linalg.lstsq(both / size, padded, rcond=1e-10)[0] / size
-        left = (gap - columns @ fitted).reshape(len(gap), -1, 3)
-        level = np.maximum(np.sqrt((left**2).mean(axis=(0, 2))), noise)
-    return np.asarray(fitted)
+        stack = np.column_stack([equations_of(columns / each[:, None]), (gap / each).ravel()])
+        fitted = ridge(stack.T @ stack, columns.shape[2] - len(prior), prior)
+        level = np.maximum(_level(gap - columns @ fitted), noise)
+    return fitted
 
 
 class Fence:
@@ -163,7 +164,7 @@ def answer(request: dict[str, Any]) -> Plain:
     at, start = asks, time.perf_counter()
     try:
         if asks in ANSWERS:
-            reply["said"] = ANSWERS[asks](folder, request["only"])
+            reply["said"] = ANSWERS[asks](campaigns(folder / LISTED), request["only"] or None)
             reply["seconds"] = time.perf_counter() - start
             return reply
         # what the library does not have need not be taken out of it
@@ -211,36 +212,33 @@ def _within(path: str, folder: str) -> bool:
     return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
 
 
-def comparison(folder: Path, only: Sequence[str]) -> Plain:
-    """Compare the campaigns listed in a folder: ``thermal-robot/comparison/1``."""
-    listed = campaigns(folder / LISTED)
+def comparison(listed: Listed, only: Sequence[str] | None) -> Plain:
+    """Compare listed campaigns: ``thermal-robot/comparison/1``."""
     names = [name for name, _ in listed.campaigns]
-    return compare(*(listed.folder(name) for name in names), names=names, only=only or None).to_dict()
+    return compare(*map(listed.folder, names), names=names, only=only).to_dict()
 
 
-def followed(folder: Path, only: Sequence[str]) -> Plain:
+def followed(listed: Listed, only: Sequence[str] | None) -> Plain:
     """Diagnose the change over time of a robot from dated campaigns: ``thermal-robot/wear/1``."""
-    listed = campaigns(folder / LISTED)
     date = listed.names.index("date")
-    dated = [(labels[date], listed.folder(name)) for name, labels in listed.campaigns]
-    return wear(dated, effects=only or None).to_dict()
+    return wear([(labels[date], listed.folder(name)) for name, labels in listed.campaigns], effects=only).to_dict()
 
 
-def fleet(folder: Path, only: Sequence[str]) -> Plain:
+def fleet(listed: Listed, only: Sequence[str] | None) -> Plain:
     """Diagnose the robots of a fleet and summarise: ``thermal-robot/fleet/1``.
 
     It is what :func:`~thermal_robot.diagnose_many` does, but within this process: those of Dask would stand outside
     the fence, and outlive an examinee that is ended.
     """
-    listed = campaigns(folder / LISTED)
+    table = listed.root / TABLE
 
     def rows() -> Iterator[Plain]:
         for name, labels in listed.campaigns:
             named = {"campaign": name, **dict(zip(listed.names, labels, strict=True))}
-            yield from ({**named, **row} for row in diagnosed(listed.folder(name), only, ())[0])
+            yield from ({**named, **row} for row in diagnosed(listed.folder(name), only or (), ())[0])
 
-    write_rows(folder / TABLE, listed.names, rows())
-    return summarise(folder / TABLE, listed.names).to_dict()
+    write_rows(table, listed.names, rows())
+    return summarise(table, listed.names).to_dict()
 
 
 ANSWERS = {"comparison": comparison, "wear": followed, "fleet": fleet}

@@ -167,12 +167,10 @@ def _sites(places: Any) -> list[tuple[str, str]]:
 
 
 def _extra(record: Record) -> set[str]:
-    """Return the reported effects that are not at work."""
     return {name for name in found(record) if is_absent(record, name)}
 
 
 def _known(record: Record) -> Marks:
-    """Score a case whose causes are all in the library."""
     wanted, extra, strange = set(at_work(record)), _extra(record), unexplained(record)
     confounded = {e["name"] for e in said(record)["effects"] if e["status"] == "confounded"}
     escaped = confounded & set(said(record)["verdict"]["effects"])
@@ -216,7 +214,6 @@ def _unknown(record: Record) -> Marks:
 
 
 def _both(record: Record) -> Marks:
-    """Score a case with one or two listed effects and a cause outside the library."""
     answers, listed = _unknown(record), set(at_work(record)) <= found(record)
     return {**answers, **_yes(listed=listed, right=listed and all(answers["right"]))}
 

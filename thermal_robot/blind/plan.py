@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, islice, repeat
 from pathlib import Path
 from typing import Any, get_args
 
@@ -86,15 +86,8 @@ def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.rand
     if not menu or (kind == "both" and not _apart(effects)):
         takes = f"; it takes {', '.join(LOCAL)}" if kind in SEVERAL else ""
         raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}{takes}")
-    return _in_turn(kind, menu, effects, causes, rng)
-
-
-def _in_turn(
-    kind: str, menu: Sequence[Asked], effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator
-) -> Iterator[Asked]:
-    while True:
-        for k in rng.permutation(len(menu)):
-            yield {**menu[k], **_beside(kind, menu[k], effects, causes, rng)}
+    orders = map(rng.permutation, repeat(len(menu)))
+    return ({**menu[k], **_beside(kind, menu[k], effects, causes, rng)} for order in orders for k in order)
 
 
 def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Asked]:
@@ -138,7 +131,6 @@ def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Aske
 
 
 def _beside(kind: str, asked: Asked, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
-    """Draw the other faults of a case."""
     apart, always = _apart(effects), [name for name in BESIDE if name in effects]
     if kind == "both":
         return {"effects": _several(apart, int(rng.integers(1, 3)), rng)}
@@ -301,29 +293,14 @@ def plan(
     cases: list[Case] = []
     # several campaigns have a stream of their own: whoever asks for them, too, has the same single ones
     for letter, stream, several in (("c", 4, False), ("s", 6, True)):
-        asked = {kind: count for kind, count in counts.items() if (kind in SEVERAL) is several}
-        cases += _cases(letter, asked, robots, effects, causes, np.random.default_rng([seed, stream]))
+        rng, drawn, places = np.random.default_rng([seed, stream]), list[Asked](), dict.fromkeys(counts, 0)
+        for kind, count in counts.items():
+            if (kind in SEVERAL) is several:
+                drawn += [{"kind": kind, **asked} for asked in islice(turns(kind, effects, causes, rng), count)]
+        order, seeds = rng.permutation(len(drawn)), rng.integers(2**62, size=len(drawn))
+        for number, k in enumerate(order):
+            kind = drawn[k]["kind"]
+            robot = robots[(places[kind] + int(rng.integers(len(robots)))) % len(robots)]
+            places[kind] += 1
+            cases.append(Case(f"{letter}{number:04d}", int(seeds[number]), robot=robot, **drawn[k]))
     return tuple(cases)
-
-
-def _cases(
-    letter: str,
-    counts: Mapping[str, int],
-    robots: Sequence[RobotChoice],
-    effects: Sequence[str],
-    causes: Sequence[str],
-    rng: np.random.Generator,
-) -> Iterator[Case]:
-    """Yield cases in random order, each with a seed and a robot."""
-    drawn: list[Asked] = []
-    for kind, count in counts.items():
-        turn = turns(kind, effects, causes, rng)
-        drawn += [{"kind": kind, **next(turn)} for _ in range(count)]
-    order = rng.permutation(len(drawn))
-    seeds = rng.integers(2**62, size=len(drawn))
-    places = dict.fromkeys(counts, 0)
-    for number, k in enumerate(order):
-        kind = drawn[k]["kind"]
-        robot = robots[(places[kind] + int(rng.integers(len(robots)))) % len(robots)]
-        places[kind] += 1
-        yield Case(f"{letter}{number:04d}", int(seeds[number]), robot=robot, **drawn[k])

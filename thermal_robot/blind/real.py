@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
+from thermal_robot.inference.algebra import equations_of, orthonormal, rms, without
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.grouping import in_order
 from thermal_robot.inference.registration import register
@@ -108,10 +109,8 @@ def seen_in_position(campaign: Campaign) -> Observations:
 
 def leaves(seen: Observations, shift: Array) -> float:
     """Residual rms, m, of (N, 3) shifts in the root frame after registration."""
-    columns = frame_columns(seen)[0].reshape(shift.size, -1)
-    columns = columns / np.linalg.norm(columns, axis=0)
-    rest = shift.ravel() - columns @ np.linalg.lstsq(columns, shift.ravel(), rcond=1e-9)[0]
-    return float(np.sqrt((rest**2).sum() / len(shift)))
+    frames = orthonormal(equations_of(frame_columns(seen)[0]))
+    return rms(without(shift.ravel(), frames).reshape(shift.shape))
 
 
 def measured(campaign: Campaign) -> Array:

@@ -136,7 +136,6 @@ def _tally(answers: Iterable[tuple[str, str, bool | None]]) -> dict[str, dict[st
 
 
 def _grouped(named: Iterable[tuple[str, Record]]) -> dict[str, dict[str, Plain]]:
-    """Rates of all questions by the groups of their records."""
     return _tally(
         (name, question, right)
         for name, record in named
@@ -176,7 +175,6 @@ def _real(record: Record) -> Plain:
 
 
 def _miss(record: Record) -> Plain:
-    """Return the data to look up a wrong answer."""
     return {
         **{name: record[name] for name in ("id", "kind", "robot")},
         **_told(record),

@@ -181,7 +181,6 @@ def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, 
 
 
 def _rms(positions: Sequence[Sequence[float]], true: Sequence[Sequence[float]]) -> float:
-    """Root mean square of the distance."""
     return math.sqrt(sum(math.dist(p, t) ** 2 for p, t in zip(positions, true, strict=True)) / len(true))
 
 

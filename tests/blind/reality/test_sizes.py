@@ -207,10 +207,10 @@ def test_a_change_has_the_name_and_the_size_of_what_formats_md_says(name, settin
     fault = FAULTS[name]
     values, spot = fault.draw(setting, np.random.default_rng(1)), FaultParameter(fault, 2)
     by = 1e-4 * (1.0 if name in GROWS_ONLY else -1.0)
-    parameter, amount = spot.parameter_change(setting, values, by)
+    told, amount = spot.change(setting, values, by)
     joint = setting.world.names[2]
-    assert parameter.endswith(f", {joint}")
-    assert spot.named(setting)["place"] == {"kind": "joint", "name": joint}
+    assert told["parameter"].endswith(f", {joint}")
+    assert told["place"] == {"kind": "joint", "name": joint}
     # the displacement that the amount stands for, in the convention of formats.md
     body = setting.world.sound(setting.samples)
     fault.act(body, setting, spot.moved(values, by))

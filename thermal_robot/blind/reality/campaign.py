@@ -178,7 +178,6 @@ def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
 
 
 def _background(case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, rng: np.random.Generator) -> AtWork:
-    """All other effects, each far below the noise."""
     if not case.background:
         return []
     named, quiet = {fault.name for fault in main}, []
@@ -270,8 +269,7 @@ def _drawn(
 
 
 def _named(spot: FaultParameter, day: Day, values: Array) -> dict[str, Any]:
-    name, _ = spot.parameter_change(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
-    return {**spot.named(day.setting), "parameter": name}
+    return spot.change(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)[0]
 
 
 _FIRST = date(2026, 1, 5)
@@ -299,7 +297,6 @@ def make_several(case: Case, several: Several, world: World, rng: np.random.Gene
 def _followed(
     case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
 ) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
-    """Draw dates, faults on each day, and the truth."""
     first, noise = days[0].gauge, days[0].instrument.noise
     done: AtWork = []
     for name in case.effects:
@@ -328,16 +325,15 @@ def _moving(
     own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
     fault, values = done[own]
     others = [item for k, item in enumerate(done) if k != own]
-    spot, setting = draw_fault_parameter(fault, values, rng), days[0].setting
+    spot = draw_fault_parameter(fault, values, rng)
     after = None if several.how == "grows" else int(rng.integers(len(days) - 1))
     shape = time if after is None else (np.arange(len(days)) > after).astype(float)
     times = float(np.exp(rng.uniform(*np.log(several.change))))
     by = times * _tells(several, days, spot, values, others)
     by *= 1.0 if fault.name in GROWS_ONLY else float(rng.choice([-1.0, 1.0]))
     at_work = [[*done[:own], (fault, spot.moved(values, by * share)), *done[own + 1 :]] for share in shape.tolist()]
-    name, amount = spot.parameter_change(setting, values, by)
-    how = {"parameter": name, "how": several.how, "after": after, "amount": amount, "deviations": times}
-    return at_work, {**spot.named(setting), **how}
+    told, amount = spot.change(days[0].setting, values, by)
+    return at_work, {**told, "how": several.how, "after": after, "amount": amount, "deviations": times}
 
 
 def _tells(several: Several, days: Sequence[Day], spot: FaultParameter, values: Array, others: AtWork) -> float:

@@ -284,16 +284,12 @@ class FaultParameter:
         result[self.number, SIZE] += by
         return result
 
-    def named(self, setting: Setting) -> dict[str, Any]:
-        """Effect and place of this number."""
-        [place] = _named([self.fault.places(setting)[self.number]])
-        return {"effect": self.fault.name, "place": place}
-
-    def parameter_change(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
-        """Name of the corresponding parameter, and its change."""
+    def change(self, setting: Setting, values: Array, by: float) -> tuple[dict[str, Any], float]:
+        """Effect, place and name of the parameter of formats.md, and its change as this number grows."""
         before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
         [name] = [key for key in after if after[key] != before[key]]
-        return name, after[name] - before[name]
+        [place] = _named([self.fault.places(setting)[self.number]])
+        return {"effect": self.fault.name, "place": place, "parameter": name}, after[name] - before[name]
 
 
 def draw_fault_parameter(fault: Fault, values: Array, rng: np.random.Generator) -> FaultParameter:

@@ -50,13 +50,11 @@ _NOTHING = follows("none")
 
 
 def _before(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Name of the joint before."""
     names = setting.world.names
     return [names[names.index(name) - 1] for _, name in places]
 
 
 def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
-    """Names of products in either order."""
     return [name for a in first for b in second for name in (f"{a} * {b}", f"{b} * {a}")]
 
 

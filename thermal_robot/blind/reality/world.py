@@ -139,29 +139,23 @@ def read(text: str) -> Tree:
 
 
 def _joint(node: ElementTree.Element) -> Joint:
-    part = {name: node.find(name) for name in ("parent", "child", "origin", "limit", "mimic")}
-    told = {name: {} if found is None else found.attrib for name, found in part.items()}
-    axis, limit, mimic, kind = (
-        _numbers(node.find("axis"), "xyz", "1 0 0"),
-        told["limit"],
-        told["mimic"],
-        node.attrib["type"],
-    )
-    bounds = {side: float(limit.get(side, 0.0)) for side in ("lower", "upper")}
+    told = {child.tag: child.attrib for child in node}
+    kind, axis = node.attrib["type"], _numbers(told.get("axis"), "xyz", "1 0 0")
+    limit, mimic = told.get("limit") if kind in ("revolute", "prismatic") else None, told.get("mimic")
     return Joint(
         name=node.attrib["name"],
         kind=kind,
         parent=told["parent"]["link"],
         child=told["child"]["link"],
-        xyz=_numbers(part["origin"], "xyz"),
-        rpy=_numbers(part["origin"], "rpy"),
+        xyz=_numbers(told.get("origin"), "xyz"),
+        rpy=_numbers(told.get("origin"), "rpy"),
         axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
         mimic=(mimic["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))) if mimic else None,
-        **(bounds if part["limit"] is not None and kind in ("revolute", "prismatic") else {}),
+        **({} if limit is None else {side: float(limit.get(side, 0.0)) for side in ("lower", "upper")}),
     )
 
 
-def _numbers(node: ElementTree.Element | None, name: str, absent: str = "0 0 0") -> Array:
+def _numbers(node: ElementTree.Element | dict[str, str] | None, name: str, absent: str = "0 0 0") -> Array:
     written = absent if node is None else node.get(name, "0 0 0")
     return np.array(written.split(), dtype=float)
 

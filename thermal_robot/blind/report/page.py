@@ -72,8 +72,7 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
     for line, (name, counts) in enumerate(zip(rows, table["counts"], strict=True)):
         total, answer = sum(counts), "unexplained" if name == "unlisted" or which == "removed" else name
         for column, number in enumerate(counts):
-            right = columns[column] == answer
-            axes.add_patch(_cell(column, line, number / total, right))
+            axes.add_patch(_cell(column, line, number / total, columns[column] == answer))
             if number:
                 colour = PAPER if number / total > _DARK else INK
                 axes.text(column, line, str(number), ha="center", va="center", fontsize=SMALL, color=colour)
@@ -81,28 +80,25 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
     axes.text(len(columns) - 0.2, -0.9, "cases", va="center", fontsize=SMALL, color=MUTED)
     axes.set_xlim(-0.5, max(len(columns), _FEWEST) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
-    axes.set_xticks(range(len(columns)), [plain(text.effect(c)) for c in columns], rotation=50, ha="right")
+    axes.set_xticks(range(len(columns)), [plain(text.effect(c)) for c in columns])
     axes.set_yticks(range(len(rows)), [plain(text.effect(r)) for r in rows])
     axes.set_xlabel("said")
     axes.set_ylabel("true")
     tidy(axes, grid="")
     axes.tick_params(length=0)
     for tick in axes.get_xticklabels():
-        tick.set_rotation_mode("anchor")
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+        tick.set(rotation=50, ha="right", rotation_mode="anchor")
+    axes.spines[:].set_visible(False)
     heading = fill(_HEADINGS.get(which, which), round(_LETTERS * wide))
     figure.suptitle(heading, x=0.01, ha="left", fontsize=LARGE, color=INK, fontweight="bold")
     return figure
 
 
 def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
-    edge = INK if right else FAINT
-    cell = Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, edgecolor=edge, linewidth=1.0 if right else 0.5)
-    # the colour of the page shows through, so that it is right on a dark one, too
-    cell.set_facecolor((AFTER, share))
-    cell.set_zorder(2.0 if right else 1.0)
-    return cell
+    """Square in a colour through which the page shows, so that it is right on a dark one, too."""
+    edge, width, order = (INK, 1.0, 2.0) if right else (FAINT, 0.5, 1.0)
+    corner = column - 0.5, line - 0.5
+    return Rectangle(corner, 1.0, 1.0, facecolor=(AFTER, share), edgecolor=edge, linewidth=width, zorder=order)
 
 
 def calibration_figure(score: Plain) -> Figure:
@@ -126,30 +122,32 @@ def calibration_figure(score: Plain) -> Figure:
     return figure
 
 
+def _rates(axes: Axes, at: Sequence[float], rates: Sequence[Plain]) -> None:
+    """Draw rates in per cent, each with its 95 % bar."""
+    for x, rate in zip(at, rates, strict=True):
+        axes.plot([x, x], [100.0 * bound for bound in rate["interval"]], color=AFTER, linewidth=1.3)
+    shares = [100.0 * rate["value"] for rate in rates]
+    axes.plot(at, shares, linestyle="none", marker="o", markersize=5.5, color=AFTER)
+
+
 def _frequencies(axes: Axes, steps: Sequence[Plain]) -> None:
-    """Draw observed frequency against mean probability of each bin, beside the diagonal."""
     axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
     said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
     said.set(rotation=45, rotation_mode="anchor", transform_rotates_text=True)
     told = [b for b in steps if b["present"]["trials"]]
-    for b in told:
-        low, high = (100.0 * bound for bound in b["present"]["interval"])
-        axes.plot([100.0 * b["mean"]] * 2, [low, high], color=AFTER, linewidth=1.3)
-    means, shares = [100.0 * b["mean"] for b in told], [100.0 * b["present"]["value"] for b in told]
-    axes.plot(means, shares, linestyle="none", marker="o", markersize=5.5, color=AFTER, label="effects")
+    _rates(axes, [100.0 * b["mean"] for b in told], [b["present"] for b in told])
     axes.set_ylabel("at work, 95 % bars (%)")
     axes.set_ylim(-3.0, 103.0)
 
 
 def _numbers(axes: Axes, steps: Sequence[Plain]) -> None:
-    """Draw the number of effects in each bin, on a logarithmic axis."""
     for b in steps:
         number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
         axes.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
         if number:
             top = (50.0 * (b["low"] + b["high"]), number)
-            said = axes.annotate(str(number), top, (0, 2), textcoords="offset points", fontsize=SMALL, color=INK)
-            said.set_horizontalalignment("center")
+            text_ = {"textcoords": "offset points", "fontsize": SMALL, "color": INK, "ha": "center"}
+            axes.annotate(str(number), top, (0, 2), **text_)
     axes.set_yscale("log")
     axes.set_ylim(0.7, 4.0 * max(b["present"]["trials"] for b in steps))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -244,23 +242,13 @@ def _panel(axes: Axes, steps: Sequence[Plain], lines: Sequence[Plain], other: Ca
     for line, style in zip(lines, ("--", "-"), strict=False):
         shown = [100.0 * p for p in line["chance"]]
         axes.plot(line["x"], shown, color=THIRD, linestyle=style, linewidth=1.4, label=other(line["other"]))
-    for s in told:
-        low, high = s["low"], s["high"] or _LAST * s["low"]
-        middle = sqrt(low * high)
-        bottom, top = (100.0 * bound for bound in s["found"]["interval"])
-        value = 100.0 * s["found"]["value"]
-        axes.plot([low, high], [value, value], color=AFTER, linewidth=0.9, alpha=0.6)
-        axes.plot([middle, middle], [bottom, top], color=AFTER, linewidth=1.3)
+    ends = [(s["low"], s["high"] or _LAST * s["low"]) for s in told]
+    middles = [sqrt(low * high) for low, high in ends]
+    for s, between, middle in zip(told, ends, middles, strict=True):
+        axes.plot(between, [100.0 * s["found"]["value"]] * 2, color=AFTER, linewidth=0.9, alpha=0.6)
         axes.text(middle, 106.0, str(s["found"]["trials"]), ha="center", fontsize=SMALL, color=MUTED)
-    axes.plot(
-        [sqrt(s["low"] * (s["high"] or _LAST * s["low"])) for s in told],
-        [100.0 * s["found"]["value"] for s in told],
-        linestyle="none",
-        marker="o",
-        markersize=5.5,
-        color=AFTER,
-    )
-    log_axis(axes, told[0]["low"] / 1.1, 1.1 * (told[-1]["high"] or _LAST * told[-1]["low"]))
+    _rates(axes, middles, [s["found"] for s in told])
+    log_axis(axes, ends[0][0] / 1.1, 1.1 * ends[-1][1])
     axes.set_xticks(sorted({s["low"] for s in told} | {s["high"] for s in told if s["high"]}))
     axes.minorticks_off()
     axes.set_ylim(-3.0, 112.0)
