@@ -140,20 +140,20 @@ class Fence:
     """
 
     def __init__(self, directory: Path) -> None:
-        self._directory = os.path.realpath(directory)
-        self._folder = ""
+        self._directory = Path(os.path.realpath(directory))
+        self._folder = Path()
 
     def allow(self, folder: Path) -> None:
         """Grant access to this folder, and revoke that to the one before."""
-        self._folder = os.path.realpath(folder)
+        self._folder = Path(os.path.realpath(folder))
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
         """Deny access, if the event asks for a forbidden file."""
         if event not in ("open", "os.listdir", "os.scandir") or not isinstance(arguments[0], (str, bytes, os.PathLike)):
             return
         # links are followed: one inside the folder could lead out of it
-        path = os.path.realpath(os.fsdecode(arguments[0]))
-        if _within(path, self._directory) and not (self._folder and _within(path, self._folder)):
+        path = Path(os.path.realpath(os.fsdecode(arguments[0])))
+        if path.is_relative_to(self._directory) and not path.is_relative_to(self._folder):
             raise PermissionError(f"{path} is no business of the one who is examined")
 
 
@@ -206,10 +206,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             fence.allow(Path(request["folder"]))
             print(json.dumps(answer(request)), file=replies, flush=True)
     return 0
-
-
-def _within(path: str, folder: str) -> bool:
-    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
 
 
 def comparison(listed: Listed, only: Sequence[str] | None) -> Plain:

@@ -18,6 +18,7 @@ from thermal_robot.blind.reality.world import Array, Slopes, World, free_columns
 
 _ROUNDS = 8
 _NEAR = 0.01  # of a size, as a share of it
+_IMITATED = 1e-3  # of the largest: what a fault can do to less than that is rounding and what is not linear
 
 
 class Unseen(Exception):
@@ -81,23 +82,16 @@ class Gauge:
         if fault.name in self.bases:
             return self.bases[fault.name]
         draw = fault.draw(self.setting, np.random.default_rng(0))
-        fixed = dict(fault.fixed)
-        columns = []
-        for settings in product(*fixed.values()):
-            for p, d in product(range(draw.shape[0]), range(draw.shape[1])):
-                if d in fixed:
-                    continue
-                unit = np.zeros_like(draw)
-                unit[:, list(fixed)] = settings
-                unit[p, d] = np.abs(draw[:, d]).max() or 1e-4
-                column = self.left(self.slope(fault, unit))
-                if self.rms(column) > 1e-12:
-                    columns.append(column / np.linalg.norm(column))
-        found = np.zeros((len(self.frames), 0))
-        if columns:
-            left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-            found = np.asarray(left[:, size > 1e-3 * size[0]])
-        self.bases[fault.name] = found
+        fixed, columns = dict(fault.fixed), [np.zeros((len(self.frames), 0))]
+        sizes = [d for d in range(draw.shape[1]) if d not in fixed]
+        for settings, p, d in product(product(*fixed.values()), range(draw.shape[0]), sizes):
+            unit = np.zeros_like(draw)
+            unit[:, list(fixed)] = settings
+            unit[p, d] = np.abs(draw[:, d]).max() or 1e-4
+            column = self.left(self.slope(fault, unit))
+            if self.rms(column) > 1e-12:
+                columns.append(column[:, None] / np.linalg.norm(column))
+        self.bases[fault.name] = found = _span(np.hstack(columns), _IMITATED)
         return found
 
     def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
@@ -149,10 +143,8 @@ def shares(gauge: Gauge, fault: Fault, values: Array) -> list[tuple[Place, int, 
     """Places of a fault with their numbers and residual rms, largest first."""
     found = []
     for p, where in enumerate(fault.places(gauge.setting)):
-        alone = np.zeros_like(values)
+        alone = fault.scaled(values, 0.0)
         alone[p] = values[p]
-        for column, _ in fault.fixed:
-            alone[:, column] = values[:, column]
         found.append((where, p, gauge.rms(gauge.left(gauge.slope(fault, alone)))))
     return sorted(found, key=lambda item: -item[2])
 
@@ -321,13 +313,16 @@ def deviation(
                 own = column
             elif name == _ZEROS or gauge.rms(gauge.left(column * now[number])) > _PRESENT * noise:
                 beside.append(column)
-    aligned = gauge.left(own)
-    span = _span(gauge, np.column_stack(beside))
+    every, aligned = np.column_stack(beside), gauge.left(own)
+    length = np.linalg.norm(every, axis=0)
+    beyond = gauge.left(every)
+    seen = np.linalg.norm(beyond, axis=0) > _SEEN * length
+    span = _span(beyond[:, seen] / length[seen], _SEEN)
     left = aligned - span @ (span.T @ aligned)
-    length = float(np.linalg.norm(left))
-    if length <= _SEEN * float(np.linalg.norm(own)) or length == 0.0:
+    alone = float(np.linalg.norm(left))
+    if alone <= _SEEN * float(np.linalg.norm(own)) or alone == 0.0:
         raise Unseen(f"{spot.fault.name} is hidden there by what else is at work")
-    return noise / length, gauge.rms(aligned)
+    return noise / alone, gauge.rms(aligned)
 
 
 def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
@@ -342,11 +337,7 @@ def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[
             yield (p, d), (gauge.slope(fault, more) - now) / step
 
 
-def _span(gauge: Gauge, every: Array) -> Array:
-    """Orthonormal basis (3M, R) of these columns and the frames."""
-    aligned, length = gauge.left(every), np.linalg.norm(every, axis=0)
-    kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
-    if not kept.any():
-        return np.zeros((len(every), 0))
-    left, size, _ = np.linalg.svd(aligned[:, kept] / length[kept], full_matrices=False)
-    return np.asarray(left[:, size > _SEEN * size[0]])
+def _span(columns: Array, floor: float) -> Array:
+    """Orthonormal basis (E, R) of columns (E, K) by SVD, without directions below a share of the largest."""
+    left, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, size > floor * size.max(initial=0.0)])

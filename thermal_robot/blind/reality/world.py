@@ -385,7 +385,7 @@ class World:
         if joint.kind == "prismatic":
             body.pos = body.pos + rotation @ joint.axis * joint.held
         else:
-            turn = from_vector(np.concatenate([np.zeros(3), joint.axis * joint.held])[None])[0, :3, :3]
+            turn = Rotation.from_rotvec(joint.axis * joint.held).as_matrix()
             body.quat = quaternion(rotation @ turn)
 
     def _beam(self, parent: mujoco.MjsBody, joint: Joint, offset: Array) -> mujoco.MjsBody:
