@@ -177,20 +177,14 @@ def _known(record: Record) -> Marks:
     exact = wanted <= found(record) and not (extra or strange or escaped)
     if not wanted:
         return _yes(exact=exact, false_alarm=bool(extra) or strange)
-    told = [place for name in at_work(record) if name in found(record) for place in _located(record, name)]
+    parts, first = record["truth"].get("parts", {}), {e["name"]: e["locations"][:1] for e in said(record)["effects"]}
+    true = {name: _sites(parts.get(name, {}).get("places", ())) for name in at_work(record) if name in found(record)}
+    told = [(_sites(first[name]), places) for name, places in true.items() if places]
     return {
         **_yes(exact=exact, first_named=first_named(record) in wanted, false_alarm=bool(extra)),
-        "located": tuple(first for first, _ in told),
-        "among_places": tuple(among for _, among in told),
+        "located": tuple(place == places[:1] for place, places in told),
+        "among_places": tuple(bool(place) and place[0] in places for place, places in told),
     }
-
-
-def _located(record: Record, effect: str) -> list[tuple[bool, bool]]:
-    """Whether the first place is the first true one, and whether it is a true one; empty where places do not apply."""
-    true = _sites(record["truth"].get("parts", {}).get(effect, {}).get("places", ()))
-    told = next(e for e in said(record)["effects"] if e["name"] == effect)["locations"]
-    first = next(iter(_sites(told)), None)
-    return [(first == true[0], first in true)] if true else []
 
 
 def _mixed(record: Record) -> Marks:

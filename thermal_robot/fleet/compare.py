@@ -56,7 +56,7 @@ from thermal_robot.fleet.compare_sums import (
 from thermal_robot.fleet.comparison import Change, Comparison, Parameter, Predicted, Status
 from thermal_robot.fleet.comparison import Effect as Compared
 from thermal_robot.inference import settings as inference
-from thermal_robot.inference.algebra import equations_of, orthonormal
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
 from thermal_robot.prediction import Spread, sensitivity
@@ -453,8 +453,7 @@ def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
 
 def _left(values: Array, gauge: Array) -> Array:
     """Project the gauge out of columns (N, 3) or (N, 3, K)."""
-    flat = values.reshape(gauge.shape[0], -1)
-    return np.asarray(flat - gauge @ (gauge.T @ flat)).reshape(values.shape)
+    return without(values.reshape(gauge.shape[0], -1), gauge).reshape(values.shape)
 
 
 def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Array) -> Array:

@@ -146,8 +146,7 @@ def _numbers(axes: Axes, steps: Sequence[Plain]) -> None:
         axes.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
         if number:
             top = (50.0 * (b["low"] + b["high"]), number)
-            text_ = {"textcoords": "offset points", "fontsize": SMALL, "color": INK, "ha": "center"}
-            axes.annotate(str(number), top, (0, 2), **text_)
+            axes.annotate(str(number), top, (0, 2), textcoords="offset points", fontsize=SMALL, color=INK, ha="center")
     axes.set_yscale("log")
     axes.set_ylim(0.7, 4.0 * max(b["present"]["trials"] for b in steps))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
