@@ -1,4 +1,6 @@
-"""Model selection at the exact fit: choose effects, refine their constants, refit, and choose again.
+"""Model selection at the exact fit: choose effects, refine their constants, refit, and choose once again.
+
+A third choice would be among refined copies of what the first two chose: on real robots it finds more, and holds less.
 
 The exact fit is by Levenberg-Marquardt over frames and parameters, at fixed prior scales. Nonlinear constants, such as
 a lag, are refined by coordinate search on the evidence.
@@ -244,7 +246,7 @@ def select_exactly(
     before: Explanation | None = None,
     starts: Sequence[Sequence[Effect]] = (),
 ) -> ExactSelection:
-    """Model selection at the exact fit: select effects, refine their constants, refit, until convergence.
+    """Model selection, repeated once at the exact fit of what it selects, with refined constants.
 
     Starts at ``start``, the exact model of the effects ``held`` with their values, and at the weights of the
     explanation ``before``. The first search starts from each of the ``starts``, by default from the effects held.
@@ -259,26 +261,23 @@ def select_exactly(
             rivals = _alternatives(effect, start, whole[effect.name])
             variants[effect.name] = tuple(dict.fromkeys((*variants[effect.name], effect, *rivals)))
     noise = Noise.of(campaign)
-    many = campaign.samples > settings.MANY_ROWS
-    revisions = 1 if many else settings.REVISIONS
-    for revision in range(revisions + 1):
-        progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
+    for again in (False, True):
+        progress("selection at the exact fit" if again else "combinations of effects")
         listed = [effect for effect, _ in held if effect.name in variants]
         blocks = tuple(_testable_blocks(variants, observations, (*begun, *listed)))
         candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
         chosen = [candidates.index(effect) for effect in listed]
-        seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
+        seeds = [chosen] if again or not starts else [[candidates.index(e) for e in one] for one in starts]
         linear = at_exact_model(observations, blocks, held)
         explanation = explain(
             linear, noise, families=families, starts=seeds, before=before, kernels=discrepancy_kernels(observations)
         )
-        factor, since = settings.REFINEMENT ** (1 / 2**revision), held
+        since = held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-        finer = refined(explanation, observations, factor) if revision < revisions else held
+        finer = held if again else refined(explanation, observations, settings.REFINEMENT)
         stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
-        known = revision > 0 or before is not None
-        held, last = finer, revision == revisions or (known and stays)
-        least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
+        held, last = finer, again or (before is not None and stays)
+        least = settings.SETTLED if last else settings.SETTLED_BETWEEN
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
         if last:
             break
@@ -287,7 +286,8 @@ def select_exactly(
             b = explanation.block_of(effect)
             leading = _leading(effect, blocks[b], explanation.values[b][0])
             others = _alternatives(effect, start, whole[effect.name])
-            variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
+            near = gate.nearby(effect, settings.REFINEMENT)
+            variants[effect.name] = tuple(dict.fromkeys((*near, *leading, *others)))
     return ExactSelection(observations, explanation, tuple(held), families)
 
 

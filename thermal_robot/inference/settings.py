@@ -152,13 +152,11 @@ fit is taken; where none does, it ends there."""
 SELECTIONS = 3
 """Rounds of model selection: of known effects, then twice with unlisted terms; another where one is taken out."""
 REVISIONS = 3
-"""Number of times that the selection is repeated at its own exact fit."""
-MANY_ROWS = 500
-"""Rows above which a selection is repeated once: each takes tens of seconds, and so many rows hardly change it."""
+"""Most rounds of exact fit and outliers of named effects; it ends earlier where outliers and noise stay."""
 SETTLED, SETTLED_NAMED = 1e-4, 1e-2
 """Last step of a fit, in standard deviations; that of named effects, where the next step is a thousandth of it."""
 SETTLED_BETWEEN = 2.0
-"""Last step, in standard deviations, of a fit of many rows before a selection: the next would be a hundredth of it."""
+"""Last step, in standard deviations, of a fit before another selection: the next would be a hundredth of it."""
 REFINEMENT = 1.6
 """Factor by which a constant is first moved: neighbours of the grid stand about 2.5 apart."""
 REFINED_GAIN, REFINED_TRIES = 0.1, 16

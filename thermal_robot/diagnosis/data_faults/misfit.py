@@ -151,7 +151,7 @@ class Recalibrated:
         return max(float(middle(np.linalg.norm(self._seen[2], axis=1))) / settings.MEDIAN, settings.LEAST_GAP)
 
     def _normal_equations(self, scale: float) -> tuple[Array, Array]:
-        """Normal equations of frames and joints with their prior, in units of a standard deviation of the gap, m."""
+        """Form normal equations of frames and joints with their prior; residuals over ``scale``, m."""
         gap = self._seen[2]
         weight = np.sqrt(cauchy_weights(np.linalg.norm(gap, axis=1)))[:, None] / scale
         design = (self._columns() * weight[:, :, None]).reshape(gap.size, -1)
