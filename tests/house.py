@@ -143,7 +143,9 @@ def imports_of_what_is_not_for_them():
 
 def circles(kinds=("top", "lazy", "checked")):
     """What a module loads never leads back to it; what it loads late, or knows by type, neither."""
-    tops = {own: {t for t, how in found if how in kinds and is_module(t)} - {PACKAGE} for own, found in imported().items()}
+    tops = {
+        own: {t for t, how in found if how in kinds and is_module(t)} - {PACKAGE} for own, found in imported().items()
+    }
     done, open_ = set(), []
 
     def visit(name):
