@@ -58,7 +58,7 @@ def is_module(name):
 
 def imports(node, how="top"):
     """Yield (module, how): ``checked`` under TYPE_CHECKING, ``lazy`` inside a function, else ``top``."""
-    for child in ast.iter_child_nodes(node):
+    for child in (c for c in ast.iter_child_nodes(node) if not isinstance(c, ast.expr)):
         here = how
         if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)) and how == "top":
             here = "lazy"
@@ -76,7 +76,9 @@ def imports(node, how="top"):
         yield from imports(child, here)
 
 
-IMPORTS = {dotted(path): list(imports(tree(path))) for path in MODULES}
+@cache
+def imported():
+    return {dotted(path): list(imports(tree(path))) for path in MODULES}
 
 
 def long_bodies():
@@ -100,7 +102,7 @@ def effects_known_elsewhere():
 
 
 def imports_against_the_order():
-    for own, found in IMPORTS.items():
+    for own, found in imported().items():
         here = room(own)
         if here and here not in ORDER:
             yield f"{here} has no place in the order of rooms"
@@ -121,7 +123,7 @@ def imports_against_the_order():
 
 def imports_of_what_is_not_for_them():
     """The command line is for nobody, Pinocchio for kinematics, observations for effects by type, probability bare."""
-    for own, found in IMPORTS.items():
+    for own, found in imported().items():
         here, pure = room(own), own.startswith("thermal_robot.assembly.probability")
         for target, how in found:
             ours = target.split(".")[0] == PACKAGE
@@ -141,7 +143,9 @@ def imports_of_what_is_not_for_them():
 
 def circles(kinds=("top", "lazy", "checked")):
     """What a module loads never leads back to it; what it loads late, or knows by type, neither."""
-    tops = {own: {t for t, how in found if how in kinds and is_module(t)} - {PACKAGE} for own, found in IMPORTS.items()}
+    tops = {
+        own: {t for t, how in found if how in kinds and is_module(t)} - {PACKAGE} for own, found in imported().items()
+    }
     done, open_ = set(), []
 
     def visit(name):

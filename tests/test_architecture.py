@@ -46,7 +46,7 @@ def test_what_is_loaded_late_is_found_listed_and_typed():
     assert printed(code) == f"{house.PACKAGE}.kinematics True"
     assert set(thermal_robot.__all__) <= set(dir(thermal_robot))
     assert not any(house.is_module(f"{house.PACKAGE}.{n}") for n in thermal_robot.__all__)  # it would hide the name
-    typed = {target for target, how in house.IMPORTS[house.PACKAGE] if how == "checked"}
+    typed = {target for target, how in house.imported()[house.PACKAGE] if how == "checked"}
     homes = {house.room(f"{house.PACKAGE}.{home}") for home in thermal_robot._HOME.values()}
     assert {house.room(target) for target in typed} == homes
     assert set(thermal_robot._HOME) == set(thermal_robot.__all__)

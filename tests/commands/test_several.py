@@ -106,7 +106,7 @@ def test_what_wear_cannot_follow_is_one_line(run, worn, more, said):
 @pytest.mark.filterwarnings("default")
 def test_a_fleet_is_diagnosed_printed_and_written(run, rv_m2, tmp_path):
     root, out = write_fleet(rv_m2, tmp_path / "all", 3), tmp_path / "out"
-    command = ("fleet", root, "--out", out, "--labels", "hall", "robot", "--workers", "2", "--only", *FLEET_ONLY)
+    command = ("fleet", root, "--out", out, "--labels", "hall", "robot", "--workers", "1", "--only", *FLEET_ONLY)
     status, printed, err = run(*command)
     assert status == 0
     assert printed.startswith("3 campaigns of 3 robots: 3 diagnosed.\n")

@@ -34,7 +34,7 @@ def corrected(robot, effects, seed=1, turning=None, only=None):
 @pytest.fixture(scope="module")
 def hall(rv_m2):
     """A model that needs temperature and directions of approach."""
-    return corrected(rv_m2, MIXTURES["hall"])
+    return corrected(rv_m2, MIXTURES["hall"], only=MIXTURES["hall"])
 
 
 @pytest.mark.parametrize(

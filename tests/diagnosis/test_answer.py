@@ -68,7 +68,7 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     assert "by request (--without drift encoder_resolution)" in str(without)
 
 
-@pytest.mark.parametrize(("name", "capped"), some([("session", True), ("temperature", False), ("region", True)], 2))
+@pytest.mark.parametrize(("name", "capped"), some([("session", True), ("temperature", False), ("region", True)], 3))
 def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2, monkeypatch, name, capped):
     harmful = FoldScheme(name, "one after the other", 4, 60, 1e-4, 2e-4, -3.0, 1e-6)
     monkeypatch.setattr("thermal_robot.diagnosis.answer.worst_folds", lambda fit: (harmful,))

@@ -8,6 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 from compared import FRAMES, NOISE, campaign, diagnosed, lagging_days, moved
+from helpers import some
 
 import thermal_robot as tr
 from thermal_robot.fleet.compare_sums import is_model
@@ -64,7 +65,7 @@ def test_a_campaign_is_the_same_as_itself():
     assert found.predicted[0].rms == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("frame", ["here", "there"])
+@pytest.mark.parametrize("frame", some(["there", "here"], 2))
 def test_a_changed_parameter_is_found_and_nothing_else(before, frame):
     found = tr.compare(before, diagnosed(3, moved(STEP), frame=frame), names=["before", "after"])
     assert places(found) == [("joint_offset", "joint_3", "after")]

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from fleet.robots import told_rows, write_told
+from helpers import some
 from scipy.integrate import quad
 
 from thermal_robot.fleet.population import combined, population
@@ -99,7 +100,7 @@ def test_what_gathers_in_a_hall_is_told_and_what_does_not_is_not(tmp_path):
 
 def test_several_campaigns_of_a_robot_count_once_and_laws_by_what_they_follow(tmp_path):
     rows = [told_rows(f"d{k}", {"robot": "a"}, {f"discovered.{k}": (True, "joint_3", {})}) for k in (1, 2)]
-    for row in (row for some in rows for row in some):
+    for row in (row for told in rows for row in told):
         row["quantity"] = "time"
     rows.append(told_rows("alone", {"robot": ""}, {"backlash": (False, "", {})}))
     found = summarise(write_told(tmp_path / "t.parquet", rows, ("robot",)), ("robot",))
@@ -194,7 +195,7 @@ def test_several_campaigns_of_a_robot_tell_it_better_and_few_robots_nothing(tmp_
     assert (few.shared, few.apart, few.parameters) == ((), (), 0)
 
 
-@pytest.mark.parametrize("spread", [0.7, 1.5, 4.0])
+@pytest.mark.parametrize("spread", some([1.5, 0.7, 4.0], 3))
 def test_mean_and_spread_lie_within_their_deviations(spread):
     off = []
     for seed in range(300):

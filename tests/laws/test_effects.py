@@ -149,25 +149,40 @@ def test_every_setting_passes_the_gate_does_nothing_by_zeros_and_is_drawn_agains
 @pytest.mark.parametrize("arm", some(["rv_m2", "ur10", "panda"], 3))
 @every_effect
 def test_reads_names_exactly_what_changes_the_response(arm, name):
-    campaign = campaign_of(arm, name=name)
+    sensors = name if name == "thermal_bending" else None
+    for more in (None, "temperature", "torque"):
+        assert_reads_what_it_follows(at_work(name, load_arm(arm)), *with_more(arm, sensors, more))
+
+
+@cache
+def with_more(arm, sensors, more):
+    """A campaign where a link has a temperature of its own, or a joint its torque; with each column changed."""
+    campaign = campaign_of(arm, name=sensors)
     robot = campaign.robot
     link = next(s.parent_link for s in robot.segments if s.length > 1e-9)
-    own = {f"temperature.{link}": campaign.covariates["temperature"] + 1.0}
-    sensed = {f"torque.{robot.joint_names[1]}": 5.0 + np.arange(ROWS)}
-    for more in ({}, own, sensed):
-        given = replace(campaign, covariates={**campaign.covariates, **more})
-        assert_reads_what_it_follows(given, at_work(name, robot))
+    added = {
+        "temperature": {f"temperature.{link}": campaign.covariates["temperature"] + 1.0},
+        "torque": {f"torque.{robot.joint_names[1]}": 5.0 + np.arange(ROWS)},
+    }
+    return changed(replace(campaign, covariates={**campaign.covariates, **added.get(more, {})}))
 
 
-def assert_reads_what_it_follows(campaign, effect):
-    nominal = observe(campaign, a_place(False, campaign))
+def changed(campaign):
+    """Observations of a campaign, and of those in which one column is another."""
+    nominal, others = observe(campaign, a_place(False, campaign)), {}
+    for column, recorded in campaign.covariates.items():
+        other = -recorded if column.startswith("approach.") else 1.3 * recorded[::-1] + 0.17
+        here = replace(campaign, covariates={**campaign.covariates, column: other})
+        others[column] = observe(here, nominal.frames)
+    return nominal, others
+
+
+def assert_reads_what_it_follows(effect, nominal, others):
     for setting in effect.variants(nominal):
         if getattr(setting, "lag", 0.0):
             continue  # within the campaign's time it goes by the campaign's record
         before, follows = gate.checked(setting, nominal), set()
-        for column, recorded in campaign.covariates.items():
-            changed = -recorded if column.startswith("approach.") else 1.3 * recorded[::-1] + 0.17
-            other = observe(replace(campaign, covariates={**campaign.covariates, column: changed}), nominal.frames)
+        for column, other in others.items():
             pairs = zip(before, gate.checked(setting, other), strict=True)
             values = [(r.values, s.values) for p, q in pairs for r, s in zip(p.responses, q.responses, strict=True)]
             if not all(np.array_equal(*pair) for pair in values):
@@ -187,16 +202,16 @@ def test_a_column_that_another_stands_in_for_is_not_read():
     # no general temperature where every link has its own
     for general in ({"temperature": recorded["temperature"]}, {}):
         given = replace(campaign, covariates={**general, **own})
-        assert_reads_what_it_follows(given, ThermalElongation())
+        assert_reads_what_it_follows(ThermalElongation(), *changed(given))
         assert set(ThermalElongation().reads(observe(given))) == set(own)
     # no payload where every joint reports its torque
     sensed = {f"torque.{joint}": 5.0 + k + np.arange(ROWS) for k, joint in enumerate(robot.joint_names)}
     given = replace(campaign, covariates={**recorded, **sensed})
-    assert_reads_what_it_follows(given, library()["joint_compliance"])
+    assert_reads_what_it_follows(library()["joint_compliance"], *changed(given))
     # the order only where there is no time
     untimed = campaign.drop_covariate("time")
     assert Drift().reads(observe(untimed)) == ("order",)
-    assert_reads_what_it_follows(untimed, Drift())
+    assert_reads_what_it_follows(Drift(), *changed(untimed))
 
 
 # what is read where it is there, and not asked for

@@ -34,7 +34,7 @@ class Browser:
         self._heard, self._calls, self._events, self._session = b"", 0, [], None
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log"):
+        for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
 
     def call(self, method, **params):
@@ -81,6 +81,12 @@ class Browser:
             elif kind == "Log.entryAdded" and told["entry"]["level"] in ("error", "warning"):
                 found.append(told["entry"]["text"])
         return found
+
+    @property
+    def fetched(self):
+        """Addresses that the page was made of, but for what stands in it."""
+        asked = [e["params"]["request"]["url"] for e in self._events if e.get("method") == "Network.requestWillBeSent"]
+        return {address for address in asked if not address.startswith("data:")}
 
     def value(self, script):
         """Value of an expression in the page, as JSON can hold it."""

@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import pytest
+from report.browser import Browser
 from report.cases import CASES
 from simulate import simulate
 
@@ -33,7 +34,16 @@ def zeros(diagnosed_once):
     """Two zeros, which a file holds, and lost motion, which none does."""
     worn = {"joint_offset": {"joint_2": 2e-3, "joint_4": -1e-3}, "backlash": {"joint_3": 4e-4}}
     tool = (0.1, 0.0, 0.08)
-    return diagnosed_once(tr.simulate("builtin:rv_m2", worn, tool_frame="tool0", rows=80, noise=2e-5, tool=tool))
+    campaign = tr.simulate("builtin:rv_m2", worn, tool_frame="tool0", rows=80, noise=2e-5, tool=tool)
+    return diagnosed_once(campaign, only=[*worn])
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """One browser for all pages."""
+    made = Browser(tmp_path_factory.mktemp("profile"))
+    yield made
+    made.close()
 
 
 @pytest.fixture(scope="session")

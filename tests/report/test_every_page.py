@@ -11,7 +11,7 @@ from html import unescape
 import pytest
 from motion.found import found
 from report import every_page
-from report.browser import PROGRAM, Browser
+from report.browser import PROGRAM
 from report.cases import CASES
 from report.every_page import EVERY, FEW, page
 from report.looking import texts
@@ -72,13 +72,6 @@ LONG = 60  # letters: what is longer may stand on two sheets
 
 needs_browser = pytest.mark.skipif(PROGRAM is None, reason="no chromium on the PATH")
 needs_reader = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext on the PATH")
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
 
 
 def bare(text):

@@ -3,6 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from helpers import some
 
 from thermal_robot.assembly.probability import (
     UniformSpread,
@@ -86,11 +87,13 @@ def test_required_clearance_of_equal_axes_is_the_closed_form():
 def test_required_clearance_at_its_ends():
     assert required_clearance(np.eye(2), probability=0.0) == 0.0
     assert required_clearance(np.eye(2), probability=1.0) == np.inf
-    # A law without a normal part is bounded: a clearance of 2 sqrt(2) holds all of the square, less holds less.
-    box = UniformSpread.box([1.0, 1.0])
-    assert required_clearance(np.zeros((2, 2)), failing=1e-6, thermal=box) == pytest.approx(
-        2.0 * np.sqrt(2.0), rel=2e-3
-    )
+
+
+@pytest.mark.parametrize("spread", some([UniformSpread.segment, UniformSpread.box], 2))
+def test_a_law_without_a_normal_part_is_bounded(spread):
+    """A clearance of 2 sqrt(2) holds all of the diagonal, or of the square; less holds less."""
+    found = required_clearance(np.zeros((2, 2)), failing=1e-6, thermal=spread([1.0, 1.0]))
+    assert found == pytest.approx(2.0 * np.sqrt(2.0), rel=2e-3)
 
 
 @pytest.mark.parametrize(("row", "expected"), [(1, 1.30), (2, 1.01)])

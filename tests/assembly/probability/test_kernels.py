@@ -3,6 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from helpers import some
 
 from thermal_robot.assembly.probability.kernels import (
     density,
@@ -29,7 +30,7 @@ def exact(x, sigma, half_width):
         return value, sigma * (near - far) / (2 * half_width)
 
 
-@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("ratio", some(RATIOS, 3))
 def test_density_and_tails_are_right_to_twelve_digits_however_far_out(ratio):
     half_width = float(np.sqrt(3.0) * ratio)
     for z in (0.0, 0.3, 0.9, 2.4, 3.9, 4.1, 8.0, 25.0, 36.0):

@@ -1,7 +1,10 @@
 """Discs by every engine: the edge, chords and compiled loops find the same chances."""
 
+from itertools import product
+
 import numpy as np
 import pytest
+from helpers import some
 from scipy.stats import ncx2
 
 from thermal_robot import compiling
@@ -35,8 +38,7 @@ def cases(seed, ratio, segments, count=300):
     return 0.5 * (matrices + np.swapaxes(matrices, 1, 2)), means, radii, ends if segments else None
 
 
-@pytest.mark.parametrize("segments", [False, True])
-@pytest.mark.parametrize("ratio", [3.0, 100.0, 1e4, 1e8, 0.0])
+@pytest.mark.parametrize(("ratio", "segments"), some(product([3.0, 100.0, 1e4, 1e8, 0.0], [False, True]), 3))
 def test_what_is_told_is_what_halved_panels_find(ratio, segments):
     matrices, means, radii, ends = cases(1, ratio, segments)
     principal, ends = Principal.of(matrices), np.zeros_like(means) if ends is None else ends

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from campaign.importers.written import complaint
+from helpers import some
 
 from thermal_robot import cli
 from thermal_robot.campaign import read_campaign
@@ -66,7 +67,7 @@ def recorded(robot, rng, *, offset, poses=25, joint_rate=100.0, rate=60.0, noise
 NOWHERE = np.zeros(3)
 
 
-@pytest.mark.parametrize("offset", [0.347, -12.3, 1.5e9])
+@pytest.mark.parametrize("offset", some([-12.3, 0.347, 1.5e9], 2))
 def test_a_known_offset_is_recovered_to_a_tenth_of_a_millisecond(rv_m2, offset):
     joints, target, _ = recorded(rv_m2, np.random.default_rng(1), offset=offset)
     found = lag(joints, target, rv_m2, NOWHERE)
