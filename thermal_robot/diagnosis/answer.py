@@ -100,7 +100,7 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
     for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):
         search = Search(replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor), prior)
         weight = softmax([search.evaluate(combination.blocks).log_evidence for combination in compared])
-        found.append(float(weight[same].sum()))
+        found.append(min(float(weight[same].sum()), 1.0))
     return Sensitivity(*found)
 
 

@@ -191,13 +191,13 @@ def _weighed(fit: Fit) -> Crash:
         kind = "joint" if _zero(linear.blocks[b]) else "link"
         name = linear.blocks[b].effect.places[0]
         units = tuple(p.unit for p in linear.blocks[b].bare)
-        found.append(Moved(kind, name, float(probabilities[own].sum()), tuple(values), tuple(std), units))
+        found.append(Moved(kind, name, min(float(probabilities[own].sum()), 1.0), tuple(values), tuple(std), units))
     hidden = tuple(b.effect.places[0] for k, b in enumerate(linear.blocks) if k >= first and k not in told and _zero(b))
     kept = ~e.outliers
     before, after = (rms(each.gap[kept, :3]) for each in (fit.nominal, fit.corrected))
     moved = tuple(sorted(found, key=lambda one: -one.probability))
     of_sets = np.array([_KINDS[frozenset(_zero(linear.blocks[b]) for b in own)] for own in sets])
-    told_as = {kind: float(probabilities[of_sets == kind].sum()) for kind in _KINDS.values()}
+    told_as = {kind: min(float(probabilities[of_sets == kind].sum()), 1.0) for kind in _KINDS.values()}
     verdict = max(told_as, key=lambda kind: told_as[kind])
     name, rows = fit.campaign.name, fit.campaign.samples
     return Crash(name, rows, verdict, told_as[verdict], moved, hidden, before, after, fit.campaign.reach)
