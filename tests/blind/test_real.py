@@ -315,6 +315,13 @@ def test_what_frames_can_do_leaves_nothing(own):
     assert 0.7 * 1e-3 / np.sqrt(40.0) < faults.leaves(seen, one_row) <= 1e-3 / np.sqrt(40.0)
 
 
+def test_frames_are_fitted_to_the_best(ur5):
+    seen = faults.seen_in_position(ur5)
+    slope = np.einsum("nik,ni->k", frame_columns(seen)[0], seen.gap)
+    assert np.abs(slope).max() < 1e-9
+    assert np.sqrt((seen.gap**2).sum(axis=1).mean()) == pytest.approx(0.72e-3, abs=0.05e-3)
+
+
 def test_lost_motion_follows_the_side_of_the_approach(ur5):
     sides = faults.with_approaches(ur5).covariates
     for j, joint in enumerate(ur5.robot.joint_names):

@@ -80,6 +80,7 @@ def test_another_robot_that_leaves_less_comes_before_a_unit_that_is_nearly_the_r
 def test_a_sound_table_is_usable(hall):
     assert hall.usable
     assert hall.reason == ""
+    assert set(hall.verdict) == {"thermal_elongation", "backlash"}
     assert hall.to_dict()["verdict"]["usable"] is True
 
 
