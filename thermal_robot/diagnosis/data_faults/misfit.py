@@ -106,7 +106,7 @@ class Recalibrated:
         across = shift - axes * (shift * axes).sum(axis=1)[:, None]
         far = np.linalg.norm(across, axis=1)
         j = int(np.argmax(far))
-        matrix, first = self._normal_equations(self._scale)[0], -len(self.prior) + 6 * j
+        matrix, first = self._normal_equations[0], -len(self.prior) + 6 * j
         covariance = np.linalg.inv(matrix)[first:, first:][:3, :3]
         deviation = np.sqrt(across[j] @ covariance @ across[j]) / max(far[j], settings.LEAST_GAP)
         return (
@@ -116,17 +116,17 @@ class Recalibrated:
             float(far[j] / max(np.median(far), settings.LEAST_GAP)),
         )
 
-    def left(self) -> tuple[float, float, float]:
-        """Robust residual size, corrected for the unknowns: distance, m, rotation, rad, and both, m.
+    def left(self) -> tuple[float, float]:
+        """Robust residual size, corrected for the unknowns: distance, m, and rotation, rad.
 
         As medians tell them: few rows that nothing explains do not count.
         """
         gap = self._seen[2]
         unknown = 6 * len(self._segments) + len(self.bases) * (6 + gap.shape[1])
         scale = np.sqrt(3.0 * gap.size / max(gap.size - unknown, len(gap))) / settings.MEDIAN
-        parts = (gap[:, :3], gap[:, 3:] / inference.LEVER, gap)
-        away, turned, both = (float(scale * np.median(np.linalg.norm(part, axis=1))) for part in parts)
-        return away, turned, both
+        parts = (gap[:, :3], gap[:, 3:] / inference.LEVER)
+        away, turned = (float(scale * np.median(np.linalg.norm(part, axis=1))) for part in parts)
+        return away, turned
 
     @cached_property
     def _seen(self) -> tuple[ChainFrames, Array, Array]:
@@ -145,15 +145,16 @@ class Recalibrated:
             gap = np.hstack([gap, inference.LEVER * turned])
         return frames, point, gap
 
-    @property
+    @cached_property
     def _scale(self) -> float:
         """Robust standard deviation of the gap, m, from its median distance."""
         return max(float(middle(np.linalg.norm(self._seen[2], axis=1))) / settings.MEDIAN, settings.LEAST_GAP)
 
-    def _normal_equations(self, scale: float) -> tuple[Array, Array]:
-        """Form normal equations of frames and joints with their prior; residuals over ``scale``, m."""
+    @cached_property
+    def _normal_equations(self) -> tuple[Array, Array]:
+        """Normal equations of frames and joints with their prior, in units of the gap's standard deviation."""
         gap = self._seen[2]
-        weight = np.sqrt(cauchy_weights(np.linalg.norm(gap, axis=1)))[:, None] / scale
+        weight = np.sqrt(cauchy_weights(np.linalg.norm(gap, axis=1)))[:, None] / self._scale
         design = (self._columns() * weight[:, :, None]).reshape(gap.size, -1)
         matrix, vector = design.T @ design, design.T @ (gap * weight).ravel()
         frames = len(matrix) - len(self.prior)
@@ -165,8 +166,7 @@ class Recalibrated:
 
     def _stepped(self) -> tuple[Recalibrated, bool]:
         """Calibration after one descent step, and whether it has converged or no step descends."""
-        scale = self._scale
-        matrix, vector = self._normal_equations(scale)
+        scale, (matrix, vector) = self._scale, self._normal_equations
         frames = len(matrix) - len(self.prior)
         step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
         for share in settings.STEP_SHARES:
@@ -327,7 +327,7 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
     """Verdict of a calibration: another motion, another model, or ``None`` where a robot may err so much."""
-    (away, turned, _), (joint, far, deviation, times) = found.left(), found.farthest()
+    (away, turned), (joint, far, deviation, times) = found.left(), found.farthest()
     if turned > settings.ANOTHER_TURN:
         places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
         return _judged(places, factor) or Misfit(turned=turned)
