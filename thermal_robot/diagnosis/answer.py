@@ -25,7 +25,7 @@ from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
-from thermal_robot.inference.algebra import rms
+from thermal_robot.inference.algebra import rms, total_probability
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.generate import Discovery
@@ -100,7 +100,7 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
     for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):
         search = Search(replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor), prior)
         weight = softmax([search.evaluate(combination.blocks).log_evidence for combination in compared])
-        found.append(min(float(weight[same].sum()), 1.0))
+        found.append(total_probability(weight[same]))
     return Sensitivity(*found)
 
 

@@ -28,7 +28,7 @@ from thermal_robot.diagnosis.diagnose import solvable
 from thermal_robot.diagnosis.values import Misfit, jsonable
 from thermal_robot.effects import Geometric, JointOffset, gate
 from thermal_robot.errors import require
-from thermal_robot.inference.algebra import rms
+from thermal_robot.inference.algebra import rms, total_probability
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.fit import Fit, fit_named
@@ -191,13 +191,13 @@ def _weighed(fit: Fit) -> Crash:
         kind = "joint" if _zero(linear.blocks[b]) else "link"
         name = linear.blocks[b].effect.places[0]
         units = tuple(p.unit for p in linear.blocks[b].bare)
-        found.append(Moved(kind, name, min(float(probabilities[own].sum()), 1.0), tuple(values), tuple(std), units))
+        found.append(Moved(kind, name, total_probability(probabilities[own]), tuple(values), tuple(std), units))
     hidden = tuple(b.effect.places[0] for k, b in enumerate(linear.blocks) if k >= first and k not in told and _zero(b))
     kept = ~e.outliers
     before, after = (rms(each.gap[kept, :3]) for each in (fit.nominal, fit.corrected))
     moved = tuple(sorted(found, key=lambda one: -one.probability))
     of_sets = np.array([_KINDS[frozenset(_zero(linear.blocks[b]) for b in own)] for own in sets])
-    told_as = {kind: min(float(probabilities[of_sets == kind].sum()), 1.0) for kind in _KINDS.values()}
+    told_as = {kind: total_probability(probabilities[of_sets == kind]) for kind in _KINDS.values()}
     verdict = max(told_as, key=lambda kind: told_as[kind])
     name, rows = fit.campaign.name, fit.campaign.samples
     return Crash(name, rows, verdict, told_as[verdict], moved, hidden, before, after, fit.campaign.reach)

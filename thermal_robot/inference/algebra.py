@@ -6,6 +6,7 @@ Every function scales its columns to unit length first, so that one floor serves
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
@@ -19,6 +20,11 @@ def equations_of(columns: Array) -> Array:
 def rms(vectors: Array) -> float:
     """Root mean square of the lengths of vectors (N, k)."""
     return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
+def total_probability(probabilities: ArrayLike) -> float:
+    """Sum of probabilities of cases that exclude each other, at most 1: rounding takes it beyond."""
+    return min(float(np.sum(probabilities)), 1.0)
 
 
 def whitener(gram: Array, floor: float = settings.SEEN) -> Array:

@@ -19,6 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import total_probability
 from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.kernels import (
     DesignMatrix,
@@ -409,7 +410,7 @@ class Explanation:
     def probability(self, blocks: Sequence[int]) -> float:
         """Posterior probability that any of the blocks is in the model."""
         held = [bool(set(c.blocks) & set(blocks)) for c in self.combinations]
-        return min(float(self.probabilities[held].sum()), 1.0)
+        return total_probability(self.probabilities[held])
 
 
 def explain(

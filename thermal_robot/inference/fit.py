@@ -18,6 +18,7 @@ from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EffectError, EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import total_probability
 from thermal_robot.inference.columns import block, frame_columns, unknown_frames
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.exact import (
@@ -73,7 +74,7 @@ class Fit:
     def probability_of_just(self, names: Set[str]) -> float:
         """Posterior probability of exactly this set of effects, summed over their settings."""
         e = self.explanation
-        return min(float(e.probabilities[[self.names_of(c) == names for c in e.combinations]].sum()), 1.0)
+        return total_probability(e.probabilities[[self.names_of(c) == names for c in e.combinations]])
 
     def odds(self, name: str) -> float:
         """Posterior odds of an effect of the explanation against the same explanation without it."""
