@@ -128,12 +128,17 @@ def test_the_worst_goes_first_and_what_is_at_work_stays(rv_m2):
         assert set(refused) <= {"geometric"}
 
 
-def test_blocks_that_speak_for_an_effect_do_not_outweigh_a_region_that_refuses_it(rv_m2, monkeypatch):
+@pytest.mark.parametrize(("error", "stays"), [(3.0, False), (6.0, False), (8.0, True), (30.0, True)])
+def test_blocks_that_speak_for_an_effect_do_not_outweigh_a_region_that_refuses_it(rv_m2, monkeypatch, error, stays):
+    """A region refuses at odds of nine, where its gain lies 1.33 standard errors below zero."""
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
-    for_it, against = DensityGain("time", 0.2, 5.0, (1.0, 9.0)), DensityGain("region", -0.5, -9.0, (-15.0, -3.0))
-    said = [{"drift": HeldOutTest(for_it, against)}, {}]
-    monkeypatch.setattr(word, "held_out_tests", lambda _: said.pop(0))
+    for_it, against = DensityGain("time", 0.2, 5.0, 2.0, 19), DensityGain("region", -0.5, -9.0, error, 19)
+    said = {"drift": HeldOutTest((for_it, against))}
+    monkeypatch.setattr(word, "held_out_tests", lambda own: {name: said[name] for name in names(own)})
     left, refused = pruned(known, lambda _: None)
+    if stays:
+        assert (left, refused) == (known, {})
+        return
     assert left.effects == ()
     assert refused["drift"].share == against.share
     assert refused["drift"].probability == pytest.approx(settings.PRIOR_PROBABILITY)
@@ -143,8 +148,8 @@ def test_the_more_rows_held_out_suffer_the_less_probable_it_is(rv_m2, monkeypatc
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
     said = []
     for nats in (-0.1, -1.0, -8.0):
-        gained = DensityGain("time", nats / 100.0, nats, (nats - 10.0, nats + 10.0))
-        answers = [{"drift": HeldOutTest(gained, gained)}, {}]
+        gained = DensityGain("time", nats / 100.0, nats, 5.0, 19)
+        answers = [{"drift": HeldOutTest((gained,))}, {}]
         monkeypatch.setattr(word, "held_out_tests", lambda _, answers=answers: answers.pop(0))
         said.append(pruned(known, lambda _: None)[1]["drift"].probability)
     assert said == sorted(said, reverse=True)
@@ -221,9 +226,9 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     unseen = forced(known, replace(item, sizes=1e-3 * NOISE / np.sqrt((item.columns**2).mean(axis=(0, 1))) / 50.0))
     nothing = {"geometric": Refused(settings.PRIOR_PROBABILITY)}
     assert undetermined(unseen) == nothing
-    poor, good = DensityGain("time", 0.2, 5.0, (-1.0, 9.0)), DensityGain("time", 0.2, 5.0, (1.0, 9.0))
+    poor, good = DensityGain("time", 0.2, 5.0, 3.0, 19), DensityGain("time", 0.2, 5.0, 2.0, 19)
     for gain, lost in ((poor, nothing), (good, {})):
-        said = {name: HeldOutTest(gain, gain) for name in names(unseen)}
+        said = {name: HeldOutTest((gain,)) for name in names(unseen)}
         monkeypatch.setattr(word, "held_out_tests", lambda own, said=said: {name: said[name] for name in names(own)})
         # where structure leaves it undetermined, a significant gain of rows held out keeps it
         assert unsupported(unseen, unseen) == lost
@@ -273,10 +278,9 @@ def test_an_effect_of_twice_the_noise_helps_and_stays(rv_m2, name):
         assert said.helps
         assert not said.harms
         assert said.blocked.scheme == "time"
-        low, high = said.blocked.interval
-        assert 0.0 < low < said.blocked.nats < high
+        assert 0.0 < said.blocked.error < said.blocked.nats / 2.0
         assert 0.0 < said.blocked.share < 1.0
-        assert said.hardest.interval[1] <= high
+        assert said.hardest.chance <= said.blocked.chance
         assert pruned(known, lambda _: None) == (known, {})
 
 

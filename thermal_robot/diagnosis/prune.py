@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, stdtrit
+from scipy.special import expit, stdtr
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.answer import Conclusion
@@ -144,33 +144,48 @@ def concluded(fit: Fit, left: ResidualAnalysis, chance: RandomGap, refused: Mapp
 class DensityGain:
     """Held-out log predictive density of one effect under one cross-validation scheme.
 
-    ``nats`` is its gain over all rows held out, with its 95 % ``interval``; ``share`` is 1 − (rms with it / rms without
-    it)² of these rows, noise included.
+    ``nats`` is its gain over all rows held out, ``error`` its standard error with ``freedom`` degrees of freedom;
+    ``share`` is 1 − (rms with it / rms without it)² of these rows, noise included.
     """
 
     scheme: str
     share: float
     nats: float
-    interval: tuple[float, float]
+    error: float
+    freedom: int
+
+    @property
+    def chance(self) -> float:
+        """Probability, by Student's t, that the density is higher with the effect."""
+        return float(stdtr(self.freedom, self.nats / max(self.error, np.finfo(float).tiny)))
 
 
-_NOT_ASKED = DensityGain("time", 0.0, 0.0, (-np.inf, np.inf))
+_NOT_ASKED = DensityGain("time", 0.0, 0.0, np.inf, 1)
 
 
 @dataclass(frozen=True)
 class HeldOutTest:
-    """Cross-validation of one effect against the refitted model without it.
+    """Cross-validation of one effect against the refitted model without it, under each scheme.
 
-    ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme with the smallest upper bound.
+    The first scheme holds blocks of consecutive rows out, the others conditions, regions and ends of ranges.
     """
 
-    blocked: DensityGain
-    hardest: DensityGain
+    gains: tuple[DensityGain, ...]
+
+    @property
+    def blocked(self) -> DensityGain:
+        """Gain on blocks of consecutive rows held out."""
+        return next((gained for gained in self.gains if gained.scheme == "time"), _NOT_ASKED)
+
+    @property
+    def hardest(self) -> DensityGain:
+        """Gain under the scheme that speaks least for the effect."""
+        return min(self.gains, key=lambda gained: gained.chance, default=_NOT_ASKED)
 
     @property
     def clearly(self) -> bool:
-        """Whether the held-out predictive density is significantly lower with the effect."""
-        return self.hardest.interval[1] < 0.0
+        """Whether the odds are nine that a scheme's held-out predictive density is lower with the effect."""
+        return self.hardest.chance < 1.0 / (1.0 + settings.NAMING_ODDS)
 
     @property
     def harms(self) -> bool:
@@ -180,7 +195,7 @@ class HeldOutTest:
     @property
     def helps(self) -> bool:
         """Whether the held-out predictive density is significantly higher with the effect."""
-        return self.blocked.interval[0] > 0.0 and not self.harms
+        return self.blocked.chance > settings.INTERVAL[1] and not self.harms
 
 
 def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
@@ -188,8 +203,8 @@ def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
 
     The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
     components in units of the noise (Vehtari, Gelman and Gabry, *Statistics and Computing* 27, 2017, on elpd and its
-    standard error): robust to a few rows. The standard error is that of the sums over blocks of consecutive rows, the
-    quantile Student's. An effect within a single block gains nothing, as other rows do not predict it.
+    standard error): robust to a few rows. The standard error is that of the sums over blocks of consecutive rows. An
+    effect within a single block gains nothing, as other rows do not predict it.
 
     Beside blocks, rows are held out by condition, by region, and at the ends of each joint's range. There, effects that
     compensate each other only within the measured range fail. Events are tested in blocks of consecutive rows alone,
@@ -212,12 +227,7 @@ def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
                 continue
             without = validation.residuals([b for b in every if b != k])[judged] / noise
             found[effect.name].append(_density_gain(name, left, without, block[number]))
-    return {name: _held_out_test(own) for name, own in found.items()}
-
-
-def _held_out_test(found: Sequence[DensityGain]) -> HeldOutTest:
-    blocked = next((gained for gained in found if gained.scheme == "time"), _NOT_ASKED)
-    return HeldOutTest(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
+    return {name: HeldOutTest(tuple(own)) for name, own in found.items()}
 
 
 def _density_gain(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> DensityGain:
@@ -226,11 +236,9 @@ def _density_gain(scheme: str, left: Array, without: Array, block: NDArray[np.in
     share = 1.0 - float(after.sum()) / total if total > 0.0 else 0.0
     density = 0.5 * (settings.TAILS + left.shape[1]) * np.log((settings.TAILS + before) / (settings.TAILS + after))
     parts = np.bincount(block, density)[np.unique(block)]
-    nats, count = float(parts.sum()), len(parts)
-    if count < 2:
-        return DensityGain(scheme, share, nats, (-np.inf, np.inf))
-    half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(count * parts.var(ddof=1)))
-    return DensityGain(scheme, share, nats, (nats - half, nats + half))
+    freedom = len(parts) - 1
+    error = float(np.sqrt(len(parts) * parts.var(ddof=1))) if freedom else np.inf
+    return DensityGain(scheme, share, float(parts.sum()), error, max(freedom, 1))
 
 
 def pruned(
@@ -239,7 +247,7 @@ def pruned(
     """Backward elimination by cross-validation until every remaining term obeys one rule.
 
     The rule: posterior odds of at least nine against nothing in its place, a held-out density that is not lower (of a
-    law, but no event: significantly higher), and at least one determined direction. All significantly harmful terms are
+    law, but no event: significantly higher), and at least one determined direction. All clearly harmful terms are
     removed at once, as they may compensate each other; the others one at a time, the smallest held-out gain first. Also
     returns the removed effects by name. Terms that are ``lost`` are removed first.
     """
