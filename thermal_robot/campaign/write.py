@@ -79,9 +79,9 @@ def write_planned(
     Beside campaign.toml and the robot stand plan.csv, all that is planned, and measurements.csv, the same with empty
     cells where something is to be recorded: the target's place and the temperatures.
 
-    ``commands`` has no measured positions; with orientations it asks for these, too. ``derived`` columns
-    follow from the order of the rows, and are left out. A directory that holds a campaign.toml is refused: somebody may
-    have filled in its table.
+    ``commands`` has no measured positions; with orientations it asks for these, too, and at sockets or planes for the
+    joints. ``derived`` columns follow from the order of the rows, and are left out. A directory that holds a
+    campaign.toml is refused: somebody may have filled in its table.
     """
     folder = Path(directory)
     if (folder / FILE_NAME).exists():
@@ -101,8 +101,10 @@ def write_commands(
     ``derived`` are columns that are left out; where temperatures are ``recorded`` their cells stay empty, too.
     """
     frame = replace(commands, orientation=None).to_frame().drop(columns=list(derived), errors="ignore")
-    measured = names.POSITION if commands.orientation is None else names.MEASURED
-    noted = [name for name in frame if names.split_name(str(name))[0] == "temperature"] if recorded else []
+    measured = names.KINDS[commands.measures][0]
+    if recorded and not measured:  # led to a socket or a plane, it is the joints that are read
+        measured = commands.robot.joint_names
+    noted = [str(name) for name in frame if names.split_name(str(name))[0] == "temperature"] if recorded else []
     frame = frame.assign(**dict.fromkeys((*noted, *measured), ""))
     _write(Path(path), frame.to_csv, lineterminator="\n", float_format="%.9g")
 

@@ -31,6 +31,7 @@ def plan(options: argparse.Namespace) -> None:
         tool_known="tool" in options.known,
         units=Units(options.angle_unit, options.length_unit),
         seed=options.seed,
+        measures=options.measures,
     )
     if options.output:
         write_plan(found, options.output)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.observables.observable import Along, Artefact, Seen
+from thermal_robot.observables.observable import Along, Artefact, Seen, in_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,11 @@ class Anchor:
     zero: float = 0.0
 
     width: ClassVar[int] = 4
+
+    @property
+    def words(self) -> str:
+        """Where its wire leaves it, mm."""
+        return f"at {in_mm(self.place)}"
 
     def moved(self, step: Array) -> Anchor:
         """Return the anchor after a step of its place and its zero."""

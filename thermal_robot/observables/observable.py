@@ -32,6 +32,11 @@ class Artefact(Protocol):
         """Return it after a step (width,) of its parameters."""
 
 
+def in_mm(point: Array) -> str:
+    """Coordinates of a point (3,) m, in words."""
+    return f"({', '.join(f'{1e3 * part:.0f}' for part in point)}) mm"
+
+
 @dataclass(frozen=True, eq=False)
 class Seen:
     """Rows of one kind with what is predicted of them.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.observables.observable import Along, Artefact, Seen
+from thermal_robot.observables.observable import Along, Artefact, Seen, in_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,11 @@ class Plane:
     def tangents(self) -> Array:
         """(2, 3) unit vectors along the plane."""
         return np.asarray(np.linalg.svd(self.normal[None])[2][1:])
+
+    @property
+    def words(self) -> str:
+        """Where it lies: its point next to the origin, mm, and its normal."""
+        return f"through {in_mm(self.offset * self.normal)}, normal to {tuple(np.round(self.normal + 0.0, 2).tolist())}"
 
     def moved(self, step: Array) -> Plane:
         """Return the plane after a turn of its normal, two components, and a change of its offset."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.observables import settings
-from thermal_robot.observables.observable import Artefact, Observable, Seen
+from thermal_robot.observables.observable import Artefact, Observable, Seen, in_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,11 @@ class Stand:
         if not self.lengths:
             return np.eye(self.points.size)
         return np.asarray(np.linalg.svd(self._slopes)[2][len(self.lengths) :].T)
+
+    @property
+    def words(self) -> str:
+        """Where its sockets are, mm."""
+        return ", ".join(f"socket {s} at {in_mm(p)}" for s, p in zip(self.sockets, self.points, strict=True))
 
     def moved(self, step: Array) -> Stand:
         """Return the stand after a step, its known distances kept."""

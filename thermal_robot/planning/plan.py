@@ -12,8 +12,8 @@ of θ is (1 + S G S)⁻¹, scaled by S, with G the whitened products: it does no
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -34,10 +34,14 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.problem import Linear, Whitening, whitened
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, joint_range
+from thermal_robot.schema import fitted, optional, word
 from thermal_robot.simulation import schedule
+from thermal_robot.simulation.brought import TOUCHED
 from thermal_robot.simulation.schedule import RISE
+from thermal_robot.simulation.simulate import simulate
 from thermal_robot.tables import aligned
 
 FRAMES = "unknown frames"
@@ -217,10 +221,13 @@ def foreseen(campaign: Campaign, effects: str | Iterable[str] | None = None) -> 
     """
     if campaign.noise_position is None:
         raise CampaignError(campaign.name, "states no noise", column="noise.position", expected="one sigma per axis")
-    seen = observe(campaign)
     names = [effects] if isinstance(effects, str) else effects
-    kinds = [kind for kind in choose(tuple(names or ())) if not gate.missing(kind, seen)]
-    return expectations(Columns.of(seen, [gate.variants(kind, seen)[0] for kind in kinds]))
+    return expectations(_testable(observe(campaign), choose(tuple(names or ()))))
+
+
+def _testable(seen: Observations, kinds: Sequence[Effect]) -> Columns:
+    """Whitened design matrix of those effects that the rows can tell."""
+    return Columns.of(seen, [gate.variants(kind, seen)[0] for kind in kinds if not gate.missing(kind, seen)])
 
 
 def _left(precision: Array, which: NDArray[np.int64]) -> Array:
@@ -235,6 +242,8 @@ ROWS, CRASH_ROWS = 60, 40
 CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
 """Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
 than that."""
+MEASURES = ("socket", "plane", "distance")
+"""What rows may say where no instrument measures positions."""
 FEWEST_ROWS, MOST_ROWS = 6, 1000
 """Rows that a plan may have: with fewer not even the frames are known, more are not planned but measured."""
 ORDERS = 16
@@ -256,6 +265,9 @@ class Plan:
         Information of all rows on the parameters of all effects, nats.
     repeats
         How often each pose is measured.
+    artefacts
+        Stands, planes or anchors by name, where rows are of these: ``points``, ``normal`` and ``offset``, ``place``, m,
+        in the root frame.
 
     Examples
     --------
@@ -269,6 +281,7 @@ class Plan:
     effects: tuple[Expected, ...]
     information: float
     repeats: int
+    artefacts: Mapping[str, Any] = field(default_factory=dict)
 
     def effect(self, name: str) -> Expected:
         """Return the expected precision of one effect.
@@ -295,14 +308,16 @@ class Plan:
         >>> from thermal_robot.planning import plan
         >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
         >>> list(found.to_dict())
-        ['information', 'repeats', 'effects', 'joints', 'conditions']
+        ['information', 'repeats', 'effects', 'joints', 'conditions', 'labels', 'artefacts']
         """
         q, names = self.commands.q, self.commands.robot.joint_names
         joints = {name: q[:, j].tolist() for j, name in enumerate(names)}
         given = {name: values.tolist() for name, values in self.commands.covariates.items()}
         effects = [expected.to_dict() for expected in self.effects]
         told = {"information": self.information, "repeats": self.repeats, "effects": effects}
-        return {**told, "joints": joints, "conditions": given}
+        places = {name: {k: np.asarray(v).tolist() for k, v in vars(a).items()} for name, a in self.artefacts.items()}
+        labels = {name: np.asarray(values).tolist() for name, values in self.commands.labels.items()}
+        return {**told, "joints": joints, "conditions": given, "labels": labels, "artefacts": places}
 
 
 def plan(
@@ -321,6 +336,7 @@ def plan(
     tool_known: bool = False,
     units: Units | None = None,
     seed: int = 0,
+    measures: str | None = None,
 ) -> Plan:
     """Plan a first campaign by optimal design, before anything was measured.
 
@@ -350,6 +366,9 @@ def plan(
         Units of the plan; rad and m by default.
     seed
         Seed of the random candidates; the same seed gives the same plan.
+    measures
+        ``"socket"``, ``"plane"`` or ``"distance"`` where no instrument measures positions: the plan then says where
+        stands, planes or the anchors of a draw wire are best placed, and its joints are postures near them.
 
     Returns
     -------
@@ -359,7 +378,7 @@ def plan(
     Raises
     ------
     CampaignError
-        A number that no campaign has; a joint that slides without limits.
+        A number that no campaign has; a joint that slides without limits; places that the robot does not reach.
     EffectError
         A name that no effect has, or none that these rows could tell.
 
@@ -373,6 +392,7 @@ def plan(
     """
     require("plan()", robot, (Robot,), "a robot, from load_robot")
     _check(robot, rows, repeats, noise, noise_orientation, rise, loads)
+    measures = fitted(optional(word(MEASURES)), measures, "plan", "measures")
     kinds = choose(() if effects is None else effects)
     rng = np.random.default_rng(seed)
     given = schedule.conditions(rows, rise, loads)
@@ -389,7 +409,8 @@ def plan(
         noise_orientation=noise_orientation if orientation else None,
         units=units or Units(),
     )
-    return _planned(made, given, schedule.visits(rows, repeats), kinds, rng)
+    found = _planned(made, given, schedule.visits(rows, repeats), kinds, rng)
+    return found if measures is None else _elsewhere(found, measures, kinds, seed)
 
 
 def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dict[str, Any] | None = None) -> Campaign:
@@ -413,18 +434,51 @@ def _planned(
     for joint in robot.joint_names:
         covariates[f"approach.{joint}"] = rng.choice([-1.0, 1.0], len(rows))
     seen = observe(_filled(empty, np.repeat(offered, places, axis=0), covariates))
-    lacks = {kind.name: gate.missing(kind, seen) for kind in kinds}
-    tested = [gate.variants(kind, seen)[0] for kind in kinds if not lacks[kind.name]]
-    columns = Columns.of(seen, tested)
+    columns = _testable(seen, kinds)
+    tested = [item.effect for item in columns.blocks]
     root = columns.root.reshape(len(place), -1, columns.root.shape[2])
     chosen = most_informative(root, root[:, :, : columns.flat], poses, place)[0]
     chosen.sort(key=lambda row: int(place[row]))
     orders = (_in_order(empty, given, visits, offered[chosen], k, rng) for k in range(ORDERS))
     found = ((commands, Columns.of(observe(commands), tested)) for commands in orders)
-    best, told, columns = max(((c, own.information, own) for c, own in found), key=lambda each: each[1])
-    known = {expected.name: expected for expected in expectations(columns)}
-    without = {kind.name: Expected(kind.name, kind.title, (), lacks=lacks[kind.name]) for kind in kinds}
-    return Plan(best, tuple(known.get(kind.name, without[kind.name]) for kind in kinds), told, places)
+    return _best(found, kinds, places)
+
+
+def _best(found: Iterable[tuple[Campaign, Columns]], kinds: Sequence[Effect], repeats: int) -> Plan:
+    """Plan of the most informative of several campaigns."""
+    commands, told, columns = max(((c, own.information, own) for c, own in found), key=lambda each: each[1])
+    known, seen = {expected.name: expected for expected in expectations(columns)}, observe(commands)
+    without = {kind.name: Expected(kind.name, kind.title, (), lacks=gate.missing(kind, seen)) for kind in kinds}
+    return Plan(commands, tuple(known.get(kind.name, without[kind.name]) for kind in kinds), told, repeats)
+
+
+def _elsewhere(planned: Plan, measures: str, kinds: Sequence[Effect], seed: int) -> Plan:
+    """Plan of rows of another kind, from the poses of a plan: stands and planes are drawn anew as often as orders are.
+
+    An effect that needs more than the rows of this kind record is left without an expectation.
+    """
+    commands = planned.commands
+    found, lost = [], CampaignError("plan", "cannot be planned")
+    for k in range(ORDERS):
+        try:
+            rows = simulate(
+                commands.robot,
+                commands=commands,
+                measures=measures,
+                noise=commands.noise_position or NOISE,
+                seed=seed + k,
+            )
+        except CampaignError as error:  # out of reach
+            lost = error
+            continue
+        if measures in TOUCHED:  # from which side a hand brings each joint is not known
+            given = {name: values for name, values in rows.covariates.items() if not name.startswith("approach.")}
+            rows = replace(rows, covariates=given)
+        found.append((replace(rows, name=commands.name), _testable(observe(rows), kinds)))
+    if not found:
+        raise lost
+    best = _best(found, kinds, planned.repeats)
+    return replace(best, artefacts=register(best.commands).artefacts)
 
 
 def _in_order(
@@ -487,12 +541,16 @@ def text(plan: Plan) -> str:
     """
     rows = [_HEAD, *(line for expected in plan.effects for line in _lines(expected))]
     lacking = [f"{e.name} {_why(e)}" for e in plan.effects if not e.parameters]
-    return "\n".join([_opening(plan), "", *aligned(rows, left=(0, 1, 7)), *(["", *lacking] if lacking else [])])
+    return "\n".join(
+        [_opening(plan), *_places(plan), "", *aligned(rows, left=(0, 1, 7)), *(["", *lacking] if lacking else [])]
+    )
 
 
 def _opening(plan: Plan) -> str:
     commands = plan.commands
     names = commands.robot.joint_names
+    if plan.artefacts:
+        return f"{commands.samples} rows, each of what it is to touch or to reach, in the robot's root frame:"
     shares = [float((commands.covariates[f"approach.{name}"] > 0.0).mean()) for name in names]
     poses = commands.samples // plan.repeats
     each = f", each {plan.repeats} times" if plan.repeats > 1 else ""
@@ -522,11 +580,27 @@ def _why(expected: Expected) -> str:
 
 
 TABLE = ".csv"
-COMMENTS = (
-    "Planned, not yet measured: go direct from row to row in this order, and fill in measurements.csv: the target's "
-    "place, and, where it has such a column, time in s and temperature in °C as recorded.",
-    "plan.csv stays as it was planned; a column that will not be recorded is taken out of measurements.csv.",
-)
+_LED = "lead the robot to what the row names, near the posture of plan.csv, and fill in the joints that it reports"
+_TO_DO = {
+    "socket": f"set the stands up where the plan says, to a hand's breadth; {_LED}",
+    "plane": f"use surfaces about where the plan says; {_LED}",
+    "distance": "fix the wire's anchors where the plan says, to a hand's breadth; fill in the distances read",
+}
+
+
+def _comments(plan: Plan) -> tuple[str, ...]:
+    """Return what is to be done with the files, for campaign.toml."""
+    usual = "go direct from row to row in this order, and fill in measurements.csv: the target's place"
+    return (
+        f"Planned, not yet measured: {_TO_DO.get(plan.commands.measures, usual)}, and, where measurements.csv has such "
+        "a column, time in s and temperature in °C as recorded.",
+        "plan.csv stays as it was planned; a column that will not be recorded is taken out of measurements.csv.",
+        *_places(plan),
+    )
+
+
+def _places(plan: Plan) -> list[str]:
+    return [f"{name}: {artefact.words}" for name, artefact in plan.artefacts.items()]
 
 
 def write_plan(plan: Plan, path: str | Path) -> Path:
@@ -560,6 +634,6 @@ def write_plan(plan: Plan, path: str | Path) -> Path:
     """
     derived = [name for name in plan.commands.covariates if name.startswith("approach.")]
     if Path(path).suffix.lower() != TABLE:
-        return write_planned(plan.commands, path, comments=COMMENTS, derived=derived)
+        return write_planned(plan.commands, path, comments=_comments(plan), derived=derived)
     write_commands(plan.commands, path, derived=derived)
     return Path(path)

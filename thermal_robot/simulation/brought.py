@@ -34,7 +34,7 @@ def brought(
     away: Array | None = None,
     near: Array | None = None,
 ) -> Campaign:
-    """Inverse kinematics by Newton's method: commands with which each row reads what it says.
+    """Inverse kinematics by Newton's method within the limits: commands with which each row reads what it says.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def brought(
             return plan
         slopes = seen.joint_sensitivity[:, : left.shape[1]]
         step = np.linalg.pinv(slopes, rcond=LEAST) @ left[:, :, None]
-        plan = replace(plan, q=plan.q + np.clip(step[:, :, 0], -SWAY, SWAY))
+        low, high = plan.robot.lower, plan.robot.upper
+        plan = replace(plan, q=np.clip(plan.q + np.clip(step[:, :, 0], -SWAY, SWAY), low, high))
         if near is not None and number % ROUNDS == ROUNDS - 1:  # what is not reached is begun nearer
             begun = 0.5 * (begun + near)
             lost = np.abs(left).max(axis=1) >= CLOSED
@@ -102,7 +103,7 @@ def touched(
     return replace(brought(rows, true, effects, away, near), noise_position=noise or None)
 
 
-def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any], Array, Array | None]:
+def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any], Array, Array]:
     """Return the labels of sockets, the stands, postures near them, and nearer ones."""
     robot, each = plan.robot, -(-plan.samples // (STANDS * SOCKETS))
     low, high = np.maximum(robot.lower, -LED), np.minimum(robot.upper, LED)
@@ -122,12 +123,13 @@ def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], d
     return labels, artefacts, q, middles[stand]
 
 
-def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, Any], Array, Array | None]:
-    """Return the labels of planes, the planes through the middle of all places, and the plan's postures."""
-    middle = np.median(observe(plan, frames).position, axis=0)
+def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, Any], Array, Array]:
+    """Return the labels of planes, the planes through the middle of all places, postures, and nearer ones."""
+    places = observe(plan, frames).position
+    middle = np.median(places, axis=0)
     number = np.arange(plan.samples) % PLANES
     planes = {f"plane {k}": Plane(normal, float(normal @ middle)) for k, normal in enumerate(np.eye(PLANES))}
-    return {"plane": number.astype(str)}, planes, plan.q, None
+    return {"plane": number.astype(str)}, planes, plan.q, plan.q[np.abs(places - middle).argmin(axis=0)[number]]
 
 
 def as_kind(kind: str, campaign: Campaign) -> Campaign:
