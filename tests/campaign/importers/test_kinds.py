@@ -85,31 +85,79 @@ def test_a_hand_eye_set_that_cannot_be_used_is_refused(robot, tmp_path, values, 
         import_files("moveit", [tmp_path / "joints.yaml", tmp_path / "samples.yaml"], tmp_path, planned(ROBOT))
 
 
-def test_corners_of_images_make_a_campaign_of_pixels(robot, q, tmp_path):
-    lens, points = 800.0, np.array([[x, y, 0.0] for x in (0.0, 0.1) for y in (0.0, 0.05)])
-    camera = exp6(np.array([0.0, 0.0, 3.0, np.pi, 0.0, 0.0]))
+def seen_corners(robot, q, folder, columns, cells, points):
+    """Write corners on the tool at known points (K, 3), m, as a camera in the room sees them; return the files."""
+    lens, camera = 800.0, exp6(np.array([0.0, 0.0, 3.0, np.pi, 0.0, 0.0]))
     board = tool_poses(robot, q) @ EYE
     seen = np.einsum("nij,kj->nki", board[:, :3, :3], points) + board[:, None, :3, 3]
     inside = (seen - camera[:3, 3]) @ camera[:3, :3]
     pixels = lens * inside[:, :, :2] / inside[:, :, 2:] + 500.0
-    corners = ["image,X,Y,Z,u,v"]
-    corners += [
-        f"{n}.png,{1e3 * x},{1e3 * y},{1e3 * z},{u},{v}"
-        for n in range(len(q))
-        for (x, y, z), (u, v) in zip(points, pixels[n], strict=True)
-    ]
+    corners = [f"image,{columns},u,v"]
+    corners += [f"{n}.png,{cell},{u},{v}" for n in range(len(q)) for cell, (u, v) in zip(cells, pixels[n], strict=True)]
     states = [",".join(["picture", *robot.joint_names])]
     states += [",".join([f"{n}.png", *map(repr, map(float, row))]) for n, row in enumerate(q)]
-    (tmp_path / "corners.csv").write_text("\n".join(corners))
-    (tmp_path / "joints.csv").write_text("\n".join(states))
-    (tmp_path / "mapping.toml").write_text(
+    (folder / "corners.csv").write_text("\n".join(corners))
+    (folder / "joints.csv").write_text("\n".join(states))
+    (folder / "mapping.toml").write_text(
         '[robot]\nurdf = "example-robot-data:ur10"\ntool_frame = "tool0"\n[measurements]\nangle_unit = "rad"\n'
         f'length_unit = "mm"\n[camera.front]\nfx = {lens}\nfy = {lens}\ncx = 500\ncy = 500\nmount = "room"\n'
     )
-    files = [tmp_path / "corners.csv", tmp_path / "joints.csv"]
+    return [folder / "corners.csv", folder / "joints.csv"]
+
+
+def test_corners_of_images_make_a_campaign_of_pixels(robot, q, tmp_path):
+    points = np.array([[x, y, 0.0] for x in (0.0, 0.1) for y in (0.0, 0.05)])
+    cells = [",".join(str(1e3 * each) for each in point) for point in points]
+    files = seen_corners(robot, q, tmp_path, "X,Y,Z", cells, points)
     campaign = import_files("corners", files, tmp_path / "out", read_mapping(tmp_path / "mapping.toml")).campaign
     assert campaign.kinds == ("pixel",)
     assert campaign.samples == 4 * len(q)
     assert np.abs(observe(campaign, register(campaign)).gap).max() < 1e-6
     with pytest.raises(CampaignError, match="which camera"):
         import_files("corners", files, tmp_path / "other", Plan())
+
+
+BOARDS = {
+    # tags of 30 mm, 9 mm apart, two in a row: the first corners lie at 0, 30, 39 and 69 mm
+    "target_type: aprilgrid\ntagRows: 1\ntagCols: 2\ntagSize: 0.03\ntagSpacing: 0.3": [
+        (x, y) for y in (0.0, 0.03) for x in (0.0, 0.03, 0.039, 0.069)
+    ],
+    "target_type: checkerboard\ntargetRows: 3\ntargetCols: 2\nrowSpacingMeters: 0.04\ncolSpacingMeters: 0.05": [
+        (0.0, 0.0),
+        (0.0, 0.05),
+        (0.04, 0.0),
+        (0.04, 0.05),
+        (0.08, 0.0),
+        (0.08, 0.05),
+    ],
+    "target_type: circlegrid\ntargetRows: 2\ntargetCols: 2\nspacingMeters: 0.02\nasymmetricGrid: True": [
+        (0.0, 0.0),
+        (0.04, 0.0),
+        (0.02, 0.02),
+        (0.06, 0.02),
+    ],
+}
+
+
+@pytest.mark.parametrize("told", BOARDS, ids=lambda told: told.split()[1])
+def test_numbers_of_corners_stand_for_places_on_a_board_of_kalibr(robot, q, tmp_path, told):
+    points = np.array([(x, y, 0.0) for x, y in BOARDS[told]])
+    files = [*seen_corners(robot, q, tmp_path, "corner", range(len(points)), points), tmp_path / "board.yaml"]
+    files[2].write_text(told)
+    mapping = read_mapping(tmp_path / "mapping.toml")
+    campaign = import_files("corners", files, tmp_path / "out", mapping).campaign
+    assert campaign.samples == len(points) * len(q)
+    assert np.abs(observe(campaign, register(campaign)).gap).max() < 1e-6
+    files[2].write_text(told.replace("Rows: ", "Rows: -"))
+    with pytest.raises(CampaignError, match="Rows"):
+        import_files("corners", files, tmp_path / "other", mapping)
+
+
+def test_a_number_beyond_the_board_is_refused(robot, q, tmp_path):
+    told, places = next(iter(BOARDS.items()))
+    points = np.array([(x, y, 0.0) for x, y in places])
+    files = [*seen_corners(robot, q, tmp_path, "corner", range(1, 1 + len(points)), points), tmp_path / "board.yaml"]
+    files[2].write_text(told)
+    with pytest.raises(CampaignError, match="no corner of the board") as refused:
+        import_files("corners", files, tmp_path / "out", read_mapping(tmp_path / "mapping.toml"))
+    assert "from 0 to 7" in str(refused.value)

@@ -12,6 +12,10 @@ OpenCV: a row for each corner, u v of ``findChessboardCorners`` or ``detectMarke
 of the corner on the board as ``calibrateCamera`` is given it; a column ``image``; and a second table with the joints at
 each image. The mapping has ``[camera.NAME]``: fx, fy, cx, cy and the mount.
 
+Kalibr: in place of X Y Z a column ``corner`` may hold the corner's number on a board, from 0, with the board's YAML
+as a third file: github.com/ethz-asl/kalibr, wiki *Calibration targets*, ``GridCalibrationTarget*.cpp``: row by row,
+of an aprilgrid two corners a tag in each row.
+
 MUKCa, a ball on the tool that is held in each of two sockets of a stand: Franzese, Spahn, Kober and Della Santina,
 *MUKCa: Accurate and Affordable Cobot Calibration Without External Measurement Devices* (arXiv 2503.12584),
 github.com/platonics-delft/kinematics_calibration, ``data``, ``calibrate_fk/utils.py``: a folder for each place of the
@@ -24,6 +28,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +41,10 @@ from thermal_robot.campaign.importers.plan import Format, Plan, Source, column_n
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import ORIENTATION, POSITION
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table
+from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import align, log3, rotation_to_quaternion
-from thermal_robot.schema import fitted, matrix, text
+from thermal_robot.schema import Kind, boolean, fitted, matrix, number, text, whole, word
 from thermal_robot.schema import listed as list_of
 
 _HAND, _EYE = "effector_wrt_world", "object_wrt_sensor"
@@ -104,13 +110,62 @@ def _moveit(files: Sequence[Path], plan: Plan) -> Source:
     return Source(table, planned(units), (f"the camera is {where}",))
 
 
+_COUNTED, _SIZED = whole(1), number(above=0.0, expected="a length above 0, m")
+_BOARDS: dict[str, dict[str, Kind]] = {
+    "aprilgrid": {"tagRows": _COUNTED, "tagCols": _COUNTED, "tagSize": _SIZED, "tagSpacing": number(least=0.0)},
+    "checkerboard": {
+        "targetRows": _COUNTED,
+        "targetCols": _COUNTED,
+        "rowSpacingMeters": _SIZED,
+        "colSpacingMeters": _SIZED,
+    },
+    "circlegrid": {"targetRows": _COUNTED, "targetCols": _COUNTED, "spacingMeters": _SIZED, "asymmetricGrid": boolean},
+}
+"""Of each board of Kalibr what its YAML says: rows and columns first."""
+
+
+def _board(file: Path) -> Array:
+    """Points (K, 3) of a board of Kalibr, m, in the order of their numbers."""
+    (said, *_) = read_yaml(file) or [{}]
+    kind = fitted(
+        word(tuple(_BOARDS)), said.get("target_type") if isinstance(said, dict) else said, str(file), "target_type"
+    )
+    rows, columns, *sizes = (fitted(own, said.get(key), str(file), key) for key, own in _BOARDS[kind].items())
+    twice = 2 if kind == "aprilgrid" else 1
+    row, column = np.indices((twice * rows, twice * columns)).reshape(2, -1)
+    if kind == "aprilgrid":
+        size, gap = sizes
+        x, y = (size * ((1.0 + gap) * (k // 2) + k % 2) for k in (column, row))
+    elif kind == "checkerboard":
+        x, y = sizes[0] * row, sizes[1] * column
+    else:
+        x, y = (sizes[0] * k for k in ((2 * column + row % 2, row) if sizes[1] else (row, column)))
+    return np.stack([x, y, np.zeros(len(row))], axis=1)
+
+
+def _on_board(corners: Table, file: Path, unit: str) -> Table:
+    """Corners with the places of their numbers on a board, in a unit of length."""
+    name, points = column_name(corners, "corner"), _board(file) / LENGTH_UNITS[unit]
+    numbers = corners.numbers(name)
+    wrong = np.flatnonzero(~np.isin(numbers, np.arange(len(points))))
+    if len(wrong):
+        expected = f"a whole number from 0 to {len(points) - 1}, as {file.name} has {len(points)} corners"
+        raise corners.error(
+            "is no corner of the board", name, int(wrong[0]), found=f"{numbers[wrong[0]]:g}", expected=expected
+        )
+    places = dict(zip("XYZ", points[numbers.astype(int)].T, strict=True))
+    return replace(corners, columns={**corners.columns, **places})
+
+
 _CORNERS: dict[str, Any] = {"robot": {"moves": "unknown"}, "measurements": {"kind": "pixel"}}
 
 
 def _corners(files: Sequence[Path], plan: Plan) -> Source:
     """Read corners by image, and the joints at each image; the one camera that the mapping states sees them."""
-    cameras = [*plan.sections.get("camera", {})]
-    corners, states = (read_table(file, plan.layout()) for file in files)
+    cameras, unit = [*plan.sections.get("camera", {})], plan.sections.get("measurements", {}).get("length_unit", "m")
+    corners, states = (read_table(file, plan.layout()) for file in files[:2])
+    if len(files) > 2:
+        corners = _on_board(corners, files[2], unit)
     if "camera" not in corners.columns and len(cameras) != 1:
         expected = "[camera.NAME] with fx, fy, cx, cy and mount in the file of --mapping, or a column camera"
         raise CampaignError(str(files[0]), "it is not clear which camera saw this", expected=expected)
@@ -125,7 +180,11 @@ MOVEIT = Format(
     "joint states and samples of MoveIt's hand-eye calibration, as YAML", "JOINTS.yaml SAMPLES.yaml", _moveit, least=2
 )
 CORNERS = Format(
-    "corners that OpenCV found in images, and the joints at each image", "CORNERS.csv JOINTS.csv", _corners, least=2
+    "corners found in images by OpenCV, or on a board of Kalibr, and the joints at each image",
+    "CORNERS.csv JOINTS.csv [BOARD.yaml]",
+    _corners,
+    least=2,
+    most=3,
 )
 
 
