@@ -117,3 +117,12 @@ def test_an_unknown_kind_and_an_empty_cell_are_refused(ur10, tmp_path):
     table.write_text(text.replace(",distance,", ",distanse,", 2))
     with pytest.raises(tr.CampaignError, match="unknown kind of measurement"):
         tr.read_campaign(file)
+
+
+@pytest.mark.parametrize(("kind", "seen"), [("distance", 1), ("plane", 1), ("pixel", 2), ("socket", 3)])
+def test_the_noise_floor_is_that_of_the_components_that_a_row_sees(ur10, kind, seen):
+    """A sound robot leaves the noise, 50 µm in each component that its rows see."""
+    campaign = tr.simulate(ur10, rows=120, measures=kind, noise=5e-5, tool=[0.05, 0.0, 0.1], seed=2)
+    gap = tr.diagnose(campaign, only=["backlash", "joint_gain"]).gap
+    assert gap.noise_floor == pytest.approx(5e-5 * np.sqrt(seen), rel=1e-9)
+    assert 0.8 < gap.rms_after / gap.noise_floor < 1.3

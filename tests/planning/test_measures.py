@@ -44,6 +44,19 @@ def test_postures_bring_the_tip_onto_the_planes_that_the_plan_names(rv_m2):
         assert abs(surface.normal @ point - surface.offset) < 6.0 * NOISE
 
 
+def test_cameras_see_the_target_where_the_plan_says(rv_m2):
+    found = planned(rv_m2, "pixel")
+    lens = found.commands.facts["camera"]["0"]
+    read = np.stack([found.commands.readings[name] for name in "uv"], axis=1)
+    for own, point, pixel in zip(found.commands.labels["camera"], places(found.commands), read, strict=True):
+        view = found.artefacts[f"camera {own}"]
+        x, y, z = view.pose[:3, :3].T @ (point - view.pose[:3, 3])
+        assert z > 0.5  # in front of it
+        assert lens["fx"] * x / z + lens["cx"] == pytest.approx(pixel[0], abs=2.0)
+        assert lens["fy"] * y / z + lens["cy"] == pytest.approx(pixel[1], abs=2.0)
+    assert "camera 0: at (" in text(found)
+
+
 def test_a_wire_is_as_long_as_from_the_anchor_that_the_plan_names(rv_m2):
     found = planned(rv_m2, "distance")
     at = places(found.commands)
@@ -84,7 +97,7 @@ def test_stands_are_placed_better_than_by_chance(led, rv_m2):
 
 def test_the_text_and_the_files_say_where_the_stands_stand(led, tmp_path):
     told = text(led).splitlines()
-    assert told[0] == f"{ROWS} rows, each of what it is to touch or to reach, in the robot's root frame:"
+    assert told[0] == f"{ROWS} rows. What is to be set up, in the robot's root frame:"
     first = 1e3 * led.artefacts["stand place 0"].points[0]
     assert told[1].startswith(f"stand place 0: socket 0 at ({', '.join(f'{x:.0f}' for x in first)}) mm, socket 1 at")
     toml = write_plan(led, tmp_path / "hall").read_text(encoding="utf-8")
@@ -116,5 +129,5 @@ def test_what_is_filled_in_becomes_a_campaign_that_names_the_zero(led, tmp_path)
 
 def test_only_what_is_brought_there_is_planned_so(rv_m2):
     with pytest.raises(tr.CampaignError, match="measures") as refused:
-        planned(rv_m2, "pixel")
-    assert '"socket" or "plane" or "distance"' in str(refused.value)
+        planned(rv_m2, "pose")
+    assert '"socket" or "plane" or "distance" or "pixel"' in str(refused.value)

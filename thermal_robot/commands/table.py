@@ -195,7 +195,11 @@ COMMANDS = {
             _option("--known", choices=("base", "tool"), nargs="+", default=[], help="frames that will be known"),
             _option("--angle-unit", choices=ANGLE_UNITS, default="rad", help="of the joints in the table (rad)"),
             _option("--length-unit", choices=LENGTH_UNITS, default="mm", help="of lengths in the table (mm)"),
-            _option("--measures", choices=("socket", "plane", "distance"), help="without an instrument: what rows say"),
+            _option(
+                "--measures",
+                choices=("socket", "plane", "distance", "pixel"),
+                help="without an instrument: what rows say",
+            ),
             _value("N", "--seed", "of the candidates (0)", type=int, default=0),
             _json("plan"),
         ],

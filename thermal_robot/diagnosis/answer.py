@@ -35,7 +35,7 @@ from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
-from thermal_robot.observables import components, kinds_of, of_model
+from thermal_robot.observables import components, figures_of_a_row, kinds_of, of_model
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
 
@@ -206,7 +206,7 @@ def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
     return Gap(
         rms_before=rms(before[:, :3]),
         rms_after=rms(after[:, :3]),
-        noise_floor=float(np.sqrt(3.0) * left.floor),
+        noise_floor=float(np.sqrt(figures_of_a_row(fit.campaign)[0]) * left.floor),
         noise_source=left.source,
         held_out=shrinkage.overall,
         orientation_before=rms(before[:, 3:]) if turned else None,

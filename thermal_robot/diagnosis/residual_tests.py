@@ -23,6 +23,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import consecutive_outliers, in_order
 from thermal_robot.inference.screening import Score, Target, harmonics, smooth_columns
 from thermal_robot.inference.weights import distance_limit
+from thermal_robot.observables import figures_of_a_row
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
 
@@ -131,10 +132,10 @@ def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None)
     errors.
     """
     left, noise = residual(fit), float(fit.explanation.whitening.noise[0])
-    again, white = repeats(fit, left), left.white
-    rms = noise * float(np.sqrt(white.shape[1] * (white[:, :3] ** 2).sum() / left.target.freedom))
+    again, (places, figures) = repeats(fit, left), figures_of_a_row(fit.campaign)
+    rms = noise * float(np.sqrt(figures * (left.white[:, :3] ** 2).sum() / left.target.freedom))
     of_repeats = again.position if again else None
-    known = {"stated": fit.campaign.noise_position, "repeats": of_repeats, "remainder": rms / float(np.sqrt(3.0))}
+    known = {"stated": fit.campaign.noise_position, "repeats": of_repeats, "remainder": rms / float(np.sqrt(places))}
     source, floor = next((name, sigma) for name, sigma in known.items() if sigma is not None)
     progress("remainder: size and neighbours")
     rest = [_too_large(fit, left), _lack_of_fit(left, again), _autocorrelation(fit, left)]
@@ -148,12 +149,12 @@ def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None)
         return ResidualAnalysis(Unexplained(False, 0.0, p_value), floor, source)
     likeness = min(max(test.share for test in rest), 1.0)
     # what neighbours or a law have in common is no noise, however small beside the stated one
-    beyond2 = max(rms**2 - 3.0 * floor**2, likeness * rms**2)
+    beyond2 = max(rms**2 - places * floor**2, likeness * rms**2)
     if source == "remainder":
         # nothing tells the noise but the residual itself: at most what neighbours do not have in common, if that
         floor, beyond2 = floor * float(np.sqrt(1.0 - likeness)), rms**2
     if of_aside:
-        beyond2 = max(beyond2, float((fit.corrected.gap[:, :3] ** 2).sum(axis=1).mean()) - 3.0 * floor**2)
+        beyond2 = max(beyond2, float((fit.corrected.gap[:, :3] ** 2).sum(axis=1).mean()) - places * floor**2)
     # what the rest follows is said only where the rest is no noise
     followed = (locations, depends) if told else ((), ())
     left_over = Unexplained(True, float(np.sqrt(beyond2)), p_value, (*told, *of_aside), *followed)

@@ -52,6 +52,14 @@ def seen_components(campaign: Campaign) -> NDArray[np.int64] | None:
     return None if (found == 3).all() else found
 
 
+def figures_of_a_row(campaign: Campaign) -> tuple[float, float]:
+    """Mean numbers of components that a row sees: of place, and of place and turn."""
+    seen = seen_components(campaign)
+    if seen is None:
+        return 3.0, float(components(campaign))
+    return float(seen[:, 0].mean()), float(seen.sum(axis=1).mean())
+
+
 @dataclass(frozen=True, eq=False)
 class Size:
     """Size of the volume through which a target is led, the gauge where no row and no fact carries a length.

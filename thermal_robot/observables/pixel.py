@@ -20,7 +20,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.kinematics import exp6, homogeneous, point_jacobian
 from thermal_robot.observables import settings
-from thermal_robot.observables.observable import Artefact, Observable, Seen
+from thermal_robot.observables.observable import Artefact, Observable, Seen, in_mm
 
 BOARD = ("board.x", "board.y", "board.z")
 HAND = "hand"
@@ -42,6 +42,11 @@ class View:
     def width(self) -> int:
         """Six of its pose, and four of the lens where it is refined."""
         return 10 if self.refined else 6
+
+    @property
+    def words(self) -> str:
+        """Where it stands, mm, and along what it looks."""
+        return f"at {in_mm(self.pose[:3, 3])}, looking along {tuple((np.round(self.pose[:3, 2], 2) + 0.0).tolist())}"
 
     def moved(self, step: Array) -> View:
         """Return it after a twist in its own axes and a change of the lens, in shares of the focal length."""

@@ -36,7 +36,9 @@ class Plane:
     @property
     def words(self) -> str:
         """Where it lies: its point next to the origin, mm, and its normal."""
-        return f"through {in_mm(self.offset * self.normal)}, normal to {tuple(np.round(self.normal + 0.0, 2).tolist())}"
+        return (
+            f"through {in_mm(self.offset * self.normal)}, normal to {tuple((np.round(self.normal, 2) + 0.0).tolist())}"
+        )
 
     def moved(self, step: Array) -> Plane:
         """Return the plane after a turn of its normal, two components, and a change of its offset."""

@@ -242,7 +242,7 @@ ROWS, CRASH_ROWS = 60, 40
 CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
 """Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
 than that."""
-MEASURES = ("socket", "plane", "distance")
+MEASURES = ("socket", "plane", "distance", "pixel")
 """What rows may say where no instrument measures positions."""
 FEWEST_ROWS, MOST_ROWS = 6, 1000
 """Rows that a plan may have: with fewer not even the frames are known, more are not planned but measured."""
@@ -367,8 +367,9 @@ def plan(
     seed
         Seed of the random candidates; the same seed gives the same plan.
     measures
-        ``"socket"``, ``"plane"`` or ``"distance"`` where no instrument measures positions: the plan then says where
-        stands, planes or the anchors of a draw wire are best placed, and its joints are postures near them.
+        ``"socket"``, ``"plane"``, ``"distance"`` or ``"pixel"`` where no instrument measures positions: the plan then
+        says where stands, planes, the anchors of a draw wire or cameras are best placed; its joints are postures near
+        the former.
 
     Returns
     -------
@@ -550,7 +551,7 @@ def _opening(plan: Plan) -> str:
     commands = plan.commands
     names = commands.robot.joint_names
     if plan.artefacts:
-        return f"{commands.samples} rows, each of what it is to touch or to reach, in the robot's root frame:"
+        return f"{commands.samples} rows. What is to be set up, in the robot's root frame:"
     shares = [float((commands.covariates[f"approach.{name}"] > 0.0).mean()) for name in names]
     poses = commands.samples // plan.repeats
     each = f", each {plan.repeats} times" if plan.repeats > 1 else ""
@@ -584,6 +585,8 @@ _LED = "lead the robot to what the row names, near the posture of plan.csv, and 
 _TO_DO = {
     "socket": f"set the stands up where the plan says, to a hand's breadth; {_LED}",
     "plane": f"use surfaces about where the plan says; {_LED}",
+    "pixel": "set the cameras up where the plan says, to a hand's breadth; fill in where images show the target, "
+    "and in [camera.NAME] the lenses that they have",
     "distance": "fix the wire's anchors where the plan says, to a hand's breadth; fill in the distances read",
 }
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
@@ -74,10 +75,11 @@ def brought(
 
 TOUCHED = ("socket", "plane")
 """Kinds of which the robot is led to what a row says."""
-STANDS, SOCKETS, PLANES, ANCHORS = 3, 2, 3, 4
+STANDS, SOCKETS, PLANES, ANCHORS, CAMERAS = 3, 2, 3, 4, 2
 """Of a campaign that is simulated: the fewest of which one can be held out; as printed; a corner; the fewest that see
-every direction twice."""
-ABOUT = 1.2  # of the extent of the places: how far from their middle a draw wire stands
+every direction twice; the fewest that see a point's place."""
+ABOUT = 1.2  # of the extent of the places: how far from their middle a draw wire or a camera stands
+LENS = {"fx": 1000.0, "fy": 1000.0, "cx": 640.0, "cy": 512.0, "mount": "room"}  # pixels: an industrial camera
 
 
 def touched(
@@ -137,11 +139,28 @@ def as_kind(kind: str, campaign: Campaign) -> Campaign:
     if kind == "controller":
         labels = {**campaign.labels, KIND: np.full(campaign.samples, kind)}
         return replace(campaign, labels=labels, base_known=True, tool_known=True)
-    if kind != "distance":
+    if kind not in ("distance", "pixel"):
         return campaign
-    points, number = np.asarray(campaign.position), np.arange(campaign.samples) % ANCHORS
+    points, number = np.asarray(campaign.position), np.arange(campaign.samples)
+    if kind == "pixel":
+        return _filmed(campaign, points, number % CAMERAS)
+    number %= ANCHORS
     corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
     anchors = points.mean(axis=0) + ABOUT * np.ptp(points, axis=0).max() * corners / np.sqrt(3.0)
     read = {"distance": np.linalg.norm(points - anchors[number], axis=1)}
     labels = {**campaign.labels, KIND: np.full(campaign.samples, kind), "anchor": number.astype(str)}
     return replace(campaign, position=None, readings=read, labels=labels, base_known=True)
+
+
+def _filmed(campaign: Campaign, points: Array, number: NDArray[np.int64]) -> Campaign:
+    """Return the rows that cameras in the room, by number, see of points (N, 3), by perspective projection."""
+    away = ABOUT * np.ptp(points, axis=0).max()
+    # each looks along a horizontal axis of the measurement frame, the image's y down
+    axes = np.array(
+        [[[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]]
+    )
+    inside = np.einsum("nji,nj->ni", axes[number], points - points.mean(axis=0)) + np.array([0.0, 0.0, away])
+    u, v = (LENS[f] * inside[:, k] / inside[:, 2] + LENS[c] for k, (f, c) in enumerate((("fx", "cx"), ("fy", "cy"))))
+    labels = {**campaign.labels, KIND: np.full(campaign.samples, "pixel"), "camera": number.astype(str)}
+    facts = {**campaign.facts, "camera": {str(k): LENS for k in range(CAMERAS)}}
+    return replace(campaign, position=None, readings={"u": u, "v": v}, labels=labels, facts=facts, base_known=True)

@@ -256,7 +256,7 @@ def _number(effect: Effect, place: Parameter, value: Any) -> float:
         raise EffectError(str(error)) from None
 
 
-_MEASURES = ("position", "pose", "socket", "plane", "distance", "controller")
+_MEASURES = ("position", "pose", "socket", "plane", "distance", "pixel", "controller")
 _TURNED = ("pose", "controller")
 _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 """Quaternion wxyz of no turn: it tells effects that orientations will be measured."""
@@ -421,6 +421,7 @@ def simulate(
     measures
         ``"position"``, or ``"pose"`` for orientations, too; by default what the campaign in ``commands`` has, or
         positions. ``"distance"`` to four points about the robot, whose places and common zero nobody knows;
+        ``"pixel"``, its image in two cameras in the room by turns, at unknown places;
         ``"controller"``, the pose that the controller has of it. ``"socket"``, two on each of three stands, and
         ``"plane"``, three at right angles that are touched: the postures are led there from those drawn, by the robot
         that is simulated.
