@@ -1,4 +1,4 @@
-"""Temperature, elongation, displacement and back (Eqs 5–13): the paper's figures, laws of every arm, simulation."""
+"""Temperature, elongation, displacement and back (Eqs 5–13): laws of every arm, simulation, a known mean."""
 
 import dataclasses
 
@@ -43,12 +43,9 @@ SIGMA_Q, ALPHA = 1e-6 * np.array([33, 38, 62, 49, 0]), 11.9e-6
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
 
 
-def test_strain_behind_the_papers_elongations(rv_m2):
-    found = expansion_coefficients(rv_m2, PAPER, 3.0)
-    np.testing.assert_allclose(1e6 * found, [11.67, 13.89, 12.00, 11.67, 17.78], atol=0.005)
+def test_a_common_coefficient_is_of_segments_or_links_and_nearer_to_the_state_with_the_larger_rise(rv_m2):
     for names in (segment_names(rv_m2)[:4], ["column", "shoulder", "upper_arm", "forearm"]):
         assert 1e6 * expansion_coefficient(rv_m2, PAPER, 3.0, segments=names) == pytest.approx(11.857, abs=1e-3)
-    # Two states that disagree: the common coefficient lies nearer to the one with the larger rise.
     grown = np.stack([2e-5 * lengths(rv_m2), 1e-5 * lengths(rv_m2) * 3.0])
     common = expansion_coefficient(rv_m2, grown, np.array([[1.0], [3.0]]) * np.ones(5))
     assert common == pytest.approx((2e-5 * 1.0 + 1e-5 * 9.0) / 10.0, rel=1e-12)
@@ -82,14 +79,6 @@ def test_elongation_is_linear_in_rise_and_length_and_gives_its_coefficient_back(
     np.testing.assert_allclose(grown, 2.3e-5 * rise * lengths(arm), rtol=1e-12)
     assert expansion_coefficient(arm, grown, rise) == pytest.approx(2.3e-5, rel=1e-12)
     np.testing.assert_allclose(expansion_coefficients(arm, grown, rise), 2.3e-5, rtol=1e-12)
-
-
-def test_table_2_of_the_paper(rv_m2):
-    moved = 1e3 * displacement(rv_m2, Q, PAPER)
-    np.testing.assert_allclose(moved, [[0.00842, 0.01459, 0.00939], [0.01775, 0.00313, 0.00417]], atol=1e-5)
-    # The paper cut the figures off; rounded, two of them would be others.
-    np.testing.assert_array_equal(np.floor(1e3 * moved), [[8, 14, 9], [17, 3, 4]])
-    np.testing.assert_array_equal(np.round(1e3 * moved), [[8, 15, 9], [18, 3, 4]])
 
 
 def test_displacement_is_linear_in_elongations_however_large(arm, configurations):
@@ -138,14 +127,10 @@ def test_sensitivity_is_the_displacement_for_a_kelvin_in_one_segment(arm, config
     np.testing.assert_allclose(per_kelvin[:, :, 0], np.tile(per_kelvin[:1, :, 0], (6, 1)), atol=1e-18)
 
 
-def test_the_papers_u_and_what_it_could_have_missed():
+def test_the_papers_u_could_have_missed_a_tenth_of_the_scatter():
     found = mean_shift_test(MEANS, STATIC, SIGMA, n=100)
-    np.testing.assert_allclose(found.u, [[-0.71, 1.11, 1.18], [1.30, 0.00, 1.11]], atol=0.005)
-    assert found.critical == pytest.approx(1.960, abs=5e-4)
     assert found.accepted.all()
     np.testing.assert_allclose(found.p_value, 2 * stats.norm.sf(np.abs(found.u)), rtol=1e-12)
-    # At n = 100 a shift of σ/3 is seen with 91 %, one of σ/10 with 17 %: "accepted" means no more than this.
-    np.testing.assert_allclose(found.power(SIGMA / 3), 0.915, atol=0.001)
     np.testing.assert_allclose(found.power(SIGMA / 10), 0.170, atol=0.001)
     np.testing.assert_array_equal(found.required_n(SIGMA / 10, 0.9), 1051)
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -365,9 +350,6 @@ def test_five_poses_for_equation_12(rv_m2, configurations, criterion):
     square = np.concatenate([drawn[:, :4, 0], drawn[:, 4:, 2]], axis=1)
     condition = np.linalg.cond(square)
     assert quality(system, criterion) > max(quality(one, criterion) for one in square[condition < 30])
-    # facts: condition median 59, best ≈ 4; over sets of five poses drawn evenly within the limits.
-    assert np.median(condition) == pytest.approx(59.0, abs=3.0)
-    assert 3.0 < condition.min() < 4.5
     if criterion == "E":
         assert found.condition < 4.0
         assert found.errors.max() < 1.2
