@@ -96,7 +96,6 @@ def test_wear_is_told_as_text_json_and_page(run, worn, tmp_path):
         (("--limit", "backlash"), "EFFECT=VALUE"),
         (("--dates", "2026-01-01"), "1 dates for 3 campaigns"),
         (("--limit", "backlsh=1"), "did you mean 'backlash'"),
-        (("--false-alarm", "2"), "no rate of false alarms"),
     ],
 )
 def test_what_wear_cannot_follow_is_one_line(run, worn, more, said):

@@ -242,16 +242,18 @@ def growing(rate=0.02, start=0.3, seed=5):
     return series_of(design, measured(design, states, rng), days)
 
 
-def test_a_jump_is_told_with_its_day_and_size():
-    worn = followed(jumping(size=1.0))["j1"]
+@pytest.mark.parametrize("after", [0, 4, 6])
+def test_a_jump_is_told_with_its_day_and_size(after):
+    worn = followed(jumping(after=after))["j1"]
     assert worn.alarm
-    assert (worn.kind, worn.jump.after, worn.jump.earliest, worn.jump.latest) == ("jump", 4, 4, 5)
+    assert worn.moved > 0.99
+    assert (worn.kind, worn.jump.after, worn.jump.earliest, worn.jump.latest) == ("jump", after, after, after + 1)
     assert abs(worn.jump.size - SIZE) < 4.0 * worn.jump.std
     assert sum(worn.jump.probabilities) == pytest.approx(1.0)
     assert worn.rate is None
     assert sum(worn.kinds.values()) == pytest.approx(1.0)
-    assert len(set(worn.fitted[:5])) == len(set(worn.fitted[5:])) == 1
-    assert worn.fitted[5] - worn.fitted[4] == pytest.approx(worn.jump.size)
+    assert len(set(worn.fitted[: after + 1])) == len(set(worn.fitted[after + 1 :])) == 1
+    assert worn.fitted[after + 1] - worn.fitted[after] == pytest.approx(worn.jump.size)
 
 
 def test_a_trend_is_told_with_its_rate_and_the_day_of_its_limit_where_there_are_dates():
@@ -427,13 +429,6 @@ def test_scatter_of_campaigns_alike_is_their_degrees_of_freedom():
         ratio.append(distance / degrees)
     # four deviations of a mean of 50 chi-squares with twelve degrees of freedom
     assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 12 / 50))
-
-
-@pytest.mark.parametrize("after", [0, 3, 6])
-def test_a_jump_is_found_on_its_day(after):
-    found = explanations(jumping(after=after))
-    assert next(iter(found)) == (Move(1, "jump", after),)
-    assert sum(moves_of(found, 1).values()) > 0.99
 
 
 def test_a_trend_and_a_jump_of_two_parameters_are_found_together_and_what_wanders_is_neither():

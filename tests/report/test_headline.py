@@ -316,7 +316,7 @@ def test_what_the_headline_has_no_room_for_is_said_below_it(diagnosis, said):
 
 
 PAIR = ("joint_offset", "drift")
-BY_WARMTH = Wanted("column", "temperature", whether="warmth", place="base", follows="time")
+WARM = Wanted("column", "temperature", whether="warmth", place="base", follows="time")
 BY_PLAY = Wanted("column", "approach.elbow_joint", whether="lost motion", place="elbow_joint", follows="elbow_joint")
 POSE = {"shoulder_pan_joint": -1.25, "elbow_joint": 0.5}
 
@@ -330,7 +330,7 @@ POSE = {"shoulder_pan_joint": -1.25, "elbow_joint": 0.5}
         (Wanted("repeats", "pose", apart=PAIR), "Repeat some poses, and label them in a column pose: this"),
         (Wanted("column", "payload", apart=PAIR), "Repeat some poses with another load, and record payload: this"),
         (
-            BY_WARMTH,
+            WARM,
             "Record temperature: a remainder enters at base and follows time, and this would show whether warmth",
         ),
         (BY_PLAY, "Record approach.elbow_joint: a remainder enters at elbow_joint and follows its position, and"),
