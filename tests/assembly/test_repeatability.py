@@ -162,15 +162,10 @@ def test_sigmas_may_be_given_by_name_or_once(rv_m2):
         (lambda r: joint_sigmas(r, Q, np.full((2, 3, 3), np.nan)), EstimationError, "finite"),
         (lambda r: joint_sigmas(r, Q, THEORETICAL, sample_size=1), EstimationError, "at least 2"),
         (lambda r: joint_sigmas(r, Q, THEORETICAL, rounding=-1.0), EstimationError, "rounding ≥ 0"),
+        (lambda r: joint_sigmas(r, Q, THEORETICAL, point=[np.nan] * 3), EstimationError, "finite numbers"),
+        (lambda r: joint_sigmas(r, Q, THEORETICAL, point=[0.0, np.inf, 0.0]), EstimationError, "finite numbers"),
     ],
 )
 def test_what_makes_no_sense_is_said(rv_m2, call, error, words):
     with pytest.raises(error, match=words):
         call(rv_m2)
-
-
-@pytest.mark.parametrize("point", [[np.nan] * 3, [0.0, np.inf, 0.0]])
-def test_a_point_that_is_none_is_refused(rv_m2, point):
-    q = np.linspace(-0.5, 0.5, 4)[:, None] * np.ones(rv_m2.n)
-    with pytest.raises(EstimationError, match="finite numbers"):
-        joint_sigmas(rv_m2, q, np.full((4, 3), 1e-5), point=point)

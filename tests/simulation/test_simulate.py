@@ -434,7 +434,5 @@ def test_conditions_have_a_value_for_each_row():
     assert np.all(np.diff(found["time"]) > 0.0)
     assert 0.9 * 6.0 < np.ptp(found["temperature"]) <= 6.0
     assert "payload" not in conditions(50, 6.0)
-
-
-def test_forty_rows_without_warming_take_ten_minutes():
+    # forty rows without warming take ten minutes
     assert 9.0 * 60.0 < conditions(40, 0.0)["time"][-1] < 10.0 * 60.0

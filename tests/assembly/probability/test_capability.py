@@ -21,9 +21,7 @@ def test_two_sided_capability_is_that_of_one_normal_coordinate():
             fails = float(mp.erfc(3 * mp.mpf(value) / mp.sqrt(2)))
         assert failing_from_capability(value) == pytest.approx(fails, rel=1e-11)
         assert capability(failing=fails) == pytest.approx(value, rel=1e-12)
-
-
-def test_capability_by_the_failing_share_goes_on_where_the_probability_is_one():
+    # by the failing share it goes on where the probability is one
     assert capability(1.0) == np.inf
     assert capability(failing=1e-200) == pytest.approx(10.07, abs=0.01)
     assert capability(0.9973002039367398) == pytest.approx(1.0, rel=1e-12)
