@@ -8,7 +8,6 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -113,26 +112,6 @@ def test_an_effect_that_is_taken_from_the_library_is_described_less_well(tmp_pat
     assert "thermal_elongation" not in {e["name"] for e in records[1]["said"]["effects"]}
     # a law in its place
     assert records[0]["fresh"]["rms_after"] < 0.7 * records[1]["fresh"]["rms_after"]
-
-
-@pytest.mark.slow
-def test_a_campaign_of_the_trials_own_world_is_made_twice_to_the_same_byte(tmp_path):
-    pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
-    from thermal_robot.blind import reality
-    from thermal_robot.blind.plan import robots
-
-    asked = case("c1", "thermal_elongation", "joint_compliance", seed=2**61 + 1)
-    asked = replace(asked, robot=robots([("rv_m2", "builtin:rv_m2", "tool0")])[0])
-    for place in ("once", "twice"):
-        (tmp_path / place).mkdir()
-    once = reality.make(asked, tmp_path / "once")
-    # in another process, where sets of words have another order
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        assert pool.submit(reality.make, asked, tmp_path / "twice").result() == once
-    assert json.loads(canonical(once)) == once
-    made = sorted((tmp_path / "once").iterdir())
-    assert [file.name for file in made] == ["campaign.toml", "fresh.csv", "measurements.csv", "robot.urdf"]
-    assert all(file.read_bytes() == (tmp_path / "twice" / file.name).read_bytes() for file in made)
 
 
 # ---- with an examinee that does what it is told
