@@ -132,9 +132,13 @@ def told(*todo):
     return tuple(case(f"c{k}", "drift", own=do) for k, do in enumerate(todo))
 
 
-def test_the_distance_is_that_of_a_hand_calculation(fake):
+def test_the_distance_is_that_of_a_hand_calculation_and_no_more_examinees_start_than_workers(fake):
     cases = (*told("", ""), Real("r1"), Real("r2", "r1"))
     records = run_trial(cases, fake, light, workers=2)
+    processes = {line.split()[1] for line in (fake / "asked.txt").read_text().splitlines()}
+    assert sorted(asked(fake)) == ["c0", "c1", "r1", "r2"]
+    assert 1 <= len(processes) <= 2
+    assert not [pid for pid in processes if alive(int(pid))]
     # distances 10 and 0 before, 3 and 4 after
     fresh = {"rms_before": pytest.approx(50**0.5), "rms_after": pytest.approx(12.5**0.5), "shares": {}}
     assert records[0]["fresh"] == fresh
@@ -264,14 +268,6 @@ def test_an_examinee_that_does_not_start_is_no_error_of_a_case(fake, monkeypatch
 
 
 # ---- examinees
-
-
-def test_no_more_examinees_are_started_than_there_are_workers(fake):
-    run_trial(told("", "", "", ""), fake, light, workers=2, timeout=30.0)
-    processes = {line.split()[1] for line in (fake / "asked.txt").read_text().splitlines()}
-    assert sorted(asked(fake)) == ["c0", "c1", "c2", "c3"]
-    assert 1 <= len(processes) <= 2
-    assert not [pid for pid in processes if alive(int(pid))]
 
 
 def test_who_stops_asking_has_nobody_else_started(fake, monkeypatch):

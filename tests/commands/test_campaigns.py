@@ -114,8 +114,6 @@ def test_only_and_without_choose_among_the_effects(run, folder, tmp_path):
     found = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
     jsonschema.validate(found, schema())
     assert found["verdict"]["unexplained"] is True
-    assert found["unexplained"]["rms"] > 0.0
-    assert found["unexplained"]["locations"]
     named = {e["name"] for e in found["effects"] if not e["name"].startswith("discovered.")}
     assert named == {*library(), *RANDOM} - {*less}
 

@@ -46,7 +46,6 @@ def test_json_holds_the_plan_and_less_noise_is_expected_to_tell_more(run, tmp_pa
         (("builtin:rv_m2",), "tool0"),
         (("nowhere.urdf", "--tool", "tool0"), "nowhere.urdf"),
         (("builtin:rv_m2", "--tool", "tool0", "--rows", "3"), "rows"),
-        (("builtin:rv_m2", "--tool", "tool0", "--repeats", "7"), "repeats"),
         (("builtin:rv_m2", "--tool", "tool0", "--effects", "backlsh"), "backlash"),
     ],
 )
