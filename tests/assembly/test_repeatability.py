@@ -39,13 +39,6 @@ def test_covariance_is_that_of_simulated_repetitions(arm, configurations):
         np.testing.assert_allclose(tool_covariance(arm, row, sigma, point=point)[0], covariance[:3, :3], rtol=1e-15)
 
 
-@on_arms
-def test_diagonal_is_equations_2_to_4(arm, configurations):
-    q, sigma = configurations(arm, 20), np.random.default_rng(1).uniform(1e-5, 9e-5, arm.n)
-    expected = np.sqrt(np.sum(kin.frame_jacobians(arm, q)[:, :3] ** 2 * sigma**2, axis=2))
-    np.testing.assert_allclose(spread(tool_covariance(arm, q, sigma)), expected, rtol=1e-13)
-
-
 def test_sigmas_behind_table_1(rv_m2):
     found = joint_sigmas(rv_m2, Q, THEORETICAL, rounding=0.5e-6)
     assert found.compatible
