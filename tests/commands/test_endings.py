@@ -47,7 +47,8 @@ def test_an_ending_whose_library_is_missing_is_refused_with_its_extra(run, monke
         monkeypatch.setitem(sys.modules, module, None)
     asked = ("predict", NOWHERE, NOWHERE, "-o")
     refused(run(*asked, "p.xlsx"), "openpyxl, which is not installed", 'pip install "thermal-robot[excel]"')
-    refused(run("demo", "--report", "d.pdf"), "weasyprint, which is not installed", '"thermal-robot[pdf]"')
+    monkeypatch.setattr("thermal_robot.commands.campaigns.diagnosed", lambda _: pytest.fail("it is computed"))
+    refused(run("demo", "--report", "d.PDF"), "weasyprint, which is not installed", '"thermal-robot[pdf]"')
     refused(run(*asked, "p.csv"), NOWHERE)
 
 

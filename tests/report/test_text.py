@@ -250,6 +250,7 @@ def test_facts_are_verdict_campaign_rows_and_effects_left_out():
     many = text(case("found", outliers=tuple(range(2, 18))))
     assert "104 of 120 rows, 16 set aside" in many
     assert "set aside  as outliers: rows 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 6 more" in many
+    assert "about      robot serial 2018" in text(case("found", about={"robot_serial": "2018"}))
     out = case("found", left_out=("drift", "geometric"))
     assert facts(out)["Left out"] == "by request (--without drift geometric): drift, geometric"
     few = replace(out, effects=out.effects[:1])
