@@ -1,4 +1,4 @@
-"""Joint scatter and tool scatter: Table 1 of the paper, round trips, and what cannot be known."""
+"""Joint scatter and tool scatter: round trips, and what cannot be known; figures of the paper are in its ledger."""
 
 import dataclasses
 
@@ -39,32 +39,10 @@ def test_covariance_is_that_of_simulated_repetitions(arm, configurations):
         np.testing.assert_allclose(tool_covariance(arm, row, sigma, point=point)[0], covariance[:3, :3], rtol=1e-15)
 
 
-@on_arms
-def test_diagonal_is_equations_2_to_4(arm, configurations):
-    q, sigma = configurations(arm, 20), np.random.default_rng(1).uniform(1e-5, 9e-5, arm.n)
-    expected = np.sqrt(np.sum(kin.frame_jacobians(arm, q)[:, :3] ** 2 * sigma**2, axis=2))
-    np.testing.assert_allclose(spread(tool_covariance(arm, q, sigma)), expected, rtol=1e-13)
-
-
-def test_table_1_of_the_paper(rv_m2):
-    covariance = tool_covariance(rv_m2, Q, SIGMA_Q)
-    # Joint values of facts to whole microradians; the paper's figures to the micrometre that it prints.
-    np.testing.assert_allclose(
-        1e6 * spread(covariance), [[15.591, 16.749, 16.624], [21.248, 16.213, 16.182]], atol=1e-3
-    )
-    np.testing.assert_array_equal(np.round(1e6 * spread(covariance)), 1e6 * THEORETICAL)
-    # The correlation of x and y that the paper's diagonal covariances drop.
-    correlation = covariance[:, 0, 1] / np.prod(spread(covariance)[:, :2], axis=1)
-    np.testing.assert_allclose(correlation, [0.12, 0.10], atol=0.005)
-
-
 def test_sigmas_behind_table_1(rv_m2):
     found = joint_sigmas(rv_m2, Q, THEORETICAL, rounding=0.5e-6)
     assert found.compatible
     assert found.status == ("determined", "determined", "determined", "only bounded", "not limited")
-    np.testing.assert_allclose(1e6 * found.sigma[:4], SIGMA_Q[:4] * 1e6, atol=0.5)
-    np.testing.assert_allclose(1e6 * found.lower[:4], [32.05, 34.30, 54.74, 0.0], atol=0.01)
-    np.testing.assert_allclose(1e6 * found.upper[:4], [33.67, 40.44, 68.57, 76.92], atol=0.01)
     assert np.isnan(found.sigma[4])
     assert found.upper[4] == np.inf
     np.testing.assert_allclose(1e6 * found.fitted, [[15.644, 16.798, 16.648], [21.298, 16.271, 16.206]], atol=1e-3)
@@ -100,7 +78,6 @@ def test_no_sigma_gives_the_experimental_column(rv_m2):
     assert not found.compatible
     assert set(found.status[:4]) == {"incompatible"}
     assert np.all(np.isnan(found.lower))
-    assert 1e6 * found.misfit == pytest.approx(1.247, abs=1e-3)  # facts: at most 1.3 µm
     assert "no non-negative value is compatible" in str(found)
     # But the sampling error of a standard deviation at n = 100 covers it.
     sampled = joint_sigmas(rv_m2, Q, EXPERIMENTAL, rounding=0.5e-6, sample_size=100)
@@ -178,15 +155,10 @@ def test_sigmas_may_be_given_by_name_or_once(rv_m2):
         (lambda r: joint_sigmas(r, Q, np.full((2, 3, 3), np.nan)), EstimationError, "finite"),
         (lambda r: joint_sigmas(r, Q, THEORETICAL, sample_size=1), EstimationError, "at least 2"),
         (lambda r: joint_sigmas(r, Q, THEORETICAL, rounding=-1.0), EstimationError, "rounding ≥ 0"),
+        (lambda r: joint_sigmas(r, Q, THEORETICAL, point=[np.nan] * 3), EstimationError, "finite numbers"),
+        (lambda r: joint_sigmas(r, Q, THEORETICAL, point=[0.0, np.inf, 0.0]), EstimationError, "finite numbers"),
     ],
 )
 def test_what_makes_no_sense_is_said(rv_m2, call, error, words):
     with pytest.raises(error, match=words):
         call(rv_m2)
-
-
-@pytest.mark.parametrize("point", [[np.nan] * 3, [0.0, np.inf, 0.0]])
-def test_a_point_that_is_none_is_refused(rv_m2, point):
-    q = np.linspace(-0.5, 0.5, 4)[:, None] * np.ones(rv_m2.n)
-    with pytest.raises(EstimationError, match="finite numbers"):
-        joint_sigmas(rv_m2, q, np.full((4, 3), 1e-5), point=point)

@@ -1,4 +1,4 @@
-"""Temperature, elongation, displacement and back (Eqs 5–13): the paper's figures, laws of every arm, simulation."""
+"""Temperature, elongation, displacement and back (Eqs 5–13): laws of every arm, simulation, a known mean."""
 
 import dataclasses
 
@@ -43,12 +43,9 @@ SIGMA_Q, ALPHA = 1e-6 * np.array([33, 38, 62, 49, 0]), 11.9e-6
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
 
 
-def test_strain_behind_the_papers_elongations(rv_m2):
-    found = expansion_coefficients(rv_m2, PAPER, 3.0)
-    np.testing.assert_allclose(1e6 * found, [11.67, 13.89, 12.00, 11.67, 17.78], atol=0.005)
+def test_a_common_coefficient_is_of_segments_or_links_and_nearer_to_the_state_with_the_larger_rise(rv_m2):
     for names in (segment_names(rv_m2)[:4], ["column", "shoulder", "upper_arm", "forearm"]):
         assert 1e6 * expansion_coefficient(rv_m2, PAPER, 3.0, segments=names) == pytest.approx(11.857, abs=1e-3)
-    # Two states that disagree: the common coefficient lies nearer to the one with the larger rise.
     grown = np.stack([2e-5 * lengths(rv_m2), 1e-5 * lengths(rv_m2) * 3.0])
     common = expansion_coefficient(rv_m2, grown, np.array([[1.0], [3.0]]) * np.ones(5))
     assert common == pytest.approx((2e-5 * 1.0 + 1e-5 * 9.0) / 10.0, rel=1e-12)
@@ -82,14 +79,6 @@ def test_elongation_is_linear_in_rise_and_length_and_gives_its_coefficient_back(
     np.testing.assert_allclose(grown, 2.3e-5 * rise * lengths(arm), rtol=1e-12)
     assert expansion_coefficient(arm, grown, rise) == pytest.approx(2.3e-5, rel=1e-12)
     np.testing.assert_allclose(expansion_coefficients(arm, grown, rise), 2.3e-5, rtol=1e-12)
-
-
-def test_table_2_of_the_paper(rv_m2):
-    moved = 1e3 * displacement(rv_m2, Q, PAPER)
-    np.testing.assert_allclose(moved, [[0.00842, 0.01459, 0.00939], [0.01775, 0.00313, 0.00417]], atol=1e-5)
-    # The paper cut the figures off; rounded, two of them would be others.
-    np.testing.assert_array_equal(np.floor(1e3 * moved), [[8, 14, 9], [17, 3, 4]])
-    np.testing.assert_array_equal(np.round(1e3 * moved), [[8, 15, 9], [18, 3, 4]])
 
 
 def test_displacement_is_linear_in_elongations_however_large(arm, configurations):
@@ -138,14 +127,10 @@ def test_sensitivity_is_the_displacement_for_a_kelvin_in_one_segment(arm, config
     np.testing.assert_allclose(per_kelvin[:, :, 0], np.tile(per_kelvin[:1, :, 0], (6, 1)), atol=1e-18)
 
 
-def test_the_papers_u_and_what_it_could_have_missed():
+def test_the_papers_u_could_have_missed_a_tenth_of_the_scatter():
     found = mean_shift_test(MEANS, STATIC, SIGMA, n=100)
-    np.testing.assert_allclose(found.u, [[-0.71, 1.11, 1.18], [1.30, 0.00, 1.11]], atol=0.005)
-    assert found.critical == pytest.approx(1.960, abs=5e-4)
     assert found.accepted.all()
     np.testing.assert_allclose(found.p_value, 2 * stats.norm.sf(np.abs(found.u)), rtol=1e-12)
-    # At n = 100 a shift of σ/3 is seen with 91 %, one of σ/10 with 17 %: "accepted" means no more than this.
-    np.testing.assert_allclose(found.power(SIGMA / 3), 0.915, atol=0.001)
     np.testing.assert_allclose(found.power(SIGMA / 10), 0.170, atol=0.001)
     np.testing.assert_array_equal(found.required_n(SIGMA / 10, 0.9), 1051)
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -215,36 +200,12 @@ def test_a_link_may_have_surroundings_of_its_own(arm, configurations):
     found = warm_up(arm, times, motor, time_constants=1800.0, initial=20.0)
     np.testing.assert_allclose(found.temperatures[-1], [35.0 if name == names[1] else 20.0 for name in names])
     q = configurations(arm, 1)[0]
+    # while it warms up the tool is where links of those temperatures bring it: nowhere else at first, and in the end
+    grown = elongation(arm, dict(zip(names, found.temperatures.T, strict=True)), coefficients=ALPHA)
+    over_time = found.displacements(q, coefficients=ALPHA)
+    np.testing.assert_allclose(over_time, displacement(arm, q, grown), rtol=0.0, atol=1e-15)
     final = displacement(arm, q, elongation(arm, motor | {names[1]: 35.0}, coefficients=ALPHA))
-    np.testing.assert_allclose(found.displacements(q, coefficients=ALPHA)[-1], final[0], rtol=0.0, atol=1e-15)
-    np.testing.assert_array_equal(found.displacements(q, coefficients=ALPHA)[0], 0.0)
-
-
-def repetitions(robot, start, rng):
-    """Measured displacements (100, 3), a minute apart, of a robot in a hall that went from 20 to 23 °C at zero."""
-    times = np.concatenate([[0.0], start + 60.0 * np.arange(100)])
-    moved = warm_up(robot, times, 23.0, time_constants=TAU, initial=20.0).displacements(Q[0], coefficients=ALPHA)[1:]
-    return moved + rng.multivariate_normal(np.zeros(3), tool_covariance(robot, Q[0], SIGMA_Q)[0], 100)
-
-
-def test_the_mean_agrees_after_stabilisation_and_not_during_warm_up(rv_m2):
-    # Section 3 of the paper: U outside the critical set once all arms have one temperature, inside it before.
-    rng = np.random.default_rng(2018)
-    static = displacement(rv_m2, Q[0], elongation(rv_m2, 23.0, coefficients=ALPHA))[0]
-    sigma = np.sqrt(np.diag(tool_covariance(rv_m2, Q[0], SIGMA_Q)[0]))
-    during, after = (
-        [mean_shift_test(repetitions(rv_m2, start, rng), static, sigma) for _ in range(150)]
-        for start in (0.0, 12 * max(TAU.values()))
-    )
-    rejected = [np.mean([~test.accepted for test in runs], axis=0) for runs in (during, after)]
-    # After: every axis is rejected as often as α says (5 %, standard error 1.8 %).
-    np.testing.assert_allclose(rejected[1], 0.05, atol=0.06)
-    # During: the mean of 100 minutes falls short by 0.2, 0.3 and 0.6 σ in x, y and z, and no experiment misses that.
-    assert np.mean([not test.accepted.all() for test in during]) > 0.99
-    # As often as the power of the test says for the mean that is still missing.
-    still = warm_up(rv_m2, 60.0 * np.arange(100), 23.0, time_constants=TAU, initial=20.0)
-    missing = still.displacements(Q[0], coefficients=ALPHA).mean(axis=0) - static
-    np.testing.assert_allclose(rejected[0], during[0].power(missing), atol=0.13)
+    np.testing.assert_allclose(over_time[[0, -1]], [np.zeros(3), final[0]], rtol=0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -365,9 +326,6 @@ def test_five_poses_for_equation_12(rv_m2, configurations, criterion):
     square = np.concatenate([drawn[:, :4, 0], drawn[:, 4:, 2]], axis=1)
     condition = np.linalg.cond(square)
     assert quality(system, criterion) > max(quality(one, criterion) for one in square[condition < 30])
-    # facts: condition median 59, best ≈ 4; over sets of five poses drawn evenly within the limits.
-    assert np.median(condition) == pytest.approx(59.0, abs=3.0)
-    assert 3.0 < condition.min() < 4.5
     if criterion == "E":
         assert found.condition < 4.0
         assert found.errors.max() < 1.2

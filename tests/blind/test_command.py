@@ -179,14 +179,11 @@ def test_a_stop_says_how_to_go_on(asked, capsys):
     assert capsys.readouterr().err.splitlines()[-1].endswith("with --seed 5 --directory blind-5 continues")
 
 
-def test_without_mujoco_one_line_says_what_to_install(run, monkeypatch):
+def test_without_mujoco_or_pyarrow_for_fleets_one_line_says_what_to_install(run, asked, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     status, out, err = run()
     assert (status, out) == (2, "")
     assert err == 'thermal-robot: the blind trial needs MuJoCo: pip install "thermal-robot[blind]"\n'
-
-
-def test_fleets_without_pyarrow_are_refused_before_anything_is_made(run, asked, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "pyarrow" else name)
     assert run("--seed", 1)[0] == 0
     asked.pop("cases")

@@ -236,12 +236,6 @@ def model():
     return found, campaign, samples, position, refitted(found, campaign, samples)
 
 
-def test_all_effects_together_predict_what_the_model_does(model):
-    found, _, samples, _, predicted = model
-    names = "+".join(effect.name for effect, _ in found.model.effects)
-    assert rms(predicted[names], found.model.prediction(samples)[0]) < 0.3 * NOISE
-
-
 def test_without_effects_the_frames_are_those_of_least_squares(model):
     """No rigid alignment leaves less of the rows that were given, the robust one of the program neither."""
     found, campaign, _, _, _ = model
@@ -251,21 +245,18 @@ def test_without_effects_the_frames_are_those_of_least_squares(model):
     assert rms(alone, campaign.position) > 0.8 * rms(robust, campaign.position)
 
 
-def test_every_subset_is_there_and_more_effects_err_less(model):
-    _, _, _, position, predicted = model
+def test_every_subset_is_there_more_effects_err_less_and_all_predict_what_the_model_does(model):
+    found, campaign, samples, position, predicted = model
+    names = "+".join(effect.name for effect, _ in found.model.effects)
+    assert rms(predicted[names], found.model.prediction(samples)[0]) < 0.3 * NOISE
+    assert refitted(replace(found, model=replace(found.model, effects=())), campaign, samples) == {}
     assert sorted(map(len, (name.split("+") for name in predicted if name))) == [1, 1, 2]
     left = {name: rms(rows, position) for name, rows in predicted.items()}
     both = max(left, key=len)
     assert all(left[""] > left[name] > left[both] for name in left if name not in ("", both))
-    found = shares(predicted, position, NOISE)
+    parts = shares(predicted, position, NOISE)
     whole = (left[""] ** 2 - left[both] ** 2) / (left[""] ** 2 + 3 * NOISE**2)
-    assert sum(found.values()) == pytest.approx(whole)
-
-
-def test_a_model_without_effects_has_no_parts(model):
-    found, campaign, samples, _, _ = model
-    bare = replace(found, model=replace(found.model, effects=()))
-    assert refitted(bare, campaign, samples) == {}
+    assert sum(parts.values()) == pytest.approx(whole)
 
 
 @pytest.mark.slow

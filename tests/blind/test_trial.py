@@ -8,7 +8,6 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -115,26 +114,6 @@ def test_an_effect_that_is_taken_from_the_library_is_described_less_well(tmp_pat
     assert records[0]["fresh"]["rms_after"] < 0.7 * records[1]["fresh"]["rms_after"]
 
 
-@pytest.mark.slow
-def test_a_campaign_of_the_trials_own_world_is_made_twice_to_the_same_byte(tmp_path):
-    pytest.importorskip("mujoco", reason="the world of the trial needs MuJoCo")
-    from thermal_robot.blind import reality
-    from thermal_robot.blind.plan import robots
-
-    asked = case("c1", "thermal_elongation", "joint_compliance", seed=2**61 + 1)
-    asked = replace(asked, robot=robots([("rv_m2", "builtin:rv_m2", "tool0")])[0])
-    for place in ("once", "twice"):
-        (tmp_path / place).mkdir()
-    once = reality.make(asked, tmp_path / "once")
-    # in another process, where sets of words have another order
-    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        assert pool.submit(reality.make, asked, tmp_path / "twice").result() == once
-    assert json.loads(canonical(once)) == once
-    made = sorted((tmp_path / "once").iterdir())
-    assert [file.name for file in made] == ["campaign.toml", "fresh.csv", "measurements.csv", "robot.urdf"]
-    assert all(file.read_bytes() == (tmp_path / "twice" / file.name).read_bytes() for file in made)
-
-
 # ---- with an examinee that does what it is told
 
 
@@ -153,9 +132,13 @@ def told(*todo):
     return tuple(case(f"c{k}", "drift", own=do) for k, do in enumerate(todo))
 
 
-def test_the_distance_is_that_of_a_hand_calculation(fake):
+def test_the_distance_is_that_of_a_hand_calculation_and_no_more_examinees_start_than_workers(fake):
     cases = (*told("", ""), Real("r1"), Real("r2", "r1"))
     records = run_trial(cases, fake, light, workers=2)
+    processes = {line.split()[1] for line in (fake / "asked.txt").read_text().splitlines()}
+    assert sorted(asked(fake)) == ["c0", "c1", "r1", "r2"]
+    assert 1 <= len(processes) <= 2
+    assert not [pid for pid in processes if alive(int(pid))]
     # distances 10 and 0 before, 3 and 4 after
     fresh = {"rms_before": pytest.approx(50**0.5), "rms_after": pytest.approx(12.5**0.5), "shares": {}}
     assert records[0]["fresh"] == fresh
@@ -285,14 +268,6 @@ def test_an_examinee_that_does_not_start_is_no_error_of_a_case(fake, monkeypatch
 
 
 # ---- examinees
-
-
-def test_no_more_examinees_are_started_than_there_are_workers(fake):
-    run_trial(told("", "", "", ""), fake, light, workers=2, timeout=30.0)
-    processes = {line.split()[1] for line in (fake / "asked.txt").read_text().splitlines()}
-    assert sorted(asked(fake)) == ["c0", "c1", "c2", "c3"]
-    assert 1 <= len(processes) <= 2
-    assert not [pid for pid in processes if alive(int(pid))]
 
 
 def test_who_stops_asking_has_nobody_else_started(fake, monkeypatch):

@@ -2,6 +2,7 @@
 
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 from commanded import refused
@@ -46,7 +47,8 @@ def test_an_ending_whose_library_is_missing_is_refused_with_its_extra(run, monke
         monkeypatch.setitem(sys.modules, module, None)
     asked = ("predict", NOWHERE, NOWHERE, "-o")
     refused(run(*asked, "p.xlsx"), "openpyxl, which is not installed", 'pip install "thermal-robot[excel]"')
-    refused(run("demo", "--report", "d.pdf"), "weasyprint, which is not installed", '"thermal-robot[pdf]"')
+    monkeypatch.setattr("thermal_robot.commands.campaigns.diagnosed", lambda _: pytest.fail("it is computed"))
+    refused(run("demo", "--report", "d.PDF"), "weasyprint, which is not installed", '"thermal-robot[pdf]"')
     refused(run(*asked, "p.csv"), NOWHERE)
 
 
@@ -55,13 +57,16 @@ def test_a_name_without_ending_is_taken(run, folder, diagnosed, tmp_path):
     assert len(pd.read_csv(tmp_path / "predicted"))
 
 
-@pytest.mark.parametrize(("ending", "module"), [("xlsx", "openpyxl"), ("ods", "odf")])
-def test_workbooks_go_in_and_out(run, folder, diagnosed, tmp_path, ending, module):
+@pytest.mark.parametrize(("ending", "module"), [("xlsx", "openpyxl"), ("ods", "odf"), ("parquet", "pyarrow")])
+def test_workbooks_and_parquet_go_in_and_out(run, folder, diagnosed, tmp_path, ending, module):
     pytest.importorskip(module)
     samples, plain, book = tmp_path / f"s.{ending}", tmp_path / "p.csv", tmp_path / f"p.{ending}"
-    pd.read_csv(folder / "fresh.csv").to_excel(samples, index=False)
+    read, kind = (pd.read_parquet, "parquet") if ending == "parquet" else (pd.read_excel, "excel")
+    getattr(pd.read_csv(folder / "fresh.csv"), f"to_{kind}")(samples, index=False)
     assert run("predict", diagnosed.model, folder / "fresh.csv", "-o", plain)[0] == 0
     assert run("predict", diagnosed.model, samples, "-o", book)[0] == 0
-    pd.testing.assert_frame_equal(pd.read_excel(book), pd.read_csv(plain), check_dtype=False, rtol=1e-12)
+    written, wanted = read(book), pd.read_csv(plain)
+    wanted["outside"] = wanted["outside"].fillna("" if kind == "parquet" else np.nan)
+    pd.testing.assert_frame_equal(written, wanted, check_dtype=False, rtol=1e-12)
     assert run("correct", diagnosed.model, samples, "-o", book)[0] == 0
-    assert "miss.direction" in pd.read_excel(book)
+    assert "miss.direction" in read(book)

@@ -3,13 +3,11 @@
 import argparse
 import inspect
 import json
-from types import SimpleNamespace
 
 import pytest
 from campaign.importers.written import put
 from commanded import refused
 
-import thermal_robot.paper
 from thermal_robot import cli
 from thermal_robot.campaign import read_campaign
 from thermal_robot.campaign.importers.run import FORMATS
@@ -48,7 +46,6 @@ def test_json_holds_the_plan_and_less_noise_is_expected_to_tell_more(run, tmp_pa
         (("builtin:rv_m2",), "tool0"),
         (("nowhere.urdf", "--tool", "tool0"), "nowhere.urdf"),
         (("builtin:rv_m2", "--tool", "tool0", "--rows", "3"), "rows"),
-        (("builtin:rv_m2", "--tool", "tool0", "--repeats", "7"), "repeats"),
         (("builtin:rv_m2", "--tool", "tool0", "--effects", "backlsh"), "backlash"),
     ],
 )
@@ -120,17 +117,3 @@ def test_what_cannot_be_imported_is_one_line(run, tmp_path):
     refused(run("import", "table", folder / "t.csv", *robot, "-o", folder / "c"), "no tool frame is given")
     with pytest.raises(SystemExit):
         run("import", "tabel", folder / "t.csv", *robot, "-o", folder / "c")
-
-
-def test_the_ledger_is_printed_and_written(run, tmp_path, monkeypatch):
-    """One of a single row; the room of the paper asks for all of it."""
-    told = {"entries": [{"quantity": "σ", "unit": "µm"}]}
-    found = SimpleNamespace(text=lambda: "σ", markdown=lambda: "| σ |", to_dict=lambda: told)
-    asked = []
-    monkeypatch.setattr(thermal_robot.paper, "ledger", lambda inputs: asked.append(inputs.l5) or found)
-    assert run("paper", "--json", tmp_path / "ledger.json") == (0, "σ\n", "")
-    assert run("paper", "--markdown", "--l5", "0.2") == (0, "| σ |\n", "")
-    assert run("paper", "--json", "-") == (0, (tmp_path / "ledger.json").read_text(encoding="utf-8"), "")
-    assert json.loads((tmp_path / "ledger.json").read_text(encoding="utf-8")) == told
-    assert asked == [0.15, 0.2, 0.15]
-    refused(run("paper", "--l5", "nan"))

@@ -96,7 +96,6 @@ def test_wear_is_told_as_text_json_and_page(run, worn, tmp_path):
         (("--limit", "backlash"), "EFFECT=VALUE"),
         (("--dates", "2026-01-01"), "1 dates for 3 campaigns"),
         (("--limit", "backlsh=1"), "did you mean 'backlash'"),
-        (("--false-alarm", "2"), "no rate of false alarms"),
     ],
 )
 def test_what_wear_cannot_follow_is_one_line(run, worn, more, said):
@@ -121,12 +120,9 @@ def test_a_fleet_is_diagnosed_printed_and_written(run, rv_m2, tmp_path):
 @pytest.mark.filterwarnings("default")
 def test_a_fleet_that_cannot_be_diagnosed_is_one_line(run, rv_m2, tmp_path, monkeypatch):
     write_fleet(rv_m2, tmp_path / "all", 1)
-    (tmp_path / "empty").mkdir()
     for source, more, said in (
-        ("empty", (), "no campaign.toml lies below this folder"),
         ("nowhere", (), "no such folder or list"),
         ("all", ("--workers", "0"), "at least 1"),
-        ("all", ("--only", "backlsh"), "backlash"),
         ("all", ("--scheduler", "nonsense://x"), "scheduler nonsense://x"),
     ):
         told(run("fleet", tmp_path / source, "--out", tmp_path / "out", *more), said)

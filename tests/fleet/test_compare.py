@@ -184,13 +184,6 @@ def test_a_model_says_what_its_campaign_said(before, after, found, tmp_path):
     assert "before: A model file" in comparison_html(plain)
 
 
-def test_a_robot_that_did_not_change_has_not_by_its_model(before):
-    found = tr.compare(before.model, diagnosed(2, frame="there"))
-    assert found.changes == ()
-    assert found.effect("joint_offset").status == "shared"
-    assert found.predicted[0].agrees
-
-
 def test_of_what_a_model_does_not_hold_no_change_is_told(before):
     """A gain began; the model of before has none, and could not say how well it knows that."""
     later = diagnosed(8, gains=3e-3)

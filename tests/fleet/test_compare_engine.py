@@ -9,6 +9,7 @@ from coupled import joint as hinge
 from coupled import link, urdf
 from helpers import some
 from scipy.linalg import lstsq
+from scipy.stats import chi2 as chi2_law
 
 import thermal_robot as tr
 from thermal_robot.effects import Parameter, library, named
@@ -168,7 +169,7 @@ def test_equal_is_what_is_lost_by_sharing(seed, blind):
     chi2, degrees, p_value = _equal([Sums(x.T @ x, x.T @ y) for x, y in data], own)
     assert chi2 == pytest.approx(together - sum(squares(x, y) for x, y in data), rel=1e-6)
     assert degrees == sum(np.linalg.matrix_rank(x) for x, _ in data) - np.linalg.matrix_rank(whole)
-    assert 0.0 <= p_value <= 1.0
+    assert p_value == pytest.approx(chi2_law.sf(chi2, degrees), rel=1e-9)
 
 
 def test_values_are_least_squares_and_what_is_not_seen_is_no_number():
@@ -186,17 +187,6 @@ def test_values_are_least_squares_and_what_is_not_seen_is_no_number():
     assert p.difference == pytest.approx(p.values[1] - p.values[0])
     assert p.chi2 == pytest.approx((p.difference / p.std) ** 2)
     assert p.std == pytest.approx(np.hypot(*p.stds))
-
-
-def test_equal_follows_the_law_of_chi_square():
-    rng = np.random.default_rng(0)
-    data = rows(7, campaigns=3)
-    truth, drawn = rng.normal(size=5), []
-    for _ in range(300):
-        sums = [Sums(x.T @ x, x.T @ (x @ truth + rng.normal(size=len(x)))) for x, _ in data]
-        drawn.append(_equal(sums, [1, 3])[2])
-    # p values are even between 0 and 1: Kolmogorov's distance of 300 of them is below 0.094 in 99 % of cases
-    assert np.abs(np.sort(drawn) - (np.arange(300) + 0.5) / 300).max() < 0.094
 
 
 def test_a_parameter_that_repeats_another_is_told_once():

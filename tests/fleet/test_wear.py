@@ -242,16 +242,18 @@ def growing(rate=0.02, start=0.3, seed=5):
     return series_of(design, measured(design, states, rng), days)
 
 
-def test_a_jump_is_told_with_its_day_and_size():
-    worn = followed(jumping(size=1.0))["j1"]
+@pytest.mark.parametrize("after", [0, 4, 6])
+def test_a_jump_is_told_with_its_day_and_size(after):
+    worn = followed(jumping(after=after))["j1"]
     assert worn.alarm
-    assert (worn.kind, worn.jump.after, worn.jump.earliest, worn.jump.latest) == ("jump", 4, 4, 5)
+    assert worn.moved > 0.99
+    assert (worn.kind, worn.jump.after, worn.jump.earliest, worn.jump.latest) == ("jump", after, after, after + 1)
     assert abs(worn.jump.size - SIZE) < 4.0 * worn.jump.std
     assert sum(worn.jump.probabilities) == pytest.approx(1.0)
     assert worn.rate is None
     assert sum(worn.kinds.values()) == pytest.approx(1.0)
-    assert len(set(worn.fitted[:5])) == len(set(worn.fitted[5:])) == 1
-    assert worn.fitted[5] - worn.fitted[4] == pytest.approx(worn.jump.size)
+    assert len(set(worn.fitted[: after + 1])) == len(set(worn.fitted[after + 1 :])) == 1
+    assert worn.fitted[after + 1] - worn.fitted[after] == pytest.approx(worn.jump.size)
 
 
 def test_a_trend_is_told_with_its_rate_and_the_day_of_its_limit_where_there_are_dates():
@@ -417,25 +419,6 @@ def test_priors_are_what_is_stated(case):
     assert settings.SCALES[-1] < settings.WIDE
 
 
-def test_scatter_of_campaigns_alike_is_their_degrees_of_freedom():
-    rng, ratio = np.random.default_rng(3), []
-    for _ in range(50):
-        design = 3.0 * rng.normal(size=(5, 30, 3))
-        values = measured(design, np.tile(rng.normal(size=3), (5, 1)), rng)
-        distance, degrees = series_of(design, values, DAYS).scattered
-        assert degrees == 4 * 3
-        ratio.append(distance / degrees)
-    # four deviations of a mean of 50 chi-squares with twelve degrees of freedom
-    assert np.mean(ratio) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 12 / 50))
-
-
-@pytest.mark.parametrize("after", [0, 3, 6])
-def test_a_jump_is_found_on_its_day(after):
-    found = explanations(jumping(after=after))
-    assert next(iter(found)) == (Move(1, "jump", after),)
-    assert sum(moves_of(found, 1).values()) > 0.99
-
-
 def test_a_trend_and_a_jump_of_two_parameters_are_found_together_and_what_wanders_is_neither():
     times, states = np.array([0.0, 1, 2, 4, 5, 7, 8, 10]), np.zeros((8, 5))
     states[:, 3] = times / 10.0
@@ -516,15 +499,6 @@ def test_a_rate_that_may_be_none_may_never_get_there():
     assert fieller(np.array([0.1, 0.0]), np.eye(2), 1.0) is None
 
 
-def test_the_interval_holds_the_day_as_often_as_it_says():
-    true = np.array([0.1, 2e-3])
-    day = (1.0 - true[0]) / true[1]
-    drawn = np.random.default_rng(0).multivariate_normal(true, COVARIANCE, 4000)
-    ends = (fieller(each, COVARIANCE, 1.0) for each in drawn)
-    inside = [low <= day <= (np.inf if high is None else high) for _, low, high in ends]
-    assert np.mean(inside) == pytest.approx(0.95, abs=0.012)
-
-
 def without_change(seed, campaigns=10, parameters=4, noise=1.0):
     design, rng = columns(campaigns, parameters, seed)
     states = np.tile(rng.normal(size=parameters), (campaigns, 1))
@@ -551,4 +525,5 @@ def test_a_clear_jump_is_no_chance_the_others_are_judged_beside_it_and_what_is_n
 def test_scatter_is_what_it_was_made_with_and_never_below_one():
     grown = [scatter(without_change(seed, noise=2.0), ()) for seed in range(40)]
     assert np.mean(grown) == pytest.approx(4.0, rel=0.1)
+    assert without_change(1).scattered[1] == (10 - 1) * 4  # degrees of freedom
     assert scatter(without_change(1, noise=0.1), ()) == 1.0

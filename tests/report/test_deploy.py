@@ -37,10 +37,7 @@ def test_the_page_says_what_correct_says_of_the_file(zeros):
 
 
 @pytest.mark.slow
-def test_what_no_file_holds_is_said_and_has_no_table(demo):
+def test_what_no_file_holds_is_said_and_has_no_table(demo, written):
     assert "files" not in demo.to_dict()
     assert "holds what is constant; nothing here is" in Reader(html(demo)).words
-
-
-def test_nothing_to_correct_is_nothing_to_deploy(written):
     assert ASKED not in headings(written(html, "nothing"))

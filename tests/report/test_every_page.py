@@ -3,21 +3,19 @@
 import re
 import shutil
 import subprocess
-import sys
 import unicodedata
 from collections import Counter
 from html import unescape
 
 import pytest
 from motion.found import found
-from report import every_page
 from report.browser import PROGRAM
 from report.cases import CASES
 from report.every_page import EVERY, FEW, page
 from report.looking import texts
 from wear_cases import by_hand
 
-from thermal_robot import cli, report
+from thermal_robot import report
 from thermal_robot.report import html, motion_plots, plots
 from thermal_robot.report.page import svg
 from thermal_robot.report.pdf import write_page
@@ -167,19 +165,3 @@ def test_a_pdf_holds_every_cell(kind, tmp_path):
     body = re.sub(r"(?s)<(svg|script|style).*?</\1>", "", shown[shown.index("<main") :])
     told = [unescape(text) for text in re.findall(r">([^<>]+)<", body) if text.strip()]
     assert missing(told, (tmp_path / "r.pdf").read_bytes()) == []
-
-
-def test_a_pdf_is_refused_before_anything_is_computed_where_its_extra_is_missing(monkeypatch, tmp_path, capsys):
-    monkeypatch.setitem(sys.modules, "weasyprint", None)
-    monkeypatch.setattr("thermal_robot.commands.campaigns.diagnosed", lambda _: pytest.fail("it is computed"))
-    assert cli.main(["demo", "--report", str(tmp_path / "r.PDF")]) == cli.BAD_INPUT
-    assert 'pip install "thermal-robot[pdf]"' in capsys.readouterr().err
-
-
-@pytest.mark.usefixtures("no_drawing")
-def test_the_first_page_says_whose_robot_it_is():
-    shown = page("found")
-    head = shown[shown.index("<header>") : shown.index("</header>")]
-    for name, said in (("Robot serial", "20185500123"), ("Operator", "A. Novak"), ("Date", "2026-11-26")):
-        assert f"<dt>{name}</dt><dd>{said}</dd>" in head
-    assert "about      robot serial 20185500123" in report.text(every_page.EVERY["found"][1]())

@@ -15,9 +15,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from compared import diagnosed, moved
-from helpers import some
 from lxml.html import document_fromstring
-from report.cases import HARD, case, rows, with_first
+from report.cases import CASES, HARD, case, rows, with_first
+from report.every_page import EVERY, FILES, WHEN
+from report.every_page import page as page_of
 from report.fleets import EMPTY, SUMMARY
 from wear_cases import by_hand
 
@@ -34,7 +35,7 @@ from thermal_robot.diagnosis.values import (
     Unexplained,
     Where,
 )
-from thermal_robot.report import fragment, html, page, tables
+from thermal_robot.report import fragment, html, page, tables, words
 from thermal_robot.report.drawing import BEFORE, INK, Drawing
 
 EMPTY_TAGS = {"meta", "link", "br", "img", "input", "hr"}
@@ -99,16 +100,26 @@ def write(request):
     return request.param
 
 
-@pytest.mark.parametrize("kind", some(["found", "nothing", "unexplained", "confounded"], 4))
-def test_a_page_needs_nothing_from_outside_and_its_references_find_their_targets(write, written, kind):
-    shown = written(write, kind)
+EACH_COMMIT = ("found_piece", "compare_3", "fleet", "wear")
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] * (k not in EACH_COMMIT)) for k in ("found_piece", *EVERY)]
+)
+def test_a_page_stands_alone_its_references_find_their_targets_and_equal_results_give_equal_pages(kind):
+    shown = page_of(kind) if kind in EVERY else fragment(case("found"))
     assert "//" not in re.sub(r"data:image/png;base64,[\w+/=\s]*", "", shown)
     assert "@import" not in shown
     reader = Reader(shown)
-    assert reader.references
     assert all(r.startswith(("#", "data:image/png;base64,")) for r in reader.references)
     assert len(reader.ids) == len(set(reader.ids))
     assert {r[1:] for r in reader.references if r.startswith("#")} <= set(reader.ids)
+    if kind in EVERY:
+        assert shown.startswith("<!DOCTYPE html>")
+        assert "script" not in reader.tags
+        assert shown.count(WHEN) == 1
+        assert shown == page_of(kind)
+        assert kind in ("fleet", "blind") or all(f"<code>{digest}</code>" in shown for digest in FILES.values())
 
 
 def test_every_name_is_escaped(write):
@@ -138,25 +149,57 @@ def test_every_name_is_escaped(write):
     assert UGLY in re.sub(r"\s+", " ", unescape(shown))
 
 
-def test_a_page_and_a_piece_say_what_the_diagnosis_says(write, written):
-    words = Reader(written(write, "found")).words
-    for said in (
-        case("found").summary, "412 µm", "28 µm", "99.5 %", "interval 99.0 to 99.7",
-        "12.34 ± 0.41 µm/(m·K)", "96.2 % (94.1 to 97.4 %)", "needs approach.<joint>", case("found").warnings[0],
-        "not determined by these data: strain per kelvin of wrist_2_link",
-    ):  # fmt: skip
-        assert said in words, said
-    assert 'class="tr-flag"' not in written(write, "found")
-    unexplained = written(write, "unexplained")
-    assert 'class="tr-flag"' in unexplained
-    assert "It enters most probably at elbow_joint (72.0 %)" in Reader(unexplained).words
-    assert "var(--tr-ink,#22282e)" in unexplained
-    assert "var(--tr-before,#e69f00)" in unexplained
+def all_words(d):
+    """What words that the text is made of, too, tell of a diagnosis."""
+    yield from (d.summary, d.advice, *d.warnings, *words.details(d), *words.facts(d).values(), *words.sentences(d))
+    yield from (words.noise(d), words.hardest(d), words.with_aside(d), words.one_sigma(d))
+    yield from (said for pair in words.about(d.about).items() for said in pair)
+    for finding in d.effects:
+        before, shown, after = words.described(finding, d)
+        yield from (finding.name, *(line for line, _ in before + after), *(cell for row in shown for cell in row))
+
+
+@pytest.mark.usefixtures("no_drawing")
+@pytest.mark.parametrize("kind", [*CASES, "misfit"])
+def test_the_page_says_all_that_the_text_says(kind):
+    hard = {"gap": {"schemes": (HARD,), "hardest": HARD}, "left_out": ("drift",)} if kind == "law" else {}
+    told = case(kind, **hard) if hard else EVERY[kind][1]()
+    shown = Reader(html(told)).words.replace(words.NO_BREAK, " ")
+    every = list(all_words(told)) if told.usable else [told.summary, *told.warnings, *words.facts(told).values()]
+    assert [said for said in every if " ".join(said.replace(words.NO_BREAK, " ").split()) not in shown] == []
+    assert ("held out by temperature" in shown) is bool(hard)
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_every_candidate_has_a_row_the_found_above_the_rest(write):
+    shown = {row[0]: row[1:] for row in cells(write(case("found")).partition("Every effect")[2])}
+    assert {f.name for f in case("found").effects} <= set(shown)
+    assert shown["thermal_elongation"] == ["found", "> 99.9 %", "96.2 % (94.1 to 97.4 %)"]
+    assert shown["geometric"] == ["not found", "< 0.1 %", "−3.1 % (−6.0 to 0.2 %)"]
+    assert shown["backlash"] == ["not testable", "needs approach.<joint>"]
+    assert shown["strain per kelvin of forearm_link"] == ["23.10 ± 0.89 µm/(m·K)"]
+    base = case("confounded")
+    table = write(replace(base, effects=base.effects[::-1])).partition("Every effect")[2]
+    places = {table.index(f">{f.name}<"): f.status for f in base.effects}
+    order = ["found", "confounded", "not_found", "not_testable"]
+    assert [places[at] for at in sorted(places)] == sorted(places.values(), key=order.index)
+
+
+@pytest.mark.usefixtures("no_drawing")
+def test_what_is_unexplained_is_flagged_and_what_is_not_determined_has_no_number(write):
+    wrong = Estimate("strain of nothing", 7.777e-6, 1.111e-6, "1/K", False)
+    shown = write(with_first("found", parameters=(wrong,)))
+    told = Reader(shown).words
+    assert all(
+        said in told for said in ("412 µm", "28 µm", "99.5 %", "not determined by these data: strain of nothing")
+    )
+    assert not re.search(r"7\.7[78]|1\.1[12]", told)
+    assert 'class="tr-flag"' not in shown
+    assert 'class="tr-flag"' in write(case("unexplained"))
 
 
 def test_the_page_is_a_document_with_every_section_that_has_content(written):
     shown = written(html, "found")
-    assert shown.startswith("<!DOCTYPE html>")
     assert "<title>Diagnosis of hall_3_morning</title>" in shown
     assert headings(shown) == [
         "How far", "Which", "Where", "Unexplained", "Next", "Set aside", "Warnings", "What the words mean",
@@ -210,7 +253,6 @@ def test_a_long_campaign_stays_small():
 @pytest.mark.usefixtures("no_drawing")
 def test_the_footer_tells_libraries_files_and_the_date_that_was_given(monkeypatch):
     bare, dated = html(case("found")), html(case("found"), "1 April 2031 <>", {"a<b.csv": "0a1b"})
-    assert bare == html(case("found"))
     assert re.search(r"<footer>thermal-robot( [\w.+]+)?(, (pin|numpy|scipy) [\w.+]+)+</footer>", bare)
     assert f"numpy {np.__version__}" in bare
     assert "1 April 2031 &lt;&gt;</footer>" in dated
@@ -221,31 +263,6 @@ def test_the_footer_tells_libraries_files_and_the_date_that_was_given(monkeypatc
 
     monkeypatch.setattr(page, "version", absent)  # a source tree that is not installed
     assert page.signature("1 May") == "thermal-robot, 1 May"
-
-
-@pytest.mark.usefixtures("no_drawing")
-def test_the_page_says_what_the_text_says_of_rows_noise_and_harder_ways():
-    told = Reader(html(case("law", left_out=("drift",), gap={"schemes": (HARD,), "hardest": HARD}))).words
-    for said in (
-        "as outliers: rows 17, 80 of the file (its header is row 1)",
-        "118 of 120 rows, 2 set aside",
-        "by request (--without drift)",
-        "± is one standard",
-        "None of the effects that were considered has the shape of the law",
-        "Rows held out in the hardest way: 410 µm → 92 µm, held out by temperature (the warmest fifth)",
-        "The gap on rows held out with the 2 rows set aside in it: 452 µm → 182 µm.",
-        "follows time (step); step 0.1700 ± 0.0060 mrad; usually warming, or something that slips",
-    ):
-        assert said in told
-    plain = Reader(html(case("nothing"))).words
-    assert "held out by temperature" not in plain
-    assert "set aside in it" not in plain
-    assert "Figures of rows held out have the noise of these rows in them." in plain
-    wrong = Estimate("strain of nothing", 7.777e-6, 1.111e-6, "1/K", False)
-    for write in (html, fragment):
-        undetermined = Reader(write(with_first("found", parameters=(wrong,)))).words
-        assert "not determined by these data: strain of nothing" in undetermined
-        assert not re.search(r"7\.7[78]|1\.1[12]", undetermined)
 
 
 @pytest.mark.usefixtures("no_drawing")
@@ -289,33 +306,6 @@ def test_the_big_numbers_share_unit_and_decimals_and_keep_their_per_cent_signs()
     assert (turned, floor) == (["orientation 1.040 mrad"], "noise floor 0.026 mm")
     assert (bounds, pair) == ("95\N{NO-BREAK SPACE}% interval 99.0 to 99.7\N{NO-BREAK SPACE}%", "2.430 mm → 0.030 mm")
     assert tables.numbers(case("found"))[0][3] == [""]
-
-
-@pytest.mark.usefixtures("no_drawing")
-def test_every_candidate_has_a_row_the_found_above_the_rest_with_details_where_it_has_some():
-    shown = {row[0]: row[1:] for row in cells(section(html(case("found")), "Which"))}
-    assert {f.name for f in case("found").effects} <= set(shown)
-    assert shown["thermal_elongation"] == ["found", "> 99.9 %", "96.2 % (94.1 to 97.4 %)"]
-    assert shown["geometric"] == ["not found", "< 0.1 %", "−3.1 % (−6.0 to 0.2 %)"]
-    assert shown["backlash"] == ["not testable", "needs approach.<joint>"]
-    assert shown["strain per kelvin of forearm_link"] == ["23.10 ± 0.89 µm/(m·K)"]
-    base = case("confounded")
-    table = section(html(replace(base, effects=base.effects[::-1])), "Which")
-    places = {table.index(f">{f.name}<"): f.status for f in base.effects}
-    order = ["found", "confounded", "not_found", "not_testable"]
-    assert [places[at] for at in sorted(places)] == sorted(places.values(), key=order.index)
-    assert table.count("tr-details") == 3
-    said = Reader(table).words
-    for told in (
-        "these data cannot tell it from base_frame",
-        "the 6 most significant of 35 parameters:",
-        "and 29 more, listed in the JSON",
-        "not determined by these data: translation z of base_link",
-    ):
-        assert told in said
-    inside = Reader(html(case("contained"))).words
-    assert "its part of geometric" in inside
-    assert "2 not seen apart from the others or the frames" in inside
 
 
 def test_rows_set_aside_stand_in_a_table_whose_largest_error_decides_the_unit():
@@ -476,13 +466,10 @@ def test_a_figure_on_a_page_is_equal_for_equal_figures_and_free_of_clashes_addre
 def test_the_page_of_a_comparison_is_whole_and_its_fragment_one_piece():
     names = ["before", "<script>alert(1)</script>"]
     plain = tr.compare(diagnosed(1), diagnosed(3, moved(4e-4)), names=names).to_dict()
-    shown = report.comparison_html(plain, "2026-01-01 00:00", {"a.csv": "0" * 64})
-    assert shown.startswith("<!DOCTYPE html>")
+    shown = report.comparison_html(plain)
     assert "<script" not in shown
-    assert not re.search(r"(?:src|href)=\"https?:", shown)
-    for told in ("zero offset, joint_3", "2026-01-01 00:00", "a.csv", "What changed", "Predictions", "Not compared"):
+    for told in ("zero offset, joint_3", "What changed", "Predictions", "Not compared"):
         assert told in shown
-    assert shown == report.comparison_html(plain, "2026-01-01 00:00", {"a.csv": "0" * 64})
     piece = report.comparison_fragment(plain)
     assert piece.startswith('<div class="thermal-robot">')
     assert piece.count("<div") == piece.count("</div>")
@@ -492,31 +479,26 @@ def test_the_page_of_a_comparison_is_whole_and_its_fragment_one_piece():
 
 
 def test_the_page_of_a_fleet_holds_every_line():
-    shown = report.fleet_html(SUMMARY, "then")
-    for said in ("<h1>30 campaigns of 29 robots", "hall 2", "fore_arm", "arm_07", "arm_19", "&lt;nonsense&gt;", "then"):
+    shown = report.fleet_html(SUMMARY)
+    for said in ("<h1>30 campaigns of 29 robots", "hall 2", "fore_arm", "arm_07", "arm_19", "&lt;nonsense&gt;"):
         assert said in shown
     assert "<nonsense>" not in shown
-    assert re.findall(r"(?:https?:)?//[\w.]+", shown) == []
-    assert shown.count("<section>") == shown.count("</section>") == 9
-    assert shown == report.fleet_html(SUMMARY, "then")
+    assert shown.count("<section>") == 9
     failed = report.fleet_html(EMPTY)
     assert failed.count("<section>") == 1
     assert "<svg" not in failed
 
 
 def test_the_page_of_a_robot_over_time_tells_what_rings():
-    shown = report.wear_html(by_hand(), "then", {"campaign.toml": "abc123"})
+    shown = report.wear_html(by_hand())
     for said in (
         "zero offset, elbow jumped by +0.200",
         "2026-07-20 (2026-06-30 to 2026-08-19)",
         "cannot be compared: unknown frames hide its changes",
         "a &lt;note&gt; to know",
-        "abc123",
     ):
         assert said in shown
-    assert "http:" not in shown
     assert shown.count('role="img"') == 1
-    assert shown == report.wear_html(by_hand(), "then", {"campaign.toml": "abc123"})
 
 
 def test_the_room_lists_what_it_has_and_what_is_light_stays_light():

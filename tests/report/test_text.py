@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from compared import diagnosed, moved
-from report.cases import HARD, JOINTS, case, with_first
+from report.cases import HARD, JOINTS, case
 from report.fleets import EMPTY, SUMMARY
 
 import thermal_robot as tr
@@ -138,24 +138,14 @@ def test_effects_are_told_at_length_or_in_short():
         "needs torque.<joint>, payload or masses in the URDF",
     ]
     which = section(text(case("confounded")), "WHICH")
-    told = "\n".join(which)
-    assert "these data cannot tell it from base_frame" in told
-    assert "these data cannot tell it from joint_offset" in told
-    assert "zero offset, wrist_1_joint        0.000 ± 0.022 mrad" in told
+    assert "zero offset, wrist_1_joint        0.000 ± 0.022 mrad" in "\n".join(which)
     start = next(k for k, line in enumerate(which) if "the 6 most significant of 35 parameters" in line)
-    shown = [line.split("  ")[-1] for line in which[start + 1 : start + 7]]
-    assert shown[0] == "0.420 ± 0.010 mrad"
-    assert [float(value.split()[0]) for value in shown] == [0.42, 0.36, 0.35, 0.3, 0.3, 0.28]
+    assert which[start + 1].endswith("0.420 ± 0.010 mrad")
     assert which[start + 7].strip() == "and 29 more, listed in the JSON"
     inside = text(case("contained")).partition("part of what was found")[2]
     assert all(f"zero offset, {joint}" in inside for joint in JOINTS[1:5])
     assert "−7.100 ± 0.020 mrad" in inside
     assert "2 not seen apart from the others or the frames: zero offset, shoulder_pan_joint" in flat(inside)
-    wrong = Estimate("strain of nothing", 7.77e-6, 1.11e-6, "1/K", False)
-    told = text(with_first("found", parameters=(wrong,)))
-    assert "not determined by these data: strain of nothing" in told
-    assert "7.7" not in told
-    assert "1.11" not in told
 
 
 @pytest.mark.parametrize(
@@ -260,6 +250,7 @@ def test_facts_are_verdict_campaign_rows_and_effects_left_out():
     many = text(case("found", outliers=tuple(range(2, 18))))
     assert "104 of 120 rows, 16 set aside" in many
     assert "set aside  as outliers: rows 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 6 more" in many
+    assert "about      robot serial 2018" in text(case("found", about={"robot_serial": "2018"}))
     out = case("found", left_out=("drift", "geometric"))
     assert facts(out)["Left out"] == "by request (--without drift geometric): drift, geometric"
     few = replace(out, effects=out.effects[:1])

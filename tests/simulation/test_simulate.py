@@ -234,12 +234,6 @@ def test_targets_and_noises_of_the_campaign_that_lent_its_commands_are_gone(rv_m
     assert {"x", "y", "z", "qw"} <= set(found.to_frame())
 
 
-def test_a_robot_that_is_warm_all_the_time_is_larger_by_the_same_share(rv_m2):
-    cold = simulate(rv_m2, conditions={"temperature": 20.0})
-    warm = simulate(rv_m2, {"thermal_elongation": 1e-5}, conditions={"temperature": 32.0})
-    np.testing.assert_allclose(warm.position, (1.0 + 12e-5) * cold.position, rtol=0.0, atol=1e-12)
-
-
 @pytest.mark.slow
 def test_the_page_prints_what_it_planted(capsys, diagnosed_once, monkeypatch):
     monkeypatch.setattr(thermal_robot, "diagnose", diagnosed_once)
@@ -434,7 +428,5 @@ def test_conditions_have_a_value_for_each_row():
     assert np.all(np.diff(found["time"]) > 0.0)
     assert 0.9 * 6.0 < np.ptp(found["temperature"]) <= 6.0
     assert "payload" not in conditions(50, 6.0)
-
-
-def test_forty_rows_without_warming_take_ten_minutes():
+    # forty rows without warming take ten minutes
     assert 9.0 * 60.0 < conditions(40, 0.0)["time"][-1] < 10.0 * 60.0

@@ -140,21 +140,20 @@ def test_inside_and_outside_add_up_to_one_with_and_without_heat(shape):
             assert abs(total - 1.0) < 1e-12
 
 
-def test_turning_everything_leaves_the_disc_alone():
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_neither_turning_everything_nor_the_unit_of_length_matters(unit):
     matrix, mean, end = covariance(50.0, 0.4), np.array([0.7, -1.1]), np.array([0.8, 0.3])
-    for spread_of in (lambda t: None, lambda t: UniformSpread.segment(t @ end)):
-        reference = failing_probability(matrix, 5.0, mean, thermal=spread_of(np.eye(2)))
-        for angle in (0.3, 1.0, np.pi / 2.0, 2.5):
-            turn = turned(angle)
-            value = failing_probability(turn @ matrix @ turn.T, 5.0, turn @ mean, thermal=spread_of(turn))
+    spreads = (
+        lambda turn, unit: None,
+        lambda turn, unit: UniformSpread.segment(unit * turn @ end),
+        lambda turn, unit: UniformSpread.box(unit * end, turn),
+    )
+    for spread_of in spreads:
+        reference = failing_probability(matrix, 5.0, mean, thermal=spread_of(np.eye(2), 1.0))
+        for turn in map(turned, (0.3, 1.0, np.pi / 2.0, 2.5)):
+            other, shifted = unit**2 * turn @ matrix @ turn.T, unit * turn @ mean
+            value = failing_probability(other, 5.0 * unit, shifted, thermal=spread_of(turn, unit))
             assert value == pytest.approx(reference, rel=1e-12)
-
-
-def test_unit_of_length_does_not_matter():
-    arguments = {"thermal": UniformSpread.box([7.0, 16.0])}
-    small = {"thermal": UniformSpread.box([7e-6, 16e-6])}
-    reference = failing_probability(np.diag([14.0, 18.0]) ** 2, 145.0, **arguments)
-    assert failing_probability(np.diag([14e-6, 18e-6]) ** 2, 145e-6, **small) == pytest.approx(reference, rel=1e-12)
 
 
 def test_singular_covariance_is_a_line_and_zero_a_point():
@@ -246,7 +245,7 @@ def test_number_of_planar_nodes_does_not_grow_with_the_number_of_generators():
     np.testing.assert_allclose(shifts @ np.array([1.0, -2.0]), 0.0, atol=1e-14)
 
 
-def test_heat_without_a_normal_part_is_geometry():
+def test_heat_without_a_normal_part_or_hardly_any_is_geometry():
     nothing = np.zeros((2, 2))
     assert joining_probability(nothing, 1.0, thermal=UniformSpread.segment([2.0, 0.0])) == pytest.approx(
         0.25, rel=1e-13
@@ -255,11 +254,8 @@ def test_heat_without_a_normal_part_is_geometry():
     box = UniformSpread.box([1.5, 2.0])
     assert joining_probability(nothing, 2.0, thermal=box) == pytest.approx(np.pi / 12.0, rel=1e-11)
     assert failing_probability(nothing, 2.0, thermal=box) == pytest.approx(1.0 - np.pi / 12.0, rel=1e-11)
-
-
-def test_a_disc_lost_in_a_wide_box_is_still_found():
-    matrix, box = 1e-6 * np.eye(2), UniformSpread.box([30.0, 20.0])
-    assert joining_probability(matrix, 0.2, thermal=box) == pytest.approx(np.pi * 0.01 / 2_400.0, rel=1e-9)
+    lost = joining_probability(1e-6 * np.eye(2), 0.2, thermal=UniformSpread.box([30.0, 20.0]))  # a disc in a wide box
+    assert lost == pytest.approx(np.pi * 0.01 / 2_400.0, rel=1e-9)
 
 
 def test_uniform_over_the_area_is_a_mixture_of_its_tiles():

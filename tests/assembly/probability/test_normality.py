@@ -1,4 +1,4 @@
-"""Shapiro-Wilk: the critical value against scipy and simulation, and the power that the paper's test had."""
+"""Shapiro-Wilk: the critical value against scipy and simulation; the power of the paper's test is in its ledger."""
 
 import numpy as np
 import pytest
@@ -20,26 +20,10 @@ def test_critical_value_inverts_scipy_s_p_value(n):
     assert shapiro_wilk_critical(n, float(outcome.pvalue)) == pytest.approx(outcome.statistic, abs=1e-10)
 
 
-def test_critical_value_of_the_paper_is_not_the_five_per_cent_point():
-    assert shapiro_wilk_critical(100, 0.05) == pytest.approx(0.9746, abs=5e-5)
-    assert shapiro_wilk_critical(100, 0.01) == pytest.approx(0.9654, abs=5e-5)
-    # The printed 0.964 is passed by fewer than one in a hundred normal samples.
-    assert shapiro_wilk_critical(100, 0.0077) == pytest.approx(0.964, abs=5e-4)
-
-
 def test_level_is_kept_by_simulation():
     power = normality_power(0.0, 100, samples=4000)
     assert abs(power.rejected - 0.05) < 5.0 * np.sqrt(0.05 * 0.95 / 4000)
-    assert power.low < power.rejected < power.high
-
-
-@pytest.mark.parametrize(
-    ("r", "n", "expected"), [(0.5, 100, 0.05), (1.0, 100, 0.05), (0.5, 5000, 0.05), (1.0, 5000, 0.98)]
-)
-def test_power_against_the_flat_normal(r, n, expected):
-    power = normality_power(r, n, samples=1500)
-    assert abs(power.rejected - expected) < 5.0 * np.sqrt(expected * (1.0 - expected) / 1500) + 0.005
-    assert power.high - power.low < 0.025
+    assert power.low < power.rejected < power.high < power.low + 0.025
 
 
 def test_power_grows_with_r_to_that_of_a_uniform_sample():

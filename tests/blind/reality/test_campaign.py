@@ -2,12 +2,16 @@
 
 import csv
 import json
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from itertools import pairwise
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from blind_fakes import AtOnce
 from helpers import some
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
@@ -45,6 +49,8 @@ def words(folder):
 def test_a_campaign_can_be_read_and_holds_what_was_asked(case, tmp_path):
     answers = make(case("pair", "ur10", effects=("drift", "backlash")), tmp_path)
     assert read_campaign(tmp_path).samples == answers["samples"]
+    made = ["campaign.toml", "fresh.csv", "measurements.csv", "robot.urdf"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == made
     assert set(answers["truth"]["effects"]) == {"drift", "backlash"}
     assert all(2.0 <= part["ratio"] <= 6.0 for part in answers["truth"]["parts"].values())
     assert np.shape(answers["fresh_position"]) == (1000, 3)
@@ -52,21 +58,28 @@ def test_a_campaign_can_be_read_and_holds_what_was_asked(case, tmp_path):
     assert json.loads(json.dumps(answers, allow_nan=False)) == answers
 
 
+APART = partial(ProcessPoolExecutor, 1, get_context("spawn"))  # where sets of words have another order
+
+
 @pytest.mark.parametrize(
-    "asked",
+    ("pool", "asked"),
     some(
         [
-            {"effects": ("joint_gain",)},
-            {"kind": "changed", "effects": ("joint_gain",), "several": Several((2, 2), "changes", "joint_gain")},
+            (AtOnce, {"effects": ("joint_gain",)}),
+            (APART, {"effects": ("thermal_elongation", "joint_compliance")}),
+            (
+                APART,
+                {"kind": "changed", "effects": ("joint_gain",), "several": Several((2, 2), "changes", "joint_gain")},
+            ),
         ],
-        2,
+        3,
     ),
 )
-def test_the_same_seed_makes_the_same_files(case, tmp_path, asked):
+def test_the_same_seed_makes_the_same_files(case, tmp_path, pool, asked):
     asked = case(samples=(30, 34), **asked)
-    first, second, other = (
-        make(c, tmp_path / n) for n, c in (("a", asked), ("b", asked), ("c", replace(asked, seed=43)))
-    )
+    first, other = (make(c, tmp_path / n) for n, c in (("a", asked), ("c", replace(asked, seed=2**61 + 1))))
+    with pool() as elsewhere:
+        second = elsewhere.submit(make, asked, tmp_path / "b").result()
     assert json.dumps(first) == json.dumps(second) != json.dumps(other)
     files = sorted((tmp_path / "a").rglob("*.*"))
     assert files

@@ -81,13 +81,10 @@ def test_spoilt_rows_are_those_that_are_named_as_an_editor_counts_them(day, seen
     assert 0.1 < len(named) / len(off) < 0.5
 
 
-def test_the_frames_of_a_sound_robot_are_found_from_half_the_rows(day, seen):
+def test_the_frames_of_a_sound_robot_are_found_from_half_the_rows_and_spoilt_ones_do_not_move_them(day, seen):
     given = np.arange(day.setting.samples) % 2 == 0
     half = Day(replace(day.setting, given=given), day.instrument)
     np.testing.assert_allclose(registered(half, seen[0][given], []), seen[0], atol=1e-11)
-
-
-def test_a_spoilt_row_does_not_move_them(day, seen):
     wrong = seen[0].copy()
     wrong[[4, 40]] += 1e-2
     np.testing.assert_allclose(registered(day, wrong, [6, 42]), seen[0], atol=1e-11)

@@ -272,8 +272,6 @@ def test_placements_that_come_and_go_count_in_their_rows(linear, setting, body):
     sometimes = linear.place(replace(body, placements=late[:, None, None] * one))
     np.testing.assert_allclose(sometimes[late], always[late], atol=1e-15)
     np.testing.assert_allclose(sometimes[~late], linear.place(body)[~late], atol=1e-15)
-
-
-def test_torque_is_that_of_the_robot(linear, setting):
+    # what is linear about the sound robot has its torque and poses
     np.testing.assert_allclose(linear.torque, setting.torque, atol=1e-9)
     np.testing.assert_allclose(linear.poses, setting.poses, atol=1e-12)
