@@ -9,7 +9,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion.following import Correlation, Moves, slope, usual_step
-from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog, with_channels
+from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog
 from thermal_robot.motion.settings import CLEAR, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
 
 _COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
@@ -21,8 +21,7 @@ _SIGMA = 1.4826  # standard deviation over median absolute deviation of a normal
 
 def reclocked(motion: Motion, clock: Callable[[Array], Array]) -> Motion:
     """Return a motion whose measured channels have other stamps, those of the command kept."""
-    named = {name: getattr(motion, name) for name in CHANNELS if name != "command"}
-    return with_channels(motion, {k: Channel(clock(c.time), c.values) for k, c in named.items() if c is not None})
+    return motion.with_channels(CHANNELS[1:], lambda channel: Channel(clock(channel.time), channel.values))
 
 
 def two_clocks(log: MotionLog) -> bool:

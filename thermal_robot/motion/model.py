@@ -18,12 +18,13 @@ from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
-from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Mask = NDArray[np.bool_]
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -60,6 +61,14 @@ class JointModel(ABC):
 
     def __init__(self, log: MotionLog) -> None:
         self.log, self.joints = log, range(len(log.joints))
+        self.servos = [log.servo(name) for name in log.joints]
+        payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
+        self.dynamics = Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """(P,) expected sizes of the parameters: one sigma of their priors."""
+        return np.array([one.size for one in self.parameters])
 
     @cached_property
     def clusters(self) -> int:
@@ -83,26 +92,21 @@ class JointModel(ABC):
         found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
         return found[0] if found else None
 
-    def dynamics_of(self, log: MotionLog) -> Dynamics:
-        """Rigid-body dynamics of the log's joints."""
-        payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
-        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
-
-    def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+    def own(self, joint: int, wanted: Mask | None = None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
         places = [p for p, one in enumerate(self.parameters) if one.joint in (joint, SHARED)]
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
-    def rated(self, torque: Array) -> float:
-        """Return the expected payload, kg: a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
+    def payload(self, torque: Array) -> Parameter:
+        """Payload, expected as a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
         most = np.abs(torque).max(axis=0)
-        servos = [self.log.servos.get(name, Servo()) for name in self.log.joints]
-        limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in servos])
-        return settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
+        limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
+        size = settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
+        return Parameter("payload", SHARED, "mass", "kg", size, 1.0, False, "payload")
 
-    @abstractmethod
     def start(self) -> Array:
-        """(P,) values from which all effects are fitted."""
+        """(P,) values from which all effects are fitted: of a problem that is nearly linear none."""
+        return np.zeros(len(self.parameters))
 
     @abstractmethod
     def refreshed(self, values: Array) -> None:
@@ -113,7 +117,7 @@ class JointModel(ABC):
         """(S, N) residual of a joint for S sets (S, P) of all parameters."""
 
     @abstractmethod
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
 
     @abstractmethod
@@ -129,14 +133,33 @@ class JointModel(ABC):
         """(N,) what the residual of a joint may follow, by name."""
 
     @abstractmethod
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """(N,) what is drawn of a joint, by name."""
+    def drawn(self, joint: int) -> dict[str, Array]:
+        """(N,) what is drawn of the readings of a joint, by name: motion, time, command, load and what was measured."""
 
     def curves(self, joint: int, values: Array) -> pd.DataFrame:
-        """Table of what is drawn of a joint: motion, time, command, measured, nominal, simulated and load."""
+        """Table of what is drawn of a joint, with what is simulated of it, ``nominal`` without any effect."""
         import pandas as pd
 
-        return pd.DataFrame(self.drawn(joint, values))
+        drawn, left = self.drawn(joint), self.residuals(joint, np.stack([np.zeros_like(values), values]))
+        return pd.DataFrame(drawn | {"nominal": drawn["measured"] - left[0], "simulated": drawn["measured"] - left[1]})
+
+    def moves(self, values: Array) -> dict[tuple[str, str], float]:
+        """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.
+
+        By effect and joint, of what all joints share in each; of the values (P,) what is zero is no part of the fit.
+        """
+
+        def of_joint(joint: int) -> dict[tuple[str, str], float]:
+            own = self.own(joint, values != 0.0)
+            effects = list(dict.fromkeys(self.parameters[p].effect for p in own))
+            sets = np.tile(values, (1 + len(effects), 1))
+            for p in own:
+                sets[1 + effects.index(self.parameters[p].effect), p] = 0.0
+            left = self.residuals(joint, sets)
+            sizes = np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1))
+            return {(name, self.log.joints[joint]): float(x) for name, x in zip(effects, sizes, strict=True)}
+
+        return {key: size for one in self.each(of_joint) for key, size in one.items()}
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
@@ -147,10 +170,6 @@ class JointModel(ABC):
         """Residual (N,) of every joint at the parameters (P,)."""
         return self.each(lambda joint: self.residuals(joint, values[None])[0])
 
-    def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
-        """Residual and derivatives of every joint at the parameters (P,)."""
-        return self.each(lambda joint: self.rows(joint, values, wanted))
-
 
 class ServoModel(JointModel):
     """Residual and derivative of a log's encoder readings by the parameters of the servo model.
@@ -160,18 +179,17 @@ class ServoModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        self.dynamics = self.dynamics_of(log)
-        self.servos = [log.servos.get(name, Servo()) for name in log.joints]
         self.coupled = all(servo.kp for servo in self.servos)
         self._grids()
+        self.measured = np.concatenate([motion.position.values for motion in log.motions])
+        self.reach = np.nanmin(self.measured, axis=0), np.nanmax(self.measured, axis=0)
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
-        self.about = np.stack([np.clip(self.commanded[:, j], *self._range(j)) for j in self.joints], axis=1)
+        self.about = np.clip(self.commanded, *self.reach)
         self.loads = self.dynamics.along(self.about)
         self.moving = False
-        self.touching, self.pressing = 0.0, np.zeros_like(self.about)
-        self.contact = np.zeros_like(self.about)
         self.lowest = float(self._heights(self.commanded)[0].min())
         self.parameters = self._parameters()
+        self._press(np.zeros(len(self.parameters)))
 
     def _grids(self) -> None:
         motions = self.log.motions
@@ -184,10 +202,6 @@ class ServoModel(JointModel):
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first = np.array([m.position.time[0] for m in motions])
         self.grid = np.concatenate([t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)])
-
-    def _range(self, joint: int) -> tuple[float, float]:
-        measured = np.concatenate([m.position.values[:, joint] for m in self.log.motions])
-        return float(np.nanmin(measured)), float(np.nanmax(measured))
 
     def _held(self, joint: int) -> Array:
         """(n,) the command of a joint on the grid, held between its stamps."""
@@ -214,7 +228,7 @@ class ServoModel(JointModel):
     def _samples(self) -> list[tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]]:
         """Of each joint the readings (N,), their place on the grid and the part of a step beyond it, and motions."""
         found = []
-        for j in range(len(self.log.joints)):
+        for j in self.joints:
             parts = []
             for k, motion in enumerate(self.log.motions):
                 q, t = motion.position.values[:, j], motion.position.time
@@ -233,27 +247,26 @@ class ServoModel(JointModel):
             if e.number not in (("droop",) if servo.kp else ("kp",))
         ]
         if self.log.robot.has_masses:
-            size_of = self.rated(self.loads.torque[1])
-            found.append(Parameter("payload", SHARED, "mass", "kg", size_of, 1.0, False, "payload"))
-            found.append(
-                Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact")
+            height = "height above the lowest command"
+            found += (
+                self.payload(self.loads.torque[1]),
+                Parameter("contact", SHARED, height, "m", 0.1, 1.5, True, "contact"),
             )
         return tuple(found)
 
     def start(self) -> Array:
         """(P,) values from which all effects are fitted: those of most, and stops and limits where the joint ends."""
         values = np.array([0.5 * one.size if one.positive else 0.0 for one in self.parameters])
-        for joint in range(len(self.log.joints)):
-            command, (low, high) = self.commanded[:, joint], self._range(joint)
-            at = {name: self.index(name, joint) for name in ("low_stop", "high_stop", "torque_limit")}
-            values[at["low_stop"]] = max(low - command.min(), 0.0)
-            values[at["high_stop"]] = max(command.max() - high, 0.0)
+        for joint in self.joints:
+            command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
+            values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
+            values[self.index("high_stop", joint)] = max(command.max() - high, 0.0)
             measured, place, _, _ = self._samples[joint]
             error = np.abs(command[place] - measured)
-            values[at["torque_limit"]] = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
+            limit = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
+            values[self.index("torque_limit", joint)] = limit
         if (p := self.index("contact")) is not None:
-            measured = np.concatenate([m.position.values for m in self.log.motions])
-            height, _ = self._heights(measured[np.isfinite(measured).all(axis=1)])
+            height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
         return values
 
@@ -311,7 +324,7 @@ class ServoModel(JointModel):
         simulated = self.positions(joint, values)
         return np.asarray(measured - (1.0 - beyond) * simulated[:, at] - beyond * simulated[:, at + 1])
 
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
         own = self.own(joint, wanted)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
@@ -332,25 +345,19 @@ class ServoModel(JointModel):
     def quantities(self, joint: int) -> dict[str, Array]:
         """(N,) what a joint's residual may follow, at its readings: position, velocity, load and time."""
         _, at, _, motion = self._samples[joint]
-        velocity = np.gradient(self.about[:, joint], self.step)
-        load = self.loads.torque[0, :, joint]
         return {
             f"the position of {self.log.joints[joint]}": self.about[at, joint],
-            "velocity": velocity[at],
-            "load": load[at],
+            "velocity": np.gradient(self.about[:, joint], self.step)[at],
+            "load": self.loads.torque[0, at, joint],
             "time": self.grid[at] - self.first[motion],
         }
 
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """Command, measured and simulated positions of a joint at its readings, rad; simulated without effects, too."""
+    def drawn(self, joint: int) -> dict[str, Array]:
+        """(N,) number of the motion, time, s, command and measured position, rad, and load, N·m, by name."""
         measured, at, beyond, motion = self._samples[joint]
-        left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        return {
-            "motion": motion, "time": self.grid[at] + beyond * self.step - self.first[motion],
-            "command": self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
-            "measured": measured, "nominal": measured - left[0],
-            "simulated": measured - left[1], "load": self.loads.torque[0, at, joint],
-        }  # fmt: skip
+        time = self.grid[at] + beyond * self.step - self.first[motion]
+        command, load = self.commanded[np.where(beyond > 0.5, at + 1, at), joint], self.loads.torque[0, at, joint]
+        return {"motion": motion, "time": time, "command": command, "load": load, "measured": measured}
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.
@@ -359,7 +366,6 @@ class ServoModel(JointModel):
         positive mass matrix that is scaled by its diagonal lie between 0 and J.
         """
         share, rounds = (2.0 / (len(self.joints) + 1), settings.WAVES) if self.coupled else (1.0, 1)
-        self._touch(None)
         for _ in range(rounds):
             about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
             loads = self._loads(about)
@@ -369,7 +375,7 @@ class ServoModel(JointModel):
             self.about, self.loads = about, loads
             if moved < min(self.noise(joint) for joint in self.joints):
                 break
-        self._touch(values)
+        self._press(values)
 
     def _loads(self, about: Array) -> Loads:
         """Return the loads along positions (n, J) on the grid; those of their motion where coupled."""
@@ -382,21 +388,19 @@ class ServoModel(JointModel):
                     rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
         return self.dynamics.along(about, speed, rate)
 
-    def _touch(self, values: Array | None) -> None:
-        p = self.index("contact")
-        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
-        if p is not None and values is not None and values[p] > 0.0:
-            self._press(values)
-
     def _press(self, values: Array) -> None:
         """Let the tool rest on a plane: the joints' springs yield to the force that keeps it there, without friction.
 
         The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
         """
+        p = self.index("contact")
+        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
+        if p is None or values[p] <= 0.0:
+            return
         height, slope = self._heights(self.about)
         compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
-        self.touching = float(values[self.index("contact")])
+        self.touching = float(values[p])
         into = self.lowest + self.touching - height
         self.contact = np.where(into > 0.0, 1.0, 0.0)[:, None] * -slope / yields[:, None]
         self.pressing = self.contact * np.maximum(into, 0.0)[:, None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,7 +13,7 @@ from thermal_robot.diagnosis.result import SCHEMA, estimate_table
 from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS
-from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.log import MotionLog, joint_kinds
 from thermal_robot.motion.physical import physical
 from thermal_robot.renderer import RenderedPage, registered_renderer
 
@@ -71,7 +71,7 @@ class MotionDiagnosis(RenderedPage):
     unit
         SI unit of the gap of a joint that turns: rad, or N·m where torques were recorded.
     moves
-        By effect and joint, how far it alone moves what is simulated: see :func:`~thermal_robot.motion.moves.moves`.
+        By effect and joint, rms by which it alone moves what is simulated.
 
     Examples
     --------
@@ -125,7 +125,7 @@ class MotionDiagnosis(RenderedPage):
 
     def unit_of(self, joint: str) -> str:
         """Return the SI unit of a joint's gap."""
-        slides = self.log.kinds.get(joint) == "prismatic"
+        slides = joint_kinds(self.log.robot).get(joint) == "prismatic"
         return {"rad": "m", "N·m": "N"}[self.unit] if slides else self.unit
 
     def title(self, effect: str, joint: str = "") -> str:
@@ -172,9 +172,8 @@ class MotionDiagnosis(RenderedPage):
         for estimate in self.finding(effect).parameters:
             joint = self.joint_of(estimate)
             if joint in seen or (seen and not joint):
-                servo = self.log.servos.get(joint) or Servo()
                 commanded = self.curves[joint]["command"] if joint in self.curves else ()
-                found.append(physical(effect, estimate, servo, np.asarray(commanded)))
+                found.append(physical(effect, estimate, self.log.servo(joint), np.asarray(commanded)))
         return tuple(found)
 
     def joint_of(self, estimate: Estimate) -> str:
@@ -185,12 +184,12 @@ class MotionDiagnosis(RenderedPage):
     @property
     def rms_before(self) -> float:
         """Root mean square of the gap over all joints and readings, rad."""
-        return _rms([one.before for one in self.joints.values()])
+        return rms([one.before for one in self.joints.values()])
 
     @property
     def rms_after(self) -> float:
         """The same once the effects are at work."""
-        return _rms([one.after for one in self.joints.values()])
+        return rms([one.after for one in self.joints.values()])
 
     def finding(self, effect: str) -> Finding:
         """Return the finding of one effect; :class:`KeyError` where there is none of that name."""
@@ -274,7 +273,7 @@ class MotionDiagnosis(RenderedPage):
         return {
             "rms_before": self.rms_before,
             "rms_after": self.rms_after,
-            "noise_floor": _rms([one.noise for one in self.joints.values()]),
+            "noise_floor": rms([one.noise for one in self.joints.values()]),
             "noise_source": "scatter",
             "orientation": None,
             "held_out": asdict(self.held_out),
@@ -295,10 +294,6 @@ class MotionDiagnosis(RenderedPage):
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"
 
 
-def _rms(values: list[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
-
-
-def rms(values: Array) -> float:
+def rms(values: Array | Sequence[float]) -> float:
     """Root mean square; zero of nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

@@ -19,8 +19,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
 from thermal_robot.motion.following import at, slope, usual_step
-from thermal_robot.motion.log import Channel, MotionLog, Servo
-from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
+from thermal_robot.motion.log import Channel, MotionLog
+from thermal_robot.motion.model import SHARED, JointModel, Mask, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
 
 _SECOND = tuple(f"second moment of {{}}, {axes}" for axes in ("xx", "xy", "yy", "xz", "yz", "zz"))
@@ -34,12 +34,11 @@ class TorqueModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        dynamics = self.dynamics_of(log)
         parts = [_sampled(motion.position, motion.torque) for motion in log.motions if motion.torque]
         self._time, self._q, self._v, self._a, *others = (np.concatenate(one) for one in zip(*parts, strict=True))
         self._sign, self._slow, self._measured, self._scatter = others
-        self._loads = dynamics.along(self._q, self._v, self._a, whole=True)
-        self._inertial, self._bodies = dynamics.inertial(self._q, self._v, self._a), dynamics.bodies
+        self._loads = self.dynamics.along(self._q, self._v, self._a, whole=True)
+        self._inertial, self._bodies = self.dynamics.inertial(self._q, self._v, self._a), self.dynamics.bodies
         self._motion = np.repeat(np.arange(len(parts)), [len(one[0]) for one in parts])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
         self.parameters = self._parameters()
@@ -48,12 +47,11 @@ class TorqueModel(JointModel):
         """Torque limits by joint, N·m, by which sizes are expected: as stated, else no less than the masses leave."""
         left = np.abs(self._measured - self._loads.torque[0])
         most = np.where(np.isfinite(left), left, 0.0).max(axis=0)
-        stated = [self.log.servos.get(name, Servo()).limit for name in self.log.joints]
-        return [own or max(settings.TORQUE_LIMIT, float(gap)) for own, gap in zip(stated, most, strict=True)]
+        return [one.limit or max(settings.TORQUE_LIMIT, float(gap)) for one, gap in zip(self.servos, most, strict=True)]
 
     def _parameters(self) -> tuple[Parameter, ...]:
         found, limits = [], self._limits()
-        for j, (name, limit) in enumerate(zip(self.log.joints, limits, strict=True)):
+        for j, limit in enumerate(limits):
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for name, label, unit, size, spread, positive in (
                 ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),
@@ -66,9 +64,7 @@ class TorqueModel(JointModel):
             ):
                 found.append(Parameter(name, j, label, unit, size, spread, positive, name))
         if self.log.robot.has_masses:
-            found.append(
-                Parameter("payload", SHARED, "mass", "kg", self.rated(self._loads.torque[1]), 1.0, False, "payload")
-            )
+            found.append(self.payload(self._loads.torque[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
                 for i, what in enumerate(_INERTIAL):
                     size, unit = (0.1, "") if not i else (0.1 * numbers[0] * settings.LINK, "kg·m")
@@ -86,7 +82,6 @@ class TorqueModel(JointModel):
             bodies = self._inertial[:, j].copy()
             bodies[:, :, 0] = np.einsum("nbi,bi->nb", bodies, np.array(list(self._bodies.values())))
             own = {
-                "offset": np.ones(len(self._q)),
                 "coulomb": sign,
                 "stribeck": self._slow[:, j],
                 "viscous": self._v[:, j],
@@ -101,43 +96,28 @@ class TorqueModel(JointModel):
 
     def residuals(self, joint: int, values: Array) -> Array:
         """(S, N) measured torque minus the model's, N·m."""
-        columns = self._columns[joint]
-        found = []
-        for one in values:
-            told, factor = columns["nominal"].copy(), 1.0
-            for p, parameter in enumerate(self.parameters):
-                if parameter.joint in (joint, SHARED) and one[p]:
-                    if parameter.number == "torque_constant":
-                        factor = 1.0 + one[p]
-                    elif parameter.number != "offset":
-                        told += one[p] * columns[parameter.number]
-            offset = self.index("offset", joint)
-            found.append(
-                self._measured[self._used[joint], joint] - factor * told - (one[offset] if offset is not None else 0)
-            )
-        return np.array(found)
+        measured, offset = self._measured[self._used[joint], joint], self.index("offset", joint)
+        told = ((self._factor(joint, one) * self._inside(joint, one), one[offset]) for one in values)
+        return np.array([measured - torque - bias for torque, bias in told])
 
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+    def _factor(self, joint: int, values: Array) -> float:
+        return 1.0 + float(values[self.index("torque_constant", joint)])
+
+    def _inside(self, joint: int, values: Array) -> Array:
+        """(N,) torque that the model says, before the torque constant and the offset."""
+        told = self._columns[joint]["nominal"].copy()
+        for p in self.own(joint, values != 0.0):
+            if self.parameters[p].number not in ("torque_constant", "offset"):
+                told += values[p] * self._columns[joint][self.parameters[p].number]
+        return told
+
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
-        columns, own, found = self._columns[joint], self.own(joint, wanted), []
-        constant = self.index("torque_constant", joint)
-        factor = 1.0 + (values[constant] if constant is not None else 0.0)
-        left = self.residuals(joint, values[None])[0]
-        measured = self._measured[self._used[joint], joint]
-        offset = self.index("offset", joint)
-        inside = (measured - left - (values[offset] if offset is not None else 0.0)) / factor
-        for p in own:
-            number = self.parameters[p].number
-            if number == "torque_constant":
-                found.append(inside)
-            else:
-                found.append(columns[number] * (1.0 if number == "offset" else factor))
-        derivative = np.stack(found, axis=1) if found else np.zeros((len(left), 0))
+        own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
+        columns = {name: column * factor for name, column in self._columns[joint].items()}
+        columns |= {"offset": np.ones(len(left)), "torque_constant": self._inside(joint, values)}
+        derivative = np.array([columns[self.parameters[p].number] for p in own]).reshape(len(own), len(left)).T
         return Rows(left, derivative, own, self.motion_of(joint))
-
-    def start(self) -> Array:
-        """(P,) values from which all effects are fitted: the problem is nearly linear."""
-        return np.zeros(len(self.parameters))
 
     def refreshed(self, values: Array) -> None:
         """Nothing: loads are those of the measured motion."""
@@ -173,16 +153,13 @@ class TorqueModel(JointModel):
             "time": self._time[rows],
         }
 
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """Measured and modelled torques at the readings of a joint."""
-        left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        rows = self._used[joint]
-        measured = self._measured[rows, joint]
+    def drawn(self, joint: int) -> dict[str, Array]:
+        """(N,) number of the motion, time, s, position, rad, and load and measured torque, N·m, by name."""
+        rows, load = self._used[joint], self._loads.torque[0, :, joint]
+        own = self._motion, self._time, self._q[:, joint], load, self._measured[:, joint]
         return {
-            "motion": self._motion[rows], "time": self._time[rows], "command": self._q[rows, joint],
-            "measured": measured, "nominal": measured - left[0], "simulated": measured - left[1],
-            "load": self._loads.torque[0, rows, joint],
-        }  # fmt: skip
+            name: one[rows] for name, one in zip(("motion", "time", "command", "load", "measured"), own, strict=True)
+        }
 
 
 def _sums(labels: NDArray[np.int64], values: Array) -> Array:
