@@ -17,13 +17,15 @@ from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.model import SHARED, JointModel, ServoModel
+from thermal_robot.motion.model import JointModel, ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
 from thermal_robot.motion.torque import TorqueModel
 
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
+_NEEDS = {"kp": "servo.kp", "droop": "a servo whose kp is not stated"}
+_NEEDS |= dict.fromkeys(("payload", "contact"), "masses in the URDF") | dict.fromkeys((*TORQUE_TITLES, "masses"), "tau")
 
 
 def diagnose_motion(
@@ -131,11 +133,7 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     verdict = tuple(one.name for one in findings if told and one.status in ("found", "confounded"))
     best = {model.parameters[b].effect for b in choice.best.blocks}
     probability = choice.probability(lambda blocks: {model.parameters[b].effect for b in blocks} == best)
-    values = {
-        (one.effect, "" if one.joint == SHARED else log.joints[one.joint]): float(point.values[p])
-        for p, one in enumerate(model.parameters)
-        if choice.active[p]
-    }
+    values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
     curves = {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, probability, left, values, curves,
@@ -171,41 +169,24 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     own = [p for p, one in enumerate(model.parameters) if one.effect == name]
     title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
     if not own:
-        return Finding(name, "not_testable", title=title, needs=_needs(name))
+        return Finding(name, "not_testable", title=title, needs=(_NEEDS.get(name, "cmd"),))
     active = [p for p in own if choice.active[p]]
     probability = max(choice.probability(lambda blocks, p=p: p in blocks) for p in own)
     if not active:
         return Finding(name, "not_found", probability, 0.0, title=title)
     rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
-    names, parameters = model.log.joints, [model.parameters[p] for p in active]
-    joints = [() if one.joint == SHARED else (names[one.joint],) for one in parameters]
-    values, stds, shares = (
-        choice.point.values[active].tolist(),
-        deviations[active].tolist(),
-        [share[p].sum() for p in active],
-    )
-    places = [Location("joint", *place, float(size)) for place, size in zip(joints, shares, strict=True) if place]
-    estimates = tuple(
-        Estimate(", ".join((one.label, *place)), value, std, one.unit, True)
-        for one, place, value, std in zip(parameters, joints, values, stds, strict=True)
-    )
+    places, estimates = [], []
+    for p, one, joint in ((p, model.parameters[p], model.keys[p][1]) for p in active):
+        called = f"{one.label}, {joint}" if joint else one.label
+        estimates.append(Estimate(called, float(choice.point.values[p]), float(deviations[p]), one.unit, True))
+        places += [Location("joint", joint, float(share[p].sum()))] if joint else []
     status: Status = "confounded" if rivals and probability < settings.SURE else "found"
+    total = float(sum(share[p].sum() for p in active))
     return Finding(
-        name, status, probability, float(sum(shares)), parameters=estimates, title=title,
+        name, status, probability, total, parameters=tuple(estimates), title=title,
         confounded_with=tuple(sorted(rivals)) if status == "confounded" else (),
         locations=tuple(sorted(places, key=lambda one: -one.share)),
     )  # fmt: skip
-
-
-def _needs(name: str) -> tuple[str, ...]:
-    if name in TORQUE_TITLES or name == "masses":
-        return ("tau",)
-    return {
-        "kp": ("servo.kp",),
-        "droop": ("a servo whose kp is not stated",),
-        "payload": ("masses in the URDF",),
-        "contact": ("masses in the URDF",),
-    }.get(name, ("cmd",))
 
 
 def _unexplained(choice: Choice) -> Unexplained:
@@ -223,7 +204,7 @@ def _unexplained(choice: Choice) -> Unexplained:
     places = tuple(Location("joint", model.log.joints[j], gain) for gain, _, j in flagged[:3])
     reason = f"{100.0 * places[0].share:.0f} % of what remains in {places[0].name} follows {flagged[0][1]}"
     follows = dict.fromkeys(name for _, name, _ in flagged)
-    remains = rms(np.array([rms(one.residual) for one in rows]))
+    remains = rms([rms(one.residual) for one in rows])
     return Unexplained(True, remains, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
 
 

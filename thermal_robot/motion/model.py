@@ -87,6 +87,11 @@ class JointModel(ABC):
         place = np.arange(len(motion)) - (np.cumsum(counts) - counts)[motion]
         return np.asarray(motion * self.pieces + place * self.pieces // np.maximum(counts[motion], 1))
 
+    @cached_property
+    def keys(self) -> list[tuple[str, str]]:
+        """Effect and joint of each parameter, the joint empty where all share it."""
+        return [(one.effect, "" if one.joint == SHARED else self.log.joints[one.joint]) for one in self.parameters]
+
     def index(self, effect: str, joint: int = SHARED) -> int | None:
         """Return the place of a parameter, ``None`` where the model has none of it."""
         found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
@@ -141,7 +146,9 @@ class JointModel(ABC):
         import pandas as pd
 
         drawn, left = self.drawn(joint), self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        return pd.DataFrame(drawn | {"nominal": drawn["measured"] - left[0], "simulated": drawn["measured"] - left[1]})
+        drawn |= {"nominal": drawn["measured"] - left[0], "simulated": drawn["measured"] - left[1]}
+        drawn["load"] = drawn.pop("load")  # stands last
+        return pd.DataFrame(drawn)
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
         """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.

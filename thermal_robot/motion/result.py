@@ -212,13 +212,8 @@ class MotionDiagnosis(RenderedPage):
         import pandas as pd
 
         told = {
-            name: pd.DataFrame(
-                {
-                    "motion": one["motion"],
-                    "time": one["time"],
-                    "gap": one["measured"] - one["nominal"],
-                    "remainder": one["measured"] - one["simulated"],
-                }
+            name: one[["motion", "time"]].assign(
+                gap=one["measured"] - one["nominal"], remainder=one["measured"] - one["simulated"]
             )
             for name, one in self.curves.items()
         }

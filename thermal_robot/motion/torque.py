@@ -96,28 +96,27 @@ class TorqueModel(JointModel):
 
     def residuals(self, joint: int, values: Array) -> Array:
         """(S, N) measured torque minus the model's, N·m."""
-        measured, offset = self._measured[self._used[joint], joint], self.index("offset", joint)
-        told = ((self._factor(joint, one) * self._inside(joint, one), one[offset]) for one in values)
-        return np.array([measured - torque - bias for torque, bias in told])
+        columns, found = self._columns[joint], []
+        for one in values:
+            told = columns["nominal"].copy()
+            for p in self.own(joint, one != 0.0):
+                if self.parameters[p].number in columns:
+                    told += one[p] * columns[self.parameters[p].number]
+            bias = one[self.index("offset", joint)]
+            found.append(self._measured[self._used[joint], joint] - self._factor(joint, one) * told - bias)
+        return np.array(found)
 
     def _factor(self, joint: int, values: Array) -> float:
         return 1.0 + float(values[self.index("torque_constant", joint)])
 
-    def _inside(self, joint: int, values: Array) -> Array:
-        """(N,) torque that the model says, before the torque constant and the offset."""
-        told = self._columns[joint]["nominal"].copy()
-        for p in self.own(joint, values != 0.0):
-            if self.parameters[p].number not in ("torque_constant", "offset"):
-                told += values[p] * self._columns[joint][self.parameters[p].number]
-        return told
-
     def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
         own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
+        bare = self._measured[self._used[joint], joint] - left - values[self.index("offset", joint)]
         columns = {name: column * factor for name, column in self._columns[joint].items()}
-        columns |= {"offset": np.ones(len(left)), "torque_constant": self._inside(joint, values)}
-        derivative = np.array([columns[self.parameters[p].number] for p in own]).reshape(len(own), len(left)).T
-        return Rows(left, derivative, own, self.motion_of(joint))
+        columns |= {"offset": np.ones(len(left)), "torque_constant": bare / factor}
+        derivative = np.array([columns[self.parameters[p].number] for p in own]).reshape(len(own), len(left))
+        return Rows(left, np.ascontiguousarray(derivative.T), own, self.motion_of(joint))
 
     def refreshed(self, values: Array) -> None:
         """Nothing: loads are those of the measured motion."""
