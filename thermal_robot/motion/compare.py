@@ -140,25 +140,20 @@ def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequ
         raise CampaignError("compare()", "the logs have no joint in common", found=found, expected="one robot")
     own = (first.log.name or "first", second.log.name or "second")
     called = tuple(names) or (own if own[0] != own[1] else (f"{own[0]} (1)", f"{own[1]} (2)"))
-    told = [_rendered(one) for one in (first, second)]
+    told: list[dict[tuple[str, str, str, str], Estimate]] = [
+        {(told.name, one.name, one.unit, d.joint_of(one)): one for told in d.shown for one in d.physical(told.name)}
+        for d in (first, second)
+    ]
     keys = dict.fromkeys(key for one in told for key in one)
     parameters = [_compared(key, [one.get(key) for one in told], (first, second)) for key in keys]
     parameters.sort(key=lambda one: -abs(one.z or 0.0))
     return MotionComparison((called[0], called[1]), tuple(parameters), first.log.robot.name, first.few or second.few)
 
 
-def _rendered(d: MotionDiagnosis) -> dict[tuple[str, str, str, str], Estimate]:
-    """Return what is shown, by effect, name (its joint in it), unit and joint."""
-    return {
-        (finding.name, one.name, one.unit, d.joint_of(one)): one
-        for finding in d.shown
-        for one in d.physical(finding.name)
-    }
-
-
 def _compared(
     key: tuple[str, str, str, str], pair: list[Estimate | None], both: tuple[MotionDiagnosis, MotionDiagnosis]
 ) -> Compared:
+    """Compare a parameter, by effect, name (its joint in it), unit and joint."""
     effect, name, unit, joint = key
     (before, std_before), (after, std_after) = ((one.value, one.std) if one else (None, None) for one in pair)
     title = (both[0] if pair[0] else both[1]).title(effect, joint)

@@ -12,12 +12,13 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Status, Unexplained
 from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.model import JointModel, ServoModel
+from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
@@ -119,8 +120,10 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
         for j, name in enumerate(log.joints)
     }
     weights = 1.0 / np.array([max(len(one), 1) for one in before])
-    square = np.array([_by_motion(model, one, weights) for one in (before, held)])
-    count = square.shape[1]
+    square, count = np.zeros((2, model.clusters)), model.clusters  # sums by motion, readings of each joint weighing one
+    for row, left in zip(square, (before, held), strict=True):
+        for j in model.joints:
+            row += weights[j] * np.bincount(model.motion_of(j), left[j] ** 2, count)
     drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(0, count, (settings.BOOTSTRAPS, count))
     sums = np.stack([square.sum(axis=1), *square[:, drawn].sum(axis=2).T])  # of all motions, then of those drawn
     shrinkage, *others = 1.0 - sums[:, 1] / np.maximum(sums[:, 0], 1e-300)
@@ -128,23 +131,19 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     total = np.sqrt(sums[0] / len(before)).tolist()
     held_out = HeldOut("motion", folds, total[0], total[1], float(shrinkage), (low, high))
     findings, shares = _findings(choice, before, weights)
-    left = _unexplained(choice)
-    told = not left.flagged or shrinkage >= settings.MOST
+    unexplained = _unexplained(choice)
+    told = not unexplained.flagged or shrinkage >= settings.MOST
     verdict = tuple(one.name for one in findings if told and one.status in ("found", "confounded"))
+    weights_of = zip(*choice.search.probabilities(), strict=True)
+    names = [({model.parameters[b].effect for b in one.blocks}, weight) for one, weight in weights_of]
     best = {model.parameters[b].effect for b in choice.best.blocks}
-    probability = choice.probability(lambda blocks: {model.parameters[b].effect for b in blocks} == best)
+    probability = total_probability([weight for effects, weight in names if effects == best])
     values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
     curves = {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}
     return MotionDiagnosis(
-        log, joints, held_out, findings, verdict, probability, left, values, curves,
+        log, joints, held_out, findings, verdict, probability, unexplained, values, curves,
         warnings=log.notes, shares=shares, unit=model.unit, moves=model.moves(point.values),
     )  # fmt: skip
-
-
-def _by_motion(model: JointModel, residuals: list[Array], weights: Array) -> Array:
-    """(M,) sums of squares of all joints by motion, each joint's readings weighing one together."""
-    own = zip(model.joints, residuals, weights, strict=True)
-    return np.asarray(sum(w * np.bincount(model.motion_of(j), one**2, model.clusters) for j, one, w in own))
 
 
 def _findings(choice: Choice, before: list[Array], weights: Array) -> tuple[tuple[Finding, ...], dict[str, float]]:
@@ -171,7 +170,7 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     if not own:
         return Finding(name, "not_testable", title=title, needs=(_NEEDS.get(name, "cmd"),))
     active = [p for p in own if choice.active[p]]
-    probability = max(choice.probability(lambda blocks, p=p: p in blocks) for p in own)
+    probability = max(choice.probability(p) for p in own)
     if not active:
         return Finding(name, "not_found", probability, 0.0, title=title)
     rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}

@@ -341,7 +341,7 @@ def import_motion(
     }
     fitted = fitted_sections(KINDS, sections)
     held = sources(tables, fitted.get("channels", {}))
-    log = build_motions(tables, held, Declaration.stated(directory.resolve().name, fitted), loaded)
+    log = build_motions(tables, held, Declaration.stated(directory.resolve().name, fitted, {}), loaded)
     origin = f"{IMPORTED} {format}` from {listed(map(str, files))}."
     texts = {ROBOT_NAME: loaded.urdf, FILE_NAME: f"# {' '.join(origin.split())}\n{tomli_w.dumps(sections)}"}
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -61,8 +62,9 @@ class Motion:
 
     def with_channels(self, names: Iterable[str], change: Callable[[Channel], Channel]) -> Motion:
         """Return the motion with channels changed, by the names of their fields; those that are not there stay so."""
-        held = ((name, getattr(self, name)) for name in names)
-        return replace(self, **{name: change(channel) for name, channel in held if channel is not None})
+        held = {name: getattr(self, name) for name in names}
+        changed: dict[str, Any] = {name: change(channel) for name, channel in held.items() if channel is not None}
+        return replace(self, **changed)
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,7 @@ class JointModel(ABC):
     """What all models of a log's joints share: parameters by name, and work on several joints at a time."""
 
     parameters: tuple[Parameter, ...] = ()
+    motions: list[NDArray[np.int64]]  # of each joint the motions (N,) of its readings
     unit = "rad"
 
     def __init__(self, log: MotionLog) -> None:
@@ -126,29 +127,34 @@ class JointModel(ABC):
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
 
     @abstractmethod
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
-
-    @abstractmethod
     def noise(self, joint: int) -> float:
         """One sigma of the readings of a joint."""
 
     @abstractmethod
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what the residual of a joint may follow, by name."""
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) what the residual of a joint may follow: position, velocity, load and time."""
 
     @abstractmethod
-    def drawn(self, joint: int) -> dict[str, Array]:
-        """(N,) what is drawn of the readings of a joint, by name: motion, time, command, load and what was measured."""
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, command, what was measured, and load, at the readings of a joint."""
+
+    def motion_of(self, joint: int) -> NDArray[np.int64]:
+        """(N,) number of the cluster of each reading of a joint."""
+        return self.cluster_of(self.motions[joint])
+
+    def quantities(self, joint: int) -> dict[str, Array]:
+        """(N,) what the residual of a joint may follow, by name."""
+        names = f"the position of {self.log.joints[joint]}", "velocity", "load", "time"
+        return dict(zip(names, self.followed(joint), strict=True))
 
     def curves(self, joint: int, values: Array) -> pd.DataFrame:
-        """Table of what is drawn of a joint, with what is simulated of it, ``nominal`` without any effect."""
+        """Table of what is drawn of a joint; ``nominal`` is simulated without any effect."""
         import pandas as pd
 
-        drawn, left = self.drawn(joint), self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        drawn |= {"nominal": drawn["measured"] - left[0], "simulated": drawn["measured"] - left[1]}
-        drawn["load"] = drawn.pop("load")  # stands last
-        return pd.DataFrame(drawn)
+        time, command, measured, load = self.drawn(joint)
+        nominal, simulated = measured - self.residuals(joint, np.stack([np.zeros_like(values), values]))
+        given = {"motion": self.motions[joint], "time": time, "command": command, "measured": measured}
+        return pd.DataFrame({**given, "nominal": nominal, "simulated": simulated, "load": load})
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
         """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.
@@ -195,6 +201,7 @@ class ServoModel(JointModel):
         self.loads = self.dynamics.along(self.about)
         self.moving = False
         self.lowest = float(self._heights(self.commanded)[0].min())
+        self.motions = [samples[3] for samples in self._samples]
         self.parameters = self._parameters()
         self._press(np.zeros(len(self.parameters)))
 
@@ -314,9 +321,8 @@ class ServoModel(JointModel):
         """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free`` of any contact."""
         numbers, weights = self.numbers(joint, values)
         parts = self.loads.torque[:2, :, joint]
-        contact = np.zeros_like(self.contact) if free else self.contact
-        pressing = 0.0 if free else self.pressing[:, joint]
-        loads = np.stack([parts[0] + pressing, parts[1], contact[:, joint]])
+        contact, pressing = (0.0 if free else 1.0) * np.stack([self.contact[:, joint], self.pressing[:, joint]])
+        loads = np.stack([parts[0] + pressing, parts[1], contact])
         inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
         around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
         begun = [motion.position.of(joint)[1][0] for motion in self.log.motions]
@@ -340,31 +346,26 @@ class ServoModel(JointModel):
         found = self.residuals(joint, sets)
         return Rows(found[0], (found[0] - found[1:]).T / steps, own, self.motion_of(joint))
 
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
-        return self.cluster_of(self._samples[joint][3])
-
     def noise(self, joint: int) -> float:
         """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""
         steps = np.abs(np.diff(np.unique(np.round(self._samples[joint][0], 9))))
         return max(float(np.median(steps)) / np.sqrt(12.0) if len(steps) else 0.0, settings.LEAST_NOISE)
 
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what a joint's residual may follow, at its readings: position, velocity, load and time."""
-        _, at, _, motion = self._samples[joint]
-        return {
-            f"the position of {self.log.joints[joint]}": self.about[at, joint],
-            "velocity": np.gradient(self.about[:, joint], self.step)[at],
-            "load": self.loads.torque[0, at, joint],
-            "time": self.grid[at] - self.first[motion],
-        }
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) position, velocity, load and time at the step before each reading."""
+        (_, at, _, motion), velocity = self._samples[joint], np.gradient(self.about[:, joint], self.step)
+        return self.about[at, joint], velocity[at], self.loads.torque[0, at, joint], self.grid[at] - self.first[motion]
 
-    def drawn(self, joint: int) -> dict[str, Array]:
-        """(N,) number of the motion, time, s, command and measured position, rad, and load, N·m, by name."""
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, s, command and measured position, rad, and load, N·m."""
         measured, at, beyond, motion = self._samples[joint]
         time = self.grid[at] + beyond * self.step - self.first[motion]
-        command, load = self.commanded[np.where(beyond > 0.5, at + 1, at), joint], self.loads.torque[0, at, joint]
-        return {"motion": motion, "time": time, "command": command, "load": load, "measured": measured}
+        return (
+            time,
+            self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
+            measured,
+            self.loads.torque[0, at, joint],
+        )
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.
@@ -386,13 +387,13 @@ class ServoModel(JointModel):
 
     def _loads(self, about: Array) -> Loads:
         """Return the loads along positions (n, J) on the grid; those of their motion where coupled."""
-        speed = rate = None
-        if self.coupled:
-            speed, rate = np.zeros_like(about), np.zeros_like(about)
-            for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
-                if b - a > 2:
-                    speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
-                    rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
+        if not self.coupled:
+            return self.dynamics.along(about)
+        speed, rate = np.zeros_like(about), np.zeros_like(about)
+        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+            if b - a > 2:
+                speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
+                rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
         return self.dynamics.along(about, speed, rate)
 
     def _press(self, values: Array) -> None:

@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,22 +71,22 @@ class Declaration:
     """What motion.toml says of its tables, or a call; lengths of the payload in m, the rest of the servo in SI."""
 
     name: str
-    units: Units = field(default_factory=Units)
-    labels: Mapping[str, str] = field(default_factory=dict)  # columns of time, motion and kind, where stated
-    channels: Mapping[str, Stated] = field(default_factory=dict)
-    servos: Mapping[str, Servo] = field(default_factory=dict)
-    payload: tuple[float, Array] | None = None
-    tolerance: Mapping[str, float] = field(default_factory=dict)
-    about: Mapping[str, str] = field(default_factory=dict)
+    units: Units
+    labels: Mapping[str, str]  # columns of time, motion and kind, where stated
+    channels: Mapping[str, Stated]
+    servos: Mapping[str, Servo]
+    payload: tuple[float, Array] | None
+    tolerance: Mapping[str, float]
+    about: Mapping[str, str]
 
     @classmethod
-    def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]]) -> Declaration:
-        """Return what sections of motion.toml say."""
+    def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]], servos: Mapping[str, Servo]) -> Declaration:
+        """Return what sections of motion.toml say, and of servos what is known beside them."""
         motion, payload = sections["motion"], sections.get("payload", {})
         units = Units(motion["angle_unit"], motion.get("length_unit", "m"))
         com = np.array(payload.get("com", (0.0, 0.0, 0.0))) * units.length_scale
         labels = {key: motion[key] for key in ("time", "motion", "kind") if motion.get(key)}
-        servos = {joint: Servo(**said) for joint, said in sections.get("servo", {}).items()}
+        servos = {**servos, **{joint: Servo(**said) for joint, said in sections.get("servo", {}).items()}}
         held = (payload["mass"], com) if "mass" in payload else None
         channels, tolerance, about = (sections.get(key, {}) for key in ("channels", "tolerance", "about"))
         return cls(name, units, labels, channels, servos, held, tolerance, about)
@@ -133,10 +133,9 @@ def read_motion(path: str | Path, *, folder: str | Path | None = None) -> Motion
     file, base, document, logs = _declared(path, folder)
     document.required("motion", "angle_unit")
     tables = [read_table(each) for each in logs]
-    declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections)
-    held = sources(tables, declaration.channels)
+    held = sources(tables, document.sections.get("channels", {}))
     robot, servos = robot_of(document.sections.get("robot", {}), file, base, joints_of(held))
-    declaration = replace(declaration, servos={**servos, **declaration.servos})
+    declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections, servos)
     for section in ("servo", "tolerance"):
         lines = {joint: document.row(section, joint) for joint in document.sections.get(section, {})}
         check_joints(str(file), section, lines, robot.joint_names, lines)
@@ -255,16 +254,13 @@ def motion_from_table(
     for frame in frames:
         require(f"{call}, table", frame, (pd.DataFrame,), "pandas DataFrames")
     tables = [table_from_frame(f, "<table>" if len(frames) == 1 else f"<table {k}>") for k, f in enumerate(frames)]
-    units = Units(angle_unit, length_unit)
-    declaration = Declaration(
-        given(call, "name", name, text(empty=True)),
-        units,
-        {key: column for key, column in (("time", time), ("motion", motion), ("kind", kind)) if column},
-        given(call, "channels", channels or {}, channels_kind),
-        dict(servos or {}),
-        None if payload is None else (float(payload[0]), np.array(payload[1], dtype=float) * units.length_scale),
-        given(call, "tolerance", tolerance or {}, TOLERANCE),
-    )
+    sections = {
+        "motion": {"angle_unit": angle_unit, "length_unit": length_unit, "time": time, "motion": motion, "kind": kind},
+        "channels": given(call, "channels", channels or {}, channels_kind),
+        "payload": {} if payload is None else {"mass": float(payload[0]), "com": payload[1]},
+        "tolerance": given(call, "tolerance", tolerance or {}, TOLERANCE),
+    }
+    declaration = Declaration.stated(given(call, "name", name, text(empty=True)), sections, servos or {})
     for key, named in (("servos", declaration.servos), ("tolerance", declaration.tolerance)):
         check_joints(call, key, named, robot.joint_names)
     return build_motions(tables, sources(tables, declaration.channels), declaration, robot)
@@ -386,8 +382,8 @@ def _in_order(
         raise table.error("rows are out of order, or two motions have one label", column, at, **told)
     kept = np.ones(len(time), dtype=bool)
     kept[rows[1:][same & (step == 0.0)]] = False
-    told = f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before"
-    return kept, () if kept.all() else (told,)
+    said = f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before"
+    return kept, () if kept.all() else (said,)
 
 
 def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion: NDArray[np.int64]) -> dict[str, str]:
@@ -467,13 +463,18 @@ def _motions(label: str, kind: str, parts: Mapping[str, Channel | None], notes: 
         notes.append(f"motion {label!r} is interrupted {len(breaks)} times and counts as {len(breaks) + 1}")
     for k, (begin, end) in enumerate(itertools.pairwise(edges)):
         name = label if k == 0 else f"{label} ({k + 1})"
-        inside = {key: slice(*np.searchsorted(c.time, [begin, end])) for key, c in parts.items() if c is not None}
-        own = {key: rows for key, rows in inside.items() if rows.stop > rows.start}
-        if any(key not in own or own[key].stop - own[key].start < FEWEST_SAMPLES for key in ("command", "position")):
+        cut = {key: _cut(channel, begin, end) for key, channel in parts.items() if channel is not None}
+        own = {key: channel for key, channel in cut.items() if len(channel.time)}
+        if any(key not in own or len(own[key].time) < FEWEST_SAMPLES for key in ("command", "position")):
             notes.append(f"motion {name!r} has fewer than {FEWEST_SAMPLES} samples and is left out")
             continue
-        zero = min(float(parts[key].time[rows.start]) for key, rows in own.items())
-        began = {key: _frozen(parts[key].time[rows] - zero, parts[key].values[rows]) for key, rows in own.items()}
+        zero = min(float(channel.time[0]) for channel in own.values())
+        began = {key: _frozen(channel.time - zero, channel.values) for key, channel in own.items()}
         if parts["command"] is position:
             began["command"] = began["position"]
         yield Motion(name, kind, **{key: began.get(key) for key in FIELDS.values()})  # type: ignore[arg-type]
+
+
+def _cut(channel: Channel, begin: float, end: float) -> Channel:
+    inside = slice(*np.searchsorted(channel.time, [begin, end]))
+    return Channel(channel.time[inside], channel.values[inside])

@@ -277,13 +277,9 @@ class MotionDiagnosis(RenderedPage):
 
     def _left(self) -> dict[str, Any]:
         left = self.unexplained
-        return {
-            "rms": left.rms,
-            "p_value": left.p_value,
-            "reasons": left.reasons,
-            "locations": [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations],
-            "depends_on": [asdict(one) for one in left.depends_on],
-        }
+        places = [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations]
+        told = {"rms": left.rms, "p_value": left.p_value, "reasons": left.reasons, "locations": places}
+        return {**told, "depends_on": [asdict(one) for one in left.depends_on]}
 
     def __repr__(self) -> str:
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"

@@ -128,10 +128,8 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
 def _servo(model: Any, joint: int | None) -> int | None:
     """Return the number of the position actuator of a joint."""
     hinge = mujoco_or_error().mjtTrn.mjTRN_JOINT
-    for k in range(model.nu):
-        if model.actuator_trntype[k] == hinge and model.actuator_trnid[k, 0] == joint and model.actuator_biasprm[k, 1]:
-            return k
-    return None
+    at_joint = (model.actuator_trntype == hinge) & (model.actuator_trnid[:, 0] == joint)
+    return next(iter(np.flatnonzero(at_joint & (model.actuator_biasprm[:, 1] != 0.0)).tolist()), None)
 
 
 def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence[Any], held: list[int]) -> Array:

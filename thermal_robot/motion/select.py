@@ -36,14 +36,14 @@ class Choice:
     search: Search
     deflation: Array
 
-    def probability(self, has: Callable[[tuple[int, ...]], bool]) -> float:
-        """Posterior probability that the parameters at work are of a kind."""
+    def probability(self, block: int) -> float:
+        """Posterior probability that a parameter is at work."""
         found = zip(*self.search.probabilities(), strict=True)
-        return total_probability([weight for one, weight in found if has(one.blocks)])
+        return total_probability([weight for one, weight in found if block in one.blocks])
 
     def without(self, block: int) -> Mask:
         """(P,) parameters of the choice but one."""
-        return self.active & (np.arange(len(self.active)) != block)
+        return np.asarray(self.active & (np.arange(len(self.active)) != block))
 
     def odds(self, block: int) -> float:
         """Log odds of a parameter of the choice against nothing in its place."""

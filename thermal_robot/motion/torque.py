@@ -41,17 +41,14 @@ class TorqueModel(JointModel):
         self._inertial, self._bodies = self.dynamics.inertial(self._q, self._v, self._a), self.dynamics.bodies
         self._motion = np.repeat(np.arange(len(parts)), [len(one[0]) for one in parts])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
+        self.motions = [self._motion[rows] for rows in self._used]
         self.parameters = self._parameters()
 
-    def _limits(self) -> list[float]:
-        """Torque limits by joint, N·m, by which sizes are expected: as stated, else no less than the masses leave."""
-        left = np.abs(self._measured - self._loads.torque[0])
-        most = np.where(np.isfinite(left), left, 0.0).max(axis=0)
-        return [one.limit or max(settings.TORQUE_LIMIT, float(gap)) for one, gap in zip(self.servos, most, strict=True)]
-
     def _parameters(self) -> tuple[Parameter, ...]:
-        found, limits = [], self._limits()
-        for j, limit in enumerate(limits):
+        found, left = [], np.nan_to_num(np.abs(self._measured - self._loads.torque[0])).max(axis=0)
+        for j, servo in enumerate(self.servos):
+            # sizes go by the torque limit: as stated, else no less than the masses leave
+            limit = servo.limit or max(settings.TORQUE_LIMIT, float(left[j]))
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for name, label, unit, size, spread, positive in (
                 ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),
@@ -66,11 +63,10 @@ class TorqueModel(JointModel):
         if self.log.robot.has_masses:
             found.append(self.payload(self._loads.torque[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
-                for i, what in enumerate(_INERTIAL):
-                    size, unit = (0.1, "") if not i else (0.1 * numbers[0] * settings.LINK, "kg·m")
-                    size, unit = (size * settings.LINK, "kg·m²") if i > 3 else (size, unit)
-                    label = what.format(name)
-                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {10 * k + i}"))
+                first = 0.1 * numbers[0] * settings.LINK
+                known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
+                for i, (what, (size, unit)) in enumerate(zip(_INERTIAL, known, strict=True), 10 * k):
+                    found.append(Parameter("masses", SHARED, what.format(name), unit, size, 1.0, False, f"mass {i}"))
         return tuple(found)
 
     @cached_property
@@ -121,10 +117,6 @@ class TorqueModel(JointModel):
     def refreshed(self, values: Array) -> None:
         """Nothing: loads are those of the measured motion."""
 
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
-        return self.cluster_of(self._motion[self._used[joint]])
-
     def signs(self) -> tuple[Array, Array]:
         """Regression of the measured torques on the rigid-body model's: slope (J,) and its standard error.
 
@@ -142,23 +134,16 @@ class TorqueModel(JointModel):
         """One sigma of a joint's smoothed torque, N·m."""
         return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
 
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what a joint's residual may follow: position, velocity, load and time."""
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) position, velocity, load and time."""
         rows = self._used[joint]
-        return {
-            f"the position of {self.log.joints[joint]}": self._q[rows, joint],
-            "velocity": self._v[rows, joint],
-            "load": self._loads.torque[0, rows, joint],
-            "time": self._time[rows],
-        }
+        return self._q[rows, joint], self._v[rows, joint], self._loads.torque[0, rows, joint], self._time[rows]
 
-    def drawn(self, joint: int) -> dict[str, Array]:
-        """(N,) number of the motion, time, s, position, rad, and load and measured torque, N·m, by name."""
-        rows, load = self._used[joint], self._loads.torque[0, :, joint]
-        own = self._motion, self._time, self._q[:, joint], load, self._measured[:, joint]
-        return {
-            name: one[rows] for name, one in zip(("motion", "time", "command", "load", "measured"), own, strict=True)
-        }
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, s, position, rad, and measured torque and load, N·m."""
+        rows = self._used[joint]
+        load = self._loads.torque[0, rows, joint]
+        return self._time[rows], self._q[rows, joint], self._measured[rows, joint], load
 
 
 def _sums(labels: NDArray[np.int64], values: Array) -> Array:
