@@ -7,11 +7,10 @@ be undone is undone, and told; a joint whose readings are of no use is left out.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from thermal_robot.arrays import Array
@@ -20,6 +19,7 @@ from thermal_robot.motion import clocks, settings
 from thermal_robot.motion.columns import UNITS
 from thermal_robot.motion.following import Correlation, at, clusters, parts, slope, usual_step
 from thermal_robot.motion.log import Channel, Motion, MotionLog
+from thermal_robot.motion.model import Mask
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.torque import TorqueModel
 
@@ -99,13 +99,11 @@ def find_faults(log: MotionLog) -> Sound:
 
 
 _Checked = tuple[MotionLog, list[Fault], set[str]]
-Mask = NDArray[np.bool_]
 
 
-def _changed(log: MotionLog, channels: Iterable[str], values: Callable[[Array], Array]) -> MotionLog:
+def _changed(log: MotionLog, channels: Sequence[str], values: Callable[[Array], Array]) -> MotionLog:
     """Return the log with other values of channels, by their names."""
-    names = tuple(channels)
-    return log.with_motions(lambda motion: motion.with_channels(names, lambda c: Channel(c.time, values(c.values))))
+    return log.with_motions(lambda motion: motion.with_channels(channels, lambda c: Channel(c.time, values(c.values))))
 
 
 def _named(log: MotionLog, struck: Mask, what: str, size: Array, error: Array, told: str, *more: Array) -> list[Fault]:

@@ -103,8 +103,7 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
     folders = sorted({found.parent for file in files for found in file.rglob("control.csv")})
     if not folders:
         raise CampaignError(", ".join(map(str, files)), "no folder with control.csv", expected="folders of motions")
-    states: list[pd.DataFrame] = []
-    commands: list[pd.DataFrame] = []
+    parts: dict[str, list[pd.DataFrame]] = {"state.csv": [], "command.csv": []}
     for folder in folders:
         names = folder / "joint_list.txt"
         joints = names.read_text(encoding="utf-8").split() if is_file(names) else asked.robot.joint_names
@@ -114,8 +113,8 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
             at = dict(zip(events.text("event"), events.numbers("timestamp"), strict=True))
             begin, end = at.get("MOTION_START", begin), at.get("DISABLE", end)
         for name, quantities, kept in (
-            ("control.csv", {"positions": "cmd"}, commands),
-            ("state_motor.csv", {"positions": "q", "velocities": "qd", "torques": "torque"}, states),
+            ("control.csv", {"positions": "cmd"}, parts["command.csv"]),
+            ("state_motor.csv", {"positions": "q", "velocities": "qd", "torques": "torque"}, parts["state.csv"]),
         ):
             stamps, held = _lists(folder / name, list(quantities))
             time = stamps * (1e-6 if np.median(np.diff(stamps)) > 1.0 else 1.0)  # no log has a row a second
@@ -123,7 +122,7 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
             columns = [_named(quantities[k], joints, v[inside], str(folder / name)) for k, v in held.items()]
             kept.append(_frame(folder.name, time[inside], {k: v for each in columns for k, v in each.items()}))
     note = "torques are kept as torque.*, unread: robots differ in what they report; state it as tau under [channels]"
-    return Taken({"state.csv": states, "command.csv": commands}, "rad", (note,))
+    return Taken(parts, "rad", (note,))
 
 
 def _lerobot(files: Sequence[Path], asked: Asked) -> Taken:

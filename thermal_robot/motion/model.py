@@ -95,8 +95,7 @@ class JointModel(ABC):
 
     def index(self, effect: str, joint: int = SHARED) -> int | None:
         """Return the place of a parameter, ``None`` where the model has none of it."""
-        found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
-        return found[0] if found else None
+        return next((p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)), None)
 
     def own(self, joint: int, wanted: Mask | None = None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
@@ -207,8 +206,7 @@ class ServoModel(JointModel):
 
     def _grids(self) -> None:
         motions = self.log.motions
-        spacing = np.concatenate([np.diff(m.position.time) for m in motions])
-        self.step = float(np.median(spacing))
+        self.step = float(np.median(np.concatenate([np.diff(m.position.time) for m in motions])))
         if self.coupled:
             self.step /= max(1, int(np.ceil(self.step / settings.STEP)))
         self.substeps = max(1, int(np.ceil(self.step / settings.STEP)))

@@ -437,14 +437,10 @@ def _channel(
 
 def _merged(parts: Sequence[tuple[Array, Array]]) -> Channel:
     """Return the samples of one or several tables in the order of their stamps."""
-    if len(parts) == 1:
-        return _frozen(*parts[0])
-    time = np.unique(np.concatenate([stamps for stamps, _ in parts]))
-    values = np.full((len(time), parts[0][1].shape[1]), np.nan)
-    for stamps, own in parts:
-        at = np.searchsorted(time, stamps)
-        values[at] = np.where(np.isnan(own), values[at], own)
-    return _frozen(time, values)
+    import pandas as pd
+
+    merged = pd.concat([pd.DataFrame(values, index=stamps) for stamps, values in parts]).groupby(level=0).last()
+    return _frozen(merged.index.to_numpy(copy=True), merged.to_numpy(copy=True))
 
 
 def _frozen(time: Array, values: Array) -> Channel:

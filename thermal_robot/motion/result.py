@@ -12,9 +12,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import SCHEMA, estimate_table
 from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import EFFECTS
+from thermal_robot.motion.effects import EFFECTS, physical
 from thermal_robot.motion.log import MotionLog, joint_kinds
-from thermal_robot.motion.physical import physical
 from thermal_robot.renderer import RenderedPage, registered_renderer
 
 if TYPE_CHECKING:
@@ -252,17 +251,10 @@ class MotionDiagnosis(RenderedPage):
         return dict(jsonable(plain))
 
     def _campaign(self) -> dict[str, Any]:
-        return {
-            "name": self.log.name,
-            "robot": self.log.robot.name,
-            "tool_frame": self.log.robot.tool_frame,
-            "samples": sum(len(motion.position.time) for motion in self.log.motions),
-            "motions": len(self.log.motions),
-            "measures": "motion",
-            "outliers": [],
-            "faults": self.faults,
-            "warnings": self.warnings,
-        }
+        log, samples = self.log, sum(len(motion.position.time) for motion in self.log.motions)
+        plain = {"name": log.name, "robot": log.robot.name, "tool_frame": log.robot.tool_frame, "samples": samples}
+        plain |= {"motions": len(log.motions), "measures": "motion", "outliers": []}
+        return {**plain, "faults": self.faults, "warnings": self.warnings}
 
     def _gap(self) -> dict[str, Any]:
         return {

@@ -174,8 +174,7 @@ def _kept(choice: Choice) -> Mask:
         best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)
         whole, worst = held_out_loss(choice.point, active).sum(), None
         for block in best.blocks:
-            less = active.copy()
-            less[block] = False
+            less = active & (np.arange(len(active)) != block)
             odds = best.log_evidence - search.evaluate(np.flatnonzero(less).tolist(), best).log_evidence
             harm = whole - held_out_loss(choice.point, less).sum()
             if (odds < np.log(settings.ODDS) or harm > 0.0) and (worst is None or odds < worst[0]):

@@ -198,8 +198,13 @@ def _into_servo(spec: Any, cause: Cause, written: Written) -> None:
         actuator.forcelimited = mujoco_or_error().mjtLimited.mjLIMITED_TRUE
         actuator.forcerange = [-limit / abs(gear), limit / abs(gear)]
         _said(written, cause, "forcerange", limit, "N·m")
-    if "delay" in told:
-        _delay(actuator, float(spec.option.timestep), cause, written)
+    delay = cause.values.get("delay", 0.0)
+    if "delay" in told and hasattr(actuator, "delay"):  # with the samples that MuJoCo keeps for it
+        actuator.delay, actuator.nsample = delay, int(np.ceil(delay / float(spec.option.timestep))) + 1
+        _said(written, cause, "delay", delay, "s")
+    elif "delay" in told:
+        reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
+        written.kept.append(f"delay of {cause.name}: {reason}")
 
 
 def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
@@ -213,17 +218,6 @@ def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
     actuator.set_to_position(kp=1.0)
     written.held.append(f"a position actuator of {cause.name}, which had none")
     return actuator
-
-
-def _delay(actuator: Any, step: float, cause: Cause, written: Written) -> None:
-    """Give an actuator the delay of its command, with the samples that MuJoCo keeps for it."""
-    delay = cause.values["delay"]
-    if hasattr(actuator, "delay"):
-        actuator.delay, actuator.nsample = delay, int(np.ceil(delay / step)) + 1
-        _said(written, cause, "delay", delay, "s")
-    else:
-        reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
-        written.kept.append(f"delay of {cause.name}: {reason}")
 
 
 def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
