@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from motion.arms import robot
+from motion.arms import COUNT, robot
 
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
 from thermal_robot.motion import Channel, Motion, MotionLog, Servo, motion_from_table
@@ -16,7 +16,7 @@ from thermal_robot.motion.model import SHARED, ServoModel
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms, with_summary
 
 JOINTS = ("joint_2", "joint_3")
-STEP, SECONDS, COUNT = 0.02, 8.0, 2 * np.pi / 4096
+STEP, SECONDS = 0.02, 8.0
 TRUE = {
     ("lag", "joint_2"): 0.06,
     ("lag", "joint_3"): 0.08,

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from motion import arms
+from motion.arms import COUNT
 
 pytest.importorskip("numba", reason="the extra fast is not installed")
 
@@ -13,8 +14,6 @@ from thermal_robot.motion.fit import Point, deflated, fit, ratios
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
 from thermal_robot.motion.select import held_out_loss
-
-COUNT = 2 * np.pi / 4096
 
 
 def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT):

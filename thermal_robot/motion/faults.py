@@ -196,10 +196,8 @@ def _turned(log: MotionLog, joints: Mask, *channels: str) -> MotionLog:
 def _gains(log: MotionLog) -> _Checked:
     """Compare the units of position and command by the sizes of the moves that follow."""
     pieces = [Correlation.of(moves) for moves in clusters(log)]
-    commanded, measured, explained = (
-        np.stack([values + _TINY for values in each])
-        for each in zip(*((p.commanded, p.measured, np.diag(p.explained)) for p in pieces), strict=True)
-    )
+    each = np.array([(piece.commanded, piece.measured, np.diag(piece.explained)) for piece in pieces]) + _TINY
+    commanded, measured, explained = each.swapaxes(0, 1)
     follows = (explained > settings.FOLLOWS * measured) & (commanded > 1e3 * _TINY)
     sizes = np.where(follows, 0.5 * np.log(measured / commanded), 0.0)
     middle, error = slope(follows.astype(float), sizes)

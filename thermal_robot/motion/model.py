@@ -260,10 +260,8 @@ class ServoModel(JointModel):
         ]
         if self.log.robot.has_masses:
             height = "height above the lowest command"
-            found += (
-                self.payload(self.loads.torque[1]),
-                Parameter("contact", SHARED, height, "m", 0.1, 1.5, True, "contact"),
-            )
+            found.append(self.payload(self.loads.torque[1]))
+            found.append(Parameter("contact", SHARED, height, "m", 0.1, 1.5, True, "contact"))
         return tuple(found)
 
     def start(self) -> Array:
@@ -357,13 +355,8 @@ class ServoModel(JointModel):
     def drawn(self, joint: int) -> tuple[Array, ...]:
         """(N,) time, s, command and measured position, rad, and load, N·m."""
         measured, at, beyond, motion = self._samples[joint]
-        time = self.grid[at] + beyond * self.step - self.first[motion]
-        return (
-            time,
-            self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
-            measured,
-            self.loads.torque[0, at, joint],
-        )
+        time, near = self.grid[at] + beyond * self.step - self.first[motion], np.where(beyond > 0.5, at + 1, at)
+        return time, self.commanded[near, joint], measured, self.loads.torque[0, at, joint]
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.

@@ -210,15 +210,12 @@ class MotionDiagnosis(RenderedPage):
         """
         import pandas as pd
 
-        told = {
-            name: one[["motion", "time"]].assign(
-                gap=one["measured"] - one["nominal"], remainder=one["measured"] - one["simulated"]
-            )
-            for name, one in self.curves.items()
-        }
-        if not told:
+        if not self.curves:
             return pd.DataFrame(columns=["gap", "remainder"])
-        return pd.concat(told, names=["joint"]).set_index(["motion", "time"], append=True).droplevel(1)
+        whole = pd.concat(dict(self.curves), names=["joint"]).set_index(["motion", "time"], append=True).droplevel(1)
+        return pd.DataFrame(
+            {"gap": whole["measured"] - whole["nominal"], "remainder": whole["measured"] - whole["simulated"]}
+        )
 
     @property
     def gaps(self) -> pd.DataFrame:
