@@ -109,10 +109,11 @@ class TorqueModel(JointModel):
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
         own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
         bare = self._measured[self._used[joint], joint] - left - values[self.index("offset", joint)]
-        columns = {name: column * factor for name, column in self._columns[joint].items()}
-        columns |= {"offset": np.ones(len(left)), "torque_constant": bare / factor}
-        derivative = np.array([columns[self.parameters[p].number] for p in own]).reshape(len(own), len(left))
-        return Rows(left, np.ascontiguousarray(derivative.T), own, self.motion_of(joint))
+        apart, columns = {"offset": np.ones(len(left)), "torque_constant": bare / factor}, self._columns[joint]
+        numbers = [self.parameters[p].number for p in own]
+        found = [apart[name] if name in apart else columns[name] * factor for name in numbers]
+        derivative = np.ascontiguousarray(np.reshape(found, (len(own), len(left))).T)
+        return Rows(left, derivative, own, self.motion_of(joint))
 
     def refreshed(self, values: Array) -> None:
         """Nothing: loads are those of the measured motion."""
