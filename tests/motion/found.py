@@ -7,17 +7,16 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from motion.arms import robot
+from motion.arms import COUNT, robot
 
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Unexplained
 from thermal_robot.motion import Channel, Motion, MotionLog, Servo, motion_from_table
 from thermal_robot.motion.effects import EFFECTS, SHARED_TITLES, TITLES
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.moves import moves
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms, with_summary
 
 JOINTS = ("joint_2", "joint_3")
-STEP, SECONDS, COUNT = 0.02, 8.0, 2 * np.pi / 4096
+STEP, SECONDS = 0.02, 8.0
 TRUE = {
     ("lag", "joint_2"): 0.06,
     ("lag", "joint_3"): 0.08,
@@ -117,7 +116,7 @@ def found(stated=False, flagged=False, rivals=(), scale=1.0, seed=4):
     return with_summary(
         MotionDiagnosis(
             log, gaps, held, tuple(effects), verdict, 0.93, left, names, curves, {}, (), log.notes, (),
-            shares={"joint_2": 0.6, "joint_3": 0.35}, moves=moves(model, values),
+            shares={"joint_2": 0.6, "joint_3": 0.35}, moves=model.moves(values),
         )
     )  # fmt: skip
 

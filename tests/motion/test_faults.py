@@ -98,8 +98,6 @@ def test_late_stamps_of_even_samples_are_evened():
     state, command = tables(6)
     draw = np.random.default_rng(0)
     even = np.round(state.time / STEP) * STEP
-    values = {name: np.interp(even, state.time, state[name]) for name in ()}
-    state = state.assign(**values)
     for label in state.motion.unique():
         rows = state.motion == label
         own, grid = state.loc[rows, "time"].to_numpy(), even[rows].to_numpy()
@@ -178,6 +176,8 @@ def servo_arm(tmp_path_factory):
 
 
 def test_the_servo_arm_has_the_unit_fault_of_its_gripper_and_no_other(servo_arm):
+    assert len(servo_arm.motions) == 34
+    assert servo_arm.joints[-1] == "gripper"
     found = find_faults(servo_arm)
     assert [(fault.what, fault.joint) for fault in found.faults] == [("unit", "gripper")]
     assert found.faults[0].size == pytest.approx(1 / 2.33, abs=0.005)

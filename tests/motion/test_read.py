@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
-import pandas as pd
 import pytest
 from motion.arms import JOINTS, TOML, log, put, read, tables
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.motion import Servo, motion_from_table, read_motion
+from thermal_robot.motion import Servo, read_motion
 
 
 def test_a_log_of_two_files_keeps_the_stamps_of_each(tmp_path):
@@ -27,14 +23,9 @@ def test_a_log_of_two_files_keeps_the_stamps_of_each(tmp_path):
     assert one.velocity is not None
     assert one.torque is None
     assert found.notes == ()
+    for one, other in zip(found.motions, log(state, command).motions, strict=True):  # frames are read alike
+        np.testing.assert_allclose(one.velocity.values, other.velocity.values, atol=1e-12)
     assert repr(found) == f"<MotionLog {tmp_path.name!r}: 3 motions of 5 joints, 60 s>"
-
-
-def test_a_frame_and_a_file_are_read_alike(tmp_path):
-    from_file, from_frame = read(tmp_path), log(*tables(3))
-    for one, other in zip(from_file.motions, from_frame.motions, strict=True):
-        np.testing.assert_allclose(one.position.values, other.position.values, atol=1e-12)
-        np.testing.assert_allclose(one.velocity.time, other.velocity.time, atol=1e-12)
 
 
 def test_units_and_names_are_met_once():
@@ -174,18 +165,3 @@ def test_a_file_that_is_not_there_says_what_is(tmp_path):
     put(tmp_path)
     with pytest.raises(CampaignError, match=r"campaigns there: 'motion\.toml'"):
         read_motion(tmp_path / "motoin.toml")
-
-
-def test_the_real_log_of_a_servo_arm():
-    if "THERMAL_ROBOT_DATA" not in os.environ:
-        pytest.skip("THERMAL_ROBOT_DATA does not name the folder of the public campaigns")
-    folder = Path(os.environ["THERMAL_ROBOT_DATA"]) / "so101_motion"
-    pytest.importorskip("pyarrow", reason="Parquet files need pyarrow")
-    state, command = (pd.read_parquet(folder / f"{name}.parquet") for name in ("state", "command"))
-    from thermal_robot.robot import load_robot
-
-    arm = load_robot(folder / "robot.urdf", "moving_jaw_so101_v1")
-    found = motion_from_table(arm, [state, command])
-    assert len(found.motions) == 34
-    assert found.joints[-1] == "gripper"
-    assert sum(len(motion.position.time) for motion in found.motions) == len(state)

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+from scipy.stats import siegelslopes
 
 from thermal_robot.arrays import Array
-from thermal_robot.motion.following import Correlation, Moves, slope, usual_step
-from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog, with_channels
+from thermal_robot.motion.following import Correlation, Moves, slope
+from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog
 from thermal_robot.motion.settings import CLEAR, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
 
 _COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
@@ -21,8 +22,7 @@ _SIGMA = 1.4826  # standard deviation over median absolute deviation of a normal
 
 def reclocked(motion: Motion, clock: Callable[[Array], Array]) -> Motion:
     """Return a motion whose measured channels have other stamps, those of the command kept."""
-    named = {name: getattr(motion, name) for name in CHANNELS if name != "command"}
-    return with_channels(motion, {k: Channel(clock(c.time), c.values) for k, c in named.items() if c is not None})
+    return motion.with_channels(CHANNELS[1:], lambda channel: Channel(clock(channel.time), channel.values))
 
 
 def two_clocks(log: MotionLog) -> bool:
@@ -128,21 +128,19 @@ def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
     A reading before its command is no robot's; else a motion whose lag stands out from the others', once the lag that
     friction makes, an angle over a speed, is taken off.
     """
-    lags, slow, spread, names, steps = [], [], [], [], []
+    names, rows = [], []
     for motion in log.motions:
         moves = Moves.of(motion)
-        told = [Correlation.of(part, _NEAR).best() for part in moves.parts(4)]
         whole, share = Correlation.of(moves, _NEAR).best()
         if share > FOLLOWS:
+            told = [Correlation.of(part, _NEAR).best() for part in moves.parts(4)]
             near = [each for each, part in told if part > FOLLOWS] or [whole]
-            lags.append(whole)
-            spread.append(max(float(np.std(near)) / np.sqrt(len(near)), moves.step / 2.0))
-            slow.append(1.0 / max(float(np.sqrt((moves.commanded**2).mean())), 1e-6))
+            error = max(float(np.std(near)) / np.sqrt(len(near)), moves.step / 2.0)
             names.append(motion.name)
-            steps.append(usual_step(motion.position))
-    if not lags:
+            rows.append((whole, error, moves.step, 1.0 / max(float(np.sqrt((moves.commanded**2).mean())), 1e-6)))
+    if not names:
         return {}
-    lag, error, step, slowness = (np.array(each) for each in (lags, spread, steps, slow))
+    lag, error, step, slowness = np.array(rows).T
     usual, scatter = _usual_lag(lag, slowness)
     early = lag < -np.maximum(FAR * step, CLEAR * error)
     away = np.abs(lag - usual) > np.maximum(FAR * step, OUTLIER * np.hypot(scatter, error))
@@ -151,14 +149,10 @@ def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
 
 
 def _usual_lag(lag: Array, slow: Array) -> tuple[Array, float]:
-    """Return the lag that the other motions lead to expect, s, and how they scatter about it (repeated medians)."""
+    """Return the lag that the other motions lead to expect, s, and how they scatter about it (Siegel's line)."""
     if len(lag) < FAR * 2:
         return np.full(len(lag), np.median(lag)), np.inf
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slopes = (lag[:, None] - lag) / (slow[:, None] - slow)
-    np.fill_diagonal(slopes, np.nan)
-    slopes[~np.isfinite(slopes)] = np.nan
-    angle = max(float(np.nanmedian(np.nanmedian(slopes, axis=1))), 0.0) if not np.isnan(slopes).all() else 0.0
+    angle = max(float(siegelslopes(lag, slow).slope), 0.0) if np.ptp(slow) > 0.0 else 0.0
     rest = lag - angle * slow
     usual = np.median(rest)
     return usual + angle * slow, float(_SIGMA * np.median(np.abs(rest - usual)))

@@ -17,12 +17,10 @@ from thermal_robot.campaign.names import did_you_mean, split_name
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.units import LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError
+from thermal_robot.motion.log import CHANNELS
 from thermal_robot.schema import Kind, MisfitError, number, record, text
 
-FIELDS = {
-    "cmd": "command", "q": "position", "qd": "velocity", "tau": "torque", "current": "current", "volts": "volts",
-    "temperature": "temperature",
-}  # fmt: skip
+FIELDS = dict(zip(("cmd", "q", "qd", "tau", "current", "volts", "temperature"), CHANNELS, strict=True))
 """Fields of a :class:`~thermal_robot.motion.Motion` by the quantity that stands before the joint's name."""
 OF_ALL = ("volts", "temperature")  # Quantities that one column may give for all joints
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}

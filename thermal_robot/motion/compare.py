@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -52,7 +52,7 @@ class Compared:
     @property
     def changed(self) -> bool:
         """Whether the difference is beyond three of its standard deviations."""
-        return self.z is not None and abs(self.z) > settings.CHANGED
+        return self.z is not None and abs(self.z) > settings.CLEAR
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,33 +140,26 @@ def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequ
         raise CampaignError("compare()", "the logs have no joint in common", found=found, expected="one robot")
     own = (first.log.name or "first", second.log.name or "second")
     called = tuple(names) or (own if own[0] != own[1] else (f"{own[0]} (1)", f"{own[1]} (2)"))
-    told = [_rendered(one) for one in (first, second)]
+    told: list[dict[tuple[str, str, str, str], Estimate]] = [
+        {(told.name, one.name, one.unit, d.joint_of(one)): one for told in d.shown for one in d.physical(told.name)}
+        for d in (first, second)
+    ]
     keys = dict.fromkeys(key for one in told for key in one)
     parameters = [_compared(key, [one.get(key) for one in told], (first, second)) for key in keys]
     parameters.sort(key=lambda one: -abs(one.z or 0.0))
     return MotionComparison((called[0], called[1]), tuple(parameters), first.log.robot.name, first.few or second.few)
 
 
-def _rendered(d: MotionDiagnosis) -> dict[tuple[str, str, str, str], Estimate]:
-    """Return what is shown, by effect, name (its joint in it), unit and joint."""
-    return {
-        (finding.name, one.name, one.unit, d.joint_of(one)): one
-        for finding in d.shown
-        for one in d.physical(finding.name)
-    }
-
-
 def _compared(
     key: tuple[str, str, str, str], pair: list[Estimate | None], both: tuple[MotionDiagnosis, MotionDiagnosis]
 ) -> Compared:
+    """Compare a parameter, by effect, name (its joint in it), unit and joint."""
     effect, name, unit, joint = key
-    values = pair[0].value if pair[0] else None, pair[1].value if pair[1] else None
-    stds = pair[0].std if pair[0] else None, pair[1].std if pair[1] else None
-    known_by = both[0] if pair[0] else both[1]
-    known = Compared(effect, known_by.title(effect, joint), joint, name, unit, values, stds)
-    if values[0] is None or values[1] is None or stds[0] is None or stds[1] is None:
+    (before, std_before), (after, std_after) = ((one.value, one.std) if one else (None, None) for one in pair)
+    title = (both[0] if pair[0] else both[1]).title(effect, joint)
+    known = Compared(effect, title, joint, name, unit, (before, after), (std_before, std_after))
+    if before is None or after is None or std_before is None or std_after is None:
         return known
-    difference, std = values[1] - values[0], float(np.hypot(stds[0], stds[1]))
+    difference, std = after - before, float(np.hypot(std_before, std_after))
     z = difference / std if std > 0.0 else 0.0
-    chance = float(erfc(abs(z) / np.sqrt(2.0)))
-    return Compared(effect, known.title, joint, name, unit, values, stds, difference, std, z, chance)
+    return replace(known, difference=difference, std=std, z=z, p_value=float(erfc(abs(z) / np.sqrt(2.0))))

@@ -9,7 +9,7 @@ import numpy as np
 from thermal_robot.campaign.description import aligned
 from thermal_robot.motion.faults import Sound
 from thermal_robot.motion.following import at
-from thermal_robot.motion.log import CHANNELS, MotionLog
+from thermal_robot.motion.log import CHANNELS, MotionLog, joint_kinds
 
 
 def text(log: MotionLog, sound: Sound) -> str:
@@ -39,23 +39,15 @@ def _facts(log: MotionLog) -> Iterator[Sequence[str]]:
 
 def _joints(sound: Sound) -> Iterator[Sequence[str]]:
     yield "joint", "commanded", "gap, rms", "servo, as stated", ""
-    log = sound.log
+    log, kinds = sound.log, joint_kinds(sound.log.robot)
     for j, joint in enumerate(log.joints):
         commanded = np.concatenate([motion.command.values[:, j] for motion in log.motions])
         gaps = [m.position.values[:, j] - at(m.command, m.position.time)[:, j] for m in log.motions]
         gap = float(np.sqrt(np.nanmean(np.concatenate(gaps) ** 2)))
-        slides = log.kinds[joint] == "prismatic"
-        servo = log.servos.get(joint)
-        stated = {} if servo is None else {key: value for key, value in vars(servo).items() if value is not None}
-        told = ", ".join(f"{key} {value:g}" for key, value in stated.items()) or "unknown"
-        span = f"{np.nanmin(commanded):.3f} .. {np.nanmax(commanded):.3f} {'m' if slides else 'rad'}"
-        yield (
-            joint,
-            span,
-            f"{1e3 * gap:.3g} {'mm' if slides else 'mrad'}",
-            told,
-            "" if joint in sound.joints else "left out",
-        )
+        unit, servo = "m" if kinds[joint] == "prismatic" else "rad", vars(log.servo(joint))
+        told = ", ".join(f"{key} {value:g}" for key, value in servo.items() if value is not None) or "unknown"
+        span = f"{np.nanmin(commanded):.3f} .. {np.nanmax(commanded):.3f} {unit}"
+        yield joint, span, f"{1e3 * gap:.3g} m{unit}", told, "" if joint in sound.joints else "left out"
 
 
 def _channels(log: MotionLog) -> Iterator[Sequence[str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +12,21 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOut, Location, Status, Unexplained
 from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.model import SHARED, JointModel, ServoModel
-from thermal_robot.motion.moves import moves
+from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
 from thermal_robot.motion.select import Choice, held_out_loss, select
 from thermal_robot.motion.torque import TorqueModel
 
-Mask = NDArray[np.bool_]
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
+_NEEDS = {"kp": "servo.kp", "droop": "a servo whose kp is not stated"}
+_NEEDS |= dict.fromkeys(("payload", "contact"), "masses in the URDF") | dict.fromkeys((*TORQUE_TITLES, "masses"), "tau")
 
 
 def diagnose_motion(
@@ -69,25 +69,25 @@ def diagnose_motion(
     model = kind(log)
     allowed = np.array([one.effect in kept for one in model.parameters])
     choice = select(model, allowed, progress)
-    refused = _gate(model, choice)
+    refused = _gate(choice)
     if refused:
         progress("without the motions that nothing explains")
         motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
         model = kind(replace(log, motions=motions))
         choice = select(model, allowed, progress, choice.point.values)
     left_out = tuple(name for name in ALL if name not in kept)
-    found = _answer(model, choice, refused, left_out, progress)
-    return replace(found, faults=tuple(fault.told for fault in sound.faults))
+    faults = tuple(fault.told for fault in sound.faults)
+    return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
 
 
-def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
+def _gate(choice: Choice) -> dict[str, float]:
     """Return kinds of motion of which much more remains than of the others, with how many times as much.
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
     """
-    if model.pieces > 1:  # what one motion leaves has no others to be compared with
+    if choice.point.model.pieces > 1:  # what one motion leaves has no others to be compared with
         return {}
-    kinds = np.array([m.kind or m.name for m in model.log.motions])
+    kinds = np.array([m.kind or m.name for m in choice.point.model.log.motions])
     each = np.zeros((len(kinds), len(choice.point.rows)))
     for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
         count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
@@ -98,162 +98,112 @@ def _gate(model: JointModel, choice: Choice) -> dict[str, float]:
     return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
-def _folds(model: JointModel, choice: Choice, progress: Callable[[str], None]) -> list[Array]:
+def _folds(choice: Choice, folds: int, progress: Callable[[str], None]) -> list[Array]:
     """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
-    count, found = model.clusters, [one.residual.copy() for one in choice.point.rows]
-    folds = min(settings.FOLDS, count)
-    if folds < 2 or not choice.active.any():
-        return found
-    for fold in range(folds):
+    model, found = choice.point.model, [one.residual.copy() for one in choice.point.rows]
+    for fold in range(folds if folds > 1 and choice.active.any() else 0):
         progress(f"motions held out, part {fold + 1} of {folds}")
-        held = np.arange(count) % folds == fold
-        values = fit(model, choice.point.values, choice.active, choice.sizes, ~held)
+        held = np.arange(model.clusters) % folds == fold
+        values = fit(model, choice.point.values, choice.active, ~held)
         for joint, left in enumerate(model.all_residuals(values)):
             out = held[choice.point.rows[joint].motion]
             found[joint][out] = left[out]
     return found
 
 
-def _answer(
-    model: JointModel, choice: Choice, refused: dict[str, float], left_out: tuple[str, ...], progress: Any
-) -> MotionDiagnosis:
-    log, point = model.log, choice.point
-    before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(model, choice, progress)
-    noise = [model.noise(j) for j in model.joints]
+def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
+    point, model, log = choice.point, choice.point.model, choice.point.model.log
+    folds = min(settings.FOLDS, model.clusters)
+    before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(choice, folds, progress)
     joints = {
-        name: JointGap(rms(before[j]), rms(point.rows[j].residual), rms(held[j]), noise[j])
+        name: JointGap(rms(before[j]), rms(point.rows[j].residual), rms(held[j]), model.noise(j))
         for j, name in enumerate(log.joints)
     }
     weights = 1.0 / np.array([max(len(one), 1) for one in before])
-    square = [_by_motion(model, before, weights), _by_motion(model, held, weights)]
-    shrinkage = 1.0 - float(square[1].sum() / max(square[0].sum(), 1e-300))
-    drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(
-        0, len(square[0]), (settings.BOOTSTRAPS, len(square[0]))
-    )
-    ratios = 1.0 - square[1][drawn].sum(axis=1) / np.maximum(square[0][drawn].sum(axis=1), 1e-300)
-    low, high = np.quantile(ratios, [0.025, 0.975])
-    total = [float(np.sqrt(one.sum() / len(before))) for one in square]
-    folds = min(settings.FOLDS, model.clusters)
-    held_out = HeldOut("motion", folds, total[0], total[1], shrinkage, (float(low), float(high)))
-    findings, shares = _findings(model, choice, before, weights)
-    left = _unexplained(model, choice, noise)
-    told = not left.flagged or shrinkage >= settings.MOST
+    square, count = np.zeros((2, model.clusters)), model.clusters  # sums by motion, readings of each joint weighing one
+    for row, left in zip(square, (before, held), strict=True):
+        for j in model.joints:
+            row += weights[j] * np.bincount(model.motion_of(j), left[j] ** 2, count)
+    drawn = np.random.default_rng(settings.BOOTSTRAP_SEED).integers(0, count, (settings.BOOTSTRAPS, count))
+    sums = np.stack([square.sum(axis=1), *square[:, drawn].sum(axis=2).T])  # of all motions, then of those drawn
+    shrinkage, *others = 1.0 - sums[:, 1] / np.maximum(sums[:, 0], 1e-300)
+    low, high = np.quantile(others, [0.025, 0.975]).tolist()
+    total = np.sqrt(sums[0] / len(before)).tolist()
+    held_out = HeldOut("motion", folds, total[0], total[1], float(shrinkage), (low, high))
+    findings, shares = _findings(choice, before, weights)
+    unexplained = _unexplained(choice)
+    told = not unexplained.flagged or shrinkage >= settings.MOST
     verdict = tuple(one.name for one in findings if told and one.status in ("found", "confounded"))
-    values = {
-        (one.effect, "" if one.joint == SHARED else log.joints[one.joint]): float(point.values[p])
-        for p, one in enumerate(model.parameters)
-        if choice.active[p]
-    }
+    weights_of = zip(*choice.search.probabilities(), strict=True)
+    names = [({model.parameters[b].effect for b in one.blocks}, weight) for one, weight in weights_of]
+    best = {model.parameters[b].effect for b in choice.best.blocks}
+    probability = total_probability([weight for effects, weight in names if effects == best])
+    values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
+    curves = {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}
     return MotionDiagnosis(
-        log, joints, held_out, findings, verdict, _probability(model, choice),
-        left, values,
-        {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}, refused, (), log.notes, left_out,
-        shares=shares, unit=model.unit, moves=moves(model, point.values),
+        log, joints, held_out, findings, verdict, probability, unexplained, values, curves,
+        warnings=log.notes, shares=shares, unit=model.unit, moves=model.moves(point.values),
     )  # fmt: skip
 
 
-def _by_motion(model: JointModel, residuals: list[Array], weights: Array) -> Array:
-    """(M,) sums of squares of all joints by motion, each joint's readings weighing one together."""
-    count = model.clusters
-    return np.asarray(
-        sum(
-            w * np.bincount(model.motion_of(j), one**2, count)
-            for j, (one, w) in enumerate(zip(residuals, weights, strict=True))
-        )
-    )
-
-
-def _probability(model: JointModel, choice: Choice) -> float:
-    """Posterior probability of exactly the effects of the choice, in whatever joints."""
-    found, weights = choice.search.probabilities()
-    names = [frozenset(model.parameters[b].effect for b in one.blocks) for one in found]
-    best = frozenset(model.parameters[b].effect for b in choice.best.blocks)
-    return min(float(sum(w for n, w in zip(names, weights, strict=True) if n == best)), 1.0)
-
-
-def _findings(
-    model: JointModel, choice: Choice, before: list[Array], weights: Array
-) -> tuple[tuple[Finding, ...], dict[str, float]]:
+def _findings(choice: Choice, before: list[Array], weights: Array) -> tuple[tuple[Finding, ...], dict[str, float]]:
     """Return a finding for every effect, the largest share first, and the share of each joint."""
-    log, point, deviations = model.log, choice.point, choice.deviations()
+    point, model, deviations = choice.point, choice.point.model, choice.deviations()
     whole = sum(float(w * (one**2).sum()) for one, w in zip(before, weights, strict=True))
     scale = np.array([point.noise[j] ** 2 * weights[j] for j in model.joints]) / max(whole, 1e-300)
-    base = held_out_loss(point, choice.active, choice.sizes)
-    share = {}
-    for block in choice.best.blocks:
-        less = choice.active.copy()
-        less[block] = False
-        share[block] = (held_out_loss(point, less, choice.sizes) - base).sum(axis=1) * scale
-    found = [_finding(model, choice, name, share, deviations) for name in ALL]
+    base = held_out_loss(point, choice.active)
+    share = {b: (held_out_loss(point, choice.without(b)) - base).sum(axis=1) * scale for b in choice.best.blocks}
+    found = [_finding(choice, name, share, deviations) for name in ALL]
     found.sort(key=lambda one: (-(one.shrinkage or 0.0), one.status not in ("found", "confounded")))
     joints = {
         name: float(weights[j] * ((before[j] ** 2).sum() - (point.rows[j].residual ** 2).sum()) / max(whole, 1e-300))
-        for j, name in enumerate(log.joints)
+        for j, name in enumerate(model.log.joints)
     }
     return tuple(found), joints
 
 
-def _finding(model: JointModel, choice: Choice, name: str, share: Mapping[int, Array], deviations: Array) -> Finding:
+def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: Array) -> Finding:
     """Return the finding of one effect: held-out shares (J,) by parameter are those without it."""
+    model = choice.point.model
     own = [p for p, one in enumerate(model.parameters) if one.effect == name]
     title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
     if not own:
-        return Finding(name, "not_testable", title=title, needs=_needs(name))
+        return Finding(name, "not_testable", title=title, needs=(_NEEDS.get(name, "cmd"),))
     active = [p for p in own if choice.active[p]]
-    probability = max(choice.probability([p]) for p in own)
+    probability = max(choice.probability(p) for p in own)
     if not active:
         return Finding(name, "not_found", probability, 0.0, title=title)
     rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
-    names, parameters = model.log.joints, [model.parameters[p] for p in active]
-    places = [
-        Location("joint", names[one.joint], float(share[p].sum()))
-        for p, one in zip(active, parameters, strict=True)
-        if one.joint != SHARED
-    ]
-    estimates = tuple(
-        Estimate(
-            ", ".join((one.label, *([names[one.joint]] if one.joint != SHARED else []))),
-            float(choice.point.values[p]), float(deviations[p]), one.unit, True,
-        )
-        for p, one in zip(active, parameters, strict=True)
-    )  # fmt: skip
+    places, estimates = [], []
+    for p, one, joint in ((p, model.parameters[p], model.keys[p][1]) for p in active):
+        called = f"{one.label}, {joint}" if joint else one.label
+        estimates.append(Estimate(called, float(choice.point.values[p]), float(deviations[p]), one.unit, True))
+        places += [Location("joint", joint, float(share[p].sum()))] if joint else []
     status: Status = "confounded" if rivals and probability < settings.SURE else "found"
-    alike = tuple(sorted(rivals)) if status == "confounded" else ()
-    total, sorted_places = float(sum(share[p].sum() for p in active)), sorted(places, key=lambda one: -one.share)
-    return Finding(name, status, probability, total, None, (), alike, tuple(sorted_places), estimates, title=title)
+    total = float(sum(share[p].sum() for p in active))
+    return Finding(
+        name, status, probability, total, parameters=tuple(estimates), title=title,
+        confounded_with=tuple(sorted(rivals)) if status == "confounded" else (),
+        locations=tuple(sorted(places, key=lambda one: -one.share)),
+    )  # fmt: skip
 
 
-def _needs(name: str) -> tuple[str, ...]:
-    if name in TORQUE_TITLES or name == "masses":
-        return ("tau",)
-    return {
-        "kp": ("servo.kp",),
-        "droop": ("a servo whose kp is not stated",),
-        "payload": ("masses in the URDF",),
-        "contact": ("masses in the URDF",),
-    }.get(name, ("cmd",))
-
-
-def _unexplained(model: JointModel, choice: Choice, noise: list[float]) -> Unexplained:
+def _unexplained(choice: Choice) -> Unexplained:
     """Test what remains against smooth curves of position, velocity, load and time, motions held out."""
-    tested = []
-    for j in model.joints:
-        left, motion = choice.point.rows[j].residual, choice.point.rows[j].motion
-        if rms(left) < settings.NOISY * noise[j]:
-            continue
-        for name, values in model.quantities(j).items():
-            gain = _curve_gain(left, values, motion)
-            tested.append((gain, name, j))
-    flagged = [one for one in tested if one[0] > settings.STRUCTURE]
+    model, rows = choice.point.model, choice.point.rows
+    tested = [
+        (_curve_gain(rows[j].residual, values, rows[j].motion), name, j)
+        for j in model.joints
+        if rms(rows[j].residual) >= settings.NOISY * model.noise(j)
+        for name, values in model.quantities(j).items()
+    ]
+    flagged = sorted((one for one in tested if one[0] > settings.STRUCTURE), reverse=True)
     if not flagged:
         return Unexplained(False, 0.0, 1.0)
-    flagged.sort(reverse=True)
-    worst = flagged[0]
-    name = model.log.joints[worst[2]]
-    reason = f"{100.0 * worst[0]:.0f} % of what remains in {name} follows {worst[1]}"
     places = tuple(Location("joint", model.log.joints[j], gain) for gain, _, j in flagged[:3])
-    follows = tuple(dict.fromkeys(one[1] for one in flagged))
-    remains = float(np.sqrt(np.mean([rms(one.residual) ** 2 for one in choice.point.rows])))
+    reason = f"{100.0 * places[0].share:.0f} % of what remains in {places[0].name} follows {flagged[0][1]}"
+    follows = dict.fromkeys(name for _, name, _ in flagged)
+    remains = rms([rms(one.residual) for one in rows])
     return Unexplained(True, remains, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
 
 

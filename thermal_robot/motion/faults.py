@@ -7,32 +7,20 @@ be undone is undone, and told; a joint whose readings are of no use is left out.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import listed
-from thermal_robot.motion import clocks
+from thermal_robot.motion import clocks, settings
 from thermal_robot.motion.columns import UNITS
 from thermal_robot.motion.following import Correlation, at, clusters, parts, slope, usual_step
-from thermal_robot.motion.log import Channel, Motion, MotionLog, with_channels
+from thermal_robot.motion.log import Channel, Motion, MotionLog
+from thermal_robot.motion.model import Mask
 from thermal_robot.motion.refuse import explains_torques
-from thermal_robot.motion.settings import (
-    CLEAR,
-    FOLLOWS,
-    FROZEN,
-    LEAST_AGAINST,
-    LIKE,
-    LONGEST_LAG,
-    OTHER_GAIN,
-    OTHER_UNIT,
-    STIRRED,
-    UNEQUAL,
-    WINDOW,
-)
 from thermal_robot.motion.torque import TorqueModel
 
 _STEP_TAIL = 0.999  # quantile of an encoder's steps that a jump exceeds
@@ -113,41 +101,36 @@ def find_faults(log: MotionLog) -> Sound:
 _Checked = tuple[MotionLog, list[Fault], set[str]]
 
 
-def _with(log: MotionLog, change: Callable[[Motion], Motion]) -> MotionLog:
-    return replace(log, motions=tuple(change(motion) for motion in log.motions))
-
-
-def _changed(log: MotionLog, values: Mapping[str, Callable[[Array], Array]]) -> MotionLog:
+def _changed(log: MotionLog, channels: Sequence[str], values: Callable[[Array], Array]) -> MotionLog:
     """Return the log with other values of channels, by their names."""
+    return log.with_motions(lambda motion: motion.with_channels(channels, lambda c: Channel(c.time, values(c.values))))
 
-    def change(motion: Motion) -> Motion:
-        held = {name: getattr(motion, name) for name in values}
-        return with_channels(
-            motion, {k: Channel(c.time, values[k](c.values)) for k, c in held.items() if c is not None}
-        )
 
-    return _with(log, change)
+def _named(log: MotionLog, struck: Mask, what: str, size: Array, error: Array, told: str, *more: Array) -> list[Fault]:
+    """Return a fault of each joint that is struck; of the sentence {0} is its name, {1} and {2} size and error."""
+    each = [(log.joints[j], float(size[j]), float(error[j]), *(of[j] for of in more)) for j in np.flatnonzero(struck)]
+    return [Fault(one[0], what, one[1], one[2], told.format(*one)) for one in each]
 
 
 def _jitter(log: MotionLog) -> _Checked:
     spread, felt, error = clocks.jitter(log)
-    if not (spread > UNEQUAL and abs(felt) < CLEAR * error < 1.0 - felt):
+    if not (spread > settings.UNEQUAL and abs(felt) < settings.CLEAR * error < 1.0 - felt):
         return log, [], set()
     told = f"the encoder's stamps jitter by {spread:.0%} of a step and its samples do not: put on an even clock"
-    return _with(log, clocks.evened), [Fault("", "jitter", spread, error, told)], set()
+    return log.with_motions(clocks.evened), [Fault("", "jitter", spread, error, told)], set()
 
 
 def _clock(log: MotionLog) -> _Checked:
     if not clocks.two_clocks(log):
         return log, [], set()
     found, error = clocks.rate(log)
-    if not abs(found - 1.0) > CLEAR * error:
+    if not abs(found - 1.0) > settings.CLEAR * error:
         return log, [], set()
     told = (
         f"the commands' clock runs {found:.5f} ± {error:.5f} times as fast as the readings', which is brought to it; "
         "which of the two is wrong the log does not tell"
     )
-    changed = _with(log, lambda motion: clocks.reclocked(motion, lambda t: found * t))
+    changed = log.with_motions(lambda motion: clocks.reclocked(motion, lambda t: found * t))
     return changed, [Fault("", "clock", found, error, told)], set()
 
 
@@ -163,16 +146,12 @@ def _shifts(log: MotionLog) -> _Checked:
             "from this log"
         )
         faults = [Fault("", "shift", size, error, told)]
-        found = {motion.name: (size, error) for motion in log.motions}
+        found = dict.fromkeys((motion.name for motion in log.motions), (size, error))
     else:
         told = "the readings of motion {!r} are stamped {:+.3f} ± {:.3f} s from where the others' lag puts them: moved"
         faults = [Fault("", "shift", *each, told.format(name, *each), name) for name, each in found.items()]
-
-    def change(motion: Motion) -> Motion:
-        size, _ = found.get(motion.name, (0.0, 0.0))
-        return clocks.reclocked(motion, lambda t: t - size)
-
-    return _with(log, change), faults, set()
+    late = {name: size for name, (size, _) in found.items()}
+    return log.with_motions(lambda m: clocks.reclocked(m, lambda t: t - late.get(m.name, 0.0))), faults, set()
 
 
 def _swaps(log: MotionLog) -> _Checked:
@@ -180,52 +159,51 @@ def _swaps(log: MotionLog) -> _Checked:
     from scipy.optimize import linear_sum_assignment
 
     pieces = [(moves, Correlation.of(moves)) for moves in clusters(log)]
-    stirred = np.stack([piece.measured > len(moves.time) * STIRRED**2 for moves, piece in pieces]).astype(float)
+    stirred = np.stack([1.0 * (piece.measured > len(moves.time) * settings.STIRRED**2) for moves, piece in pieces])
     shares = np.stack([piece.explained / np.maximum(piece.measured, _TINY)[:, None] for _, piece in pieces])
     shares *= stirred[:, :, None]
     rows, order = linear_sum_assignment(-shares.sum(axis=0))
     gain, error = slope(stirred, shares[:, rows, order] - shares[:, rows, rows])
-    clear = (order != rows) & (gain > CLEAR * error)
+    clear = (order != rows) & (gain > settings.CLEAR * error)
     if not clear.any() or not np.array_equal(np.sort(order[clear]), rows[clear]):
         return log, [], set()
     own = np.argsort(np.where(clear, order, rows))  # whose readings belong to each joint
     told = (
-        "the readings called {0} follow the command of {1}, which explains {2:.0%} ± {3:.0%} of their moves more than "
+        "the readings called {0} follow the command of {3}, which explains {1:.0%} ± {2:.0%} of their moves more than "
         "its own: exchanged; the commands may be instead"
     )
-    named = [(log.joints[i], log.joints[order[i]], float(gain[i]), float(error[i])) for i in np.flatnonzero(clear)]
-    faults = [Fault(each[0], "swap", each[2], each[3], told.format(*each)) for each in named]
-    along = _SERVOS if (_likeness(log)[clear] > LIKE).all() else ()
-    return _changed(log, dict.fromkeys(("position", *along), lambda values: values[:, own])), faults, set()
+    faults = _named(log, clear, "swap", gain, error, told, np.array(log.joints)[order])
+    along = _SERVOS if (_likeness(log)[clear] > settings.LIKE).all() else ()
+    return _changed(log, ("position", *along), lambda values: values[:, own]), faults, set()
 
 
 def _signs(log: MotionLog) -> _Checked:
     pieces = [Correlation.of(moves) for moves in clusters(log)]
     size = np.stack([np.sqrt(np.maximum(piece.measured * piece.commanded, 0.0)) for piece in pieces])
     likeness, error = slope(size, np.stack([np.diag(piece.peaks) for piece in pieces]))
-    turned = likeness < -CLEAR * error
+    turned = likeness < -settings.CLEAR * error
+    if not turned.any():
+        return log, [], set()
     told = "q.{0} moves against cmd.{0} (correlation {1:.3f} ± {2:.3f}): turned round; the command may be instead"
-    named = [(log.joints[j], float(likeness[j]), float(error[j])) for j in np.flatnonzero(turned)]
-    faults = [Fault(each[0], "sign", each[1], each[2], told.format(*each)) for each in named]
-    factor, along = np.where(turned, -1.0, 1.0), np.where(turned & (_likeness(log) > LIKE), -1.0, 1.0)
-    scales: dict[str, Callable[[Array], Array]] = {"position": lambda values: values * factor}
-    scales |= dict.fromkeys(("velocity", "torque"), lambda values: values * along)
-    return (_changed(log, scales) if turned.any() else log), faults, set()
+    faults, along = _named(log, turned, "sign", likeness, error, told), turned & (_likeness(log) > settings.LIKE)
+    return _turned(_turned(log, turned, "position"), along, "velocity", "torque"), faults, set()
+
+
+def _turned(log: MotionLog, joints: Mask, *channels: str) -> MotionLog:
+    return _changed(log, channels, lambda values: values * np.where(joints, -1.0, 1.0))
 
 
 def _gains(log: MotionLog) -> _Checked:
     """Compare the units of position and command by the sizes of the moves that follow."""
     pieces = [Correlation.of(moves) for moves in clusters(log)]
-    commanded, measured, explained = (
-        np.stack([values + _TINY for values in each])
-        for each in zip(*((p.commanded, p.measured, np.diag(p.explained)) for p in pieces), strict=True)
-    )
-    follows = (explained > FOLLOWS * measured) & (commanded > 1e3 * _TINY)
+    each = np.array([(piece.commanded, piece.measured, np.diag(piece.explained)) for piece in pieces]) + _TINY
+    commanded, measured, explained = each.swapaxes(0, 1)
+    follows = (explained > settings.FOLLOWS * measured) & (commanded > 1e3 * _TINY)
     sizes = np.where(follows, 0.5 * np.log(measured / commanded), 0.0)
     middle, error = slope(follows.astype(float), sizes)
-    scale, _ = _scale_of_speeds(log)
+    scale, _ = slope(*_windows(log)[:2])
     faults, lost, factor = [], set(), np.ones(len(log.joints))
-    for j in np.flatnonzero(np.abs(middle) > np.maximum(np.log(OTHER_GAIN), CLEAR * error)):
+    for j in np.flatnonzero(np.abs(middle) > np.maximum(np.log(settings.OTHER_GAIN), settings.CLEAR * error)):
         joint, size, sigma = log.joints[j], float(np.exp(middle[j])), float(np.exp(middle[j]) * error[j])
         word, factor[j] = _remedy(size, float(scale[j]))
         if not word and size < 1.0:
@@ -234,7 +212,7 @@ def _gains(log: MotionLog) -> _Checked:
         done = f"taken for {word}" if word else "the joint is left out"
         told = f"q.{joint} moves {size:.4g} ± {sigma:.2g} times as far as cmd.{joint}: another unit, {done}"
         faults.append(Fault(joint, "unit", size, sigma, told))
-    return _changed(log, {"position": lambda values: values / factor}), faults, lost
+    return _changed(log, ["position"], lambda values: values / factor), faults, lost
 
 
 def _remedy(size: float, speeds: float) -> tuple[str, float]:
@@ -244,7 +222,7 @@ def _remedy(size: float, speeds: float) -> tuple[str, float]:
     if speeds > 0.0:
         known[f"{speeds:.4g} rad, as the integral of qd says"] = speeds
     nearest = min(known, key=lambda word: abs(np.log(size / known[word])))
-    near = abs(np.log(size / known[nearest])) < np.log(OTHER_GAIN) / 2.0
+    near = abs(np.log(size / known[nearest])) < np.log(settings.OTHER_GAIN) / 2.0
     return (nearest, known[nearest]) if near else ("", 1.0)
 
 
@@ -252,20 +230,17 @@ def _speeds(log: MotionLog) -> _Checked:
     """Compare unit and sign of velocity and position, by the integral of velocity over windows of one second."""
     squares, products, moved = _windows(log)
     scale, error = slope(squares, products)
-    foreign = (np.abs(_likeness(log)) < LIKE) & (moved.sum(axis=0) > FROZEN)
-    other = (np.abs(scale - 1.0) > np.maximum(OTHER_UNIT, CLEAR * error)) & ~foreign
+    foreign = (np.abs(_likeness(log)) < settings.LIKE) & (moved.sum(axis=0) > settings.FROZEN)
+    other = (np.abs(scale - 1.0) > np.maximum(settings.OTHER_UNIT, settings.CLEAR * error)) & ~foreign
     told = (
         "q.{0} is {1:.4f} ± {2:.4f} of what qd.{0} integrates to: the unit of one is wrong; q goes with cmd.{0}, so qd "
         "is brought to it"
     )
     strange = "qd.{0} is not the velocity of q.{0}, which is {1:.2f} ± {2:.2f} of what it integrates to: left out"
-    named = [(log.joints[j], float(scale[j]), float(error[j]), bool(other[j])) for j in np.flatnonzero(other | foreign)]
-    faults = [
-        Fault(joint, "unit" if unit else "swap", size, sigma, (told if unit else strange).format(joint, size, sigma))
-        for joint, size, sigma, unit in named
-    ]
+    faults = _named(log, other, "unit", scale, error, told) + _named(log, foreign, "swap", scale, error, strange)
+    faults.sort(key=lambda fault: log.joints.index(fault.joint))
     factor = np.where(foreign, np.nan, np.where(other, scale, 1.0))
-    return _changed(log, {"velocity": lambda values: values * factor}), faults, set()
+    return _changed(log, ["velocity"], lambda values: values * factor), faults, set()
 
 
 def _loads(log: MotionLog) -> _Checked:
@@ -273,18 +248,9 @@ def _loads(log: MotionLog) -> _Checked:
     if not (log.robot.has_masses and explains_torques(log)):
         return log, [], set()
     found, error = TorqueModel(log).signs()
-    turned = (found < -CLEAR * error) & (found < LEAST_AGAINST)
+    turned = (found < -settings.CLEAR * error) & (found < settings.LEAST_AGAINST)
     told = "tau.{0} is {1:.3f} ± {2:.3f} of the torque that the URDF's masses need: of the other sign, turned round"
-    named = [(log.joints[j], float(found[j]), float(error[j])) for j in np.flatnonzero(turned)]
-    faults = [Fault(each[0], "sign", each[1], each[2], told.format(*each)) for each in named]
-    scales = {"torque": lambda values: values * np.where(turned, -1.0, 1.0)}
-    return (_changed(log, scales) if turned.any() else log), faults, set()
-
-
-def _scale_of_speeds(log: MotionLog) -> tuple[Array, Array]:
-    """Return (joints,) the slope of position over the integral of velocity, and its error; NaN without a velocity."""
-    squares, products, _ = _windows(log)
-    return slope(squares, products)
+    return _turned(log, turned, "torque"), _named(log, turned, "sign", found, error, told), set()
 
 
 def _likeness(log: MotionLog) -> Array:
@@ -300,10 +266,11 @@ def _windows(log: MotionLog) -> tuple[Array, Array, Array]:
         if motion.velocity is None:
             continue
         t, v = motion.velocity.time, np.nan_to_num(motion.velocity.values)
-        steps = (v[1:] + v[:-1]) / 2.0 * np.diff(t)[:, None]
-        integral = np.concatenate([np.zeros((1, v.shape[1])), np.cumsum(steps, axis=0)])
-        q, gaps = at(motion.position, t), np.cumsum(_gaps(motion, t), axis=0)
-        count = max(1, int(np.searchsorted(t - t[0], WINDOW)))
+        integral = cumulative_trapezoid(v, t, axis=0, initial=0.0)
+        # whether the nearest reading before an instant, or at it, is a gap
+        before = np.clip(np.searchsorted(motion.position.time, t, "right") - 1, 0, None)
+        q, gaps = at(motion.position, t), np.cumsum(np.isnan(motion.position.values)[before], axis=0)
+        count = max(1, int(np.searchsorted(t - t[0], settings.WINDOW)))
         whole = gaps[count:] == gaps[:-count]
         x, y = (np.where(whole, values[count:] - values[:-count], 0.0) for values in (integral, np.nan_to_num(q)))
         for rows in np.array_split(np.arange(len(x)), parts(log)):
@@ -312,12 +279,6 @@ def _windows(log: MotionLog) -> tuple[Array, Array, Array]:
         return (np.zeros((1, len(log.joints))),) * 3
     squares, products, moved = np.array(sums).swapaxes(0, 1)
     return squares, products, moved
-
-
-def _gaps(motion: Motion, times: Array) -> NDArray[np.bool_]:
-    """(n, joints) whether the nearest reading before an instant, or at it, is a gap."""
-    before = np.clip(np.searchsorted(motion.position.time, times, "right") - 1, 0, None)
-    return np.isnan(motion.position.values)[before]
 
 
 def _stale(log: MotionLog) -> _Checked:
@@ -339,13 +300,9 @@ def _stale(log: MotionLog) -> _Checked:
         how = f"in {size:.1%} ± {error:.1%} of the rows ({listed(names, 3)})"
         told = f"q.{joint} stays the same while its command passes by, {how}: {done}"
         faults.append(Fault(joint, "stale", size, error, told))
-    pairs = zip(log.motions, blank, strict=True)
-    return replace(log, motions=tuple(_blanked(motion, rows) for motion, rows in pairs)), faults, lost
-
-
-def _blanked(motion: Motion, rows: NDArray[np.bool_]) -> Motion:
-    values = np.where(rows, np.nan, motion.position.values)
-    return replace(motion, position=Channel(motion.position.time, values)) if rows.any() else motion
+    rest = iter(blank)
+    changed = _changed(log, ["position"], lambda values: np.where(next(rest), np.nan, values)) if faults else log
+    return changed, faults, lost
 
 
 def _frozen_runs(motion: Motion, j: int) -> Iterator[slice]:
@@ -355,16 +312,16 @@ def _frozen_runs(motion: Motion, j: int) -> Iterator[slice]:
     on and the reading jumps at the end.
     """
     q, step = motion.position.values[:, j], usual_step(motion.position)
-    width = max(1, round(LONGEST_LAG / step))
+    width = max(1, round(settings.LONGEST_LAG / step))
     command = np.nan_to_num(at(motion.command, motion.position.time)[:, j])
     steps = np.abs(np.diff(q))
     edges = np.concatenate([[0], np.flatnonzero(~(steps == 0.0)) + 1, [len(q)]])
     moved = steps[steps > 0.0]
-    jump = max(_JUMP * float(np.quantile(moved, _STEP_TAIL)), FROZEN / 2.0) if len(moved) else np.inf
+    jump = max(_JUMP * float(np.quantile(moved, _STEP_TAIL)), settings.FROZEN / 2.0) if len(moved) else np.inf
     for begin, end in itertools.pairwise(edges):
         if end - begin < width or np.isnan(q[begin]):
             continue
         gap = np.convolve(command[begin:end] - q[begin], np.ones(width) / width, "valid")
-        passed = gap.max() > FROZEN / 2.0 and gap.min() < -FROZEN / 2.0
-        if passed or (np.ptp(gap) > FROZEN and end < len(q) and steps[end - 1] > jump):
+        passed = gap.max() > settings.FROZEN / 2.0 and gap.min() < -settings.FROZEN / 2.0
+        if passed or (np.ptp(gap) > settings.FROZEN and end < len(q) and steps[end - 1] > jump):
             yield slice(begin, end)

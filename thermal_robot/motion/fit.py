@@ -8,15 +8,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import Gram
 from thermal_robot.motion import settings
-from thermal_robot.motion.model import SHARED, JointModel, Rows
-
-Mask = NDArray[np.bool_]
+from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +23,7 @@ class Point:
     ``values`` (P,); ``rows`` of each joint; ``noise`` (J,) root mean square of each joint's residual, rad.
     """
 
+    model: JointModel
     values: Array
     rows: list[Rows]
     noise: Array
@@ -33,9 +31,9 @@ class Point:
     @classmethod
     def at(cls, model: JointModel, values: Array, wanted: Mask | None = None) -> Point:
         """Linearise the model at some values by the parameters ``wanted``."""
-        rows = model.all_rows(values, wanted)
+        rows = model.each(lambda joint: model.rows(joint, values, wanted))
         noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
-        return cls(values, rows, noise)
+        return cls(model, values, rows, noise)
 
     @cached_property
     def products(self) -> tuple[Array, Array, Array]:
@@ -58,17 +56,11 @@ class Point:
         return matrix, vector, total
 
 
-def fit(
-    model: JointModel,
-    values: Array,
-    active: Mask,
-    sizes: Array,
-    motions: Mask | None = None,
-) -> Array:
+def fit(model: JointModel, values: Array, active: Mask, motions: Mask | None = None) -> Array:
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
-    ``sizes`` (P,) are the prior's standard deviations; the prior counts as much as one independent reading. ``motions``
-    (M,) are the clusters that are fitted, by default all.
+    The prior counts as much as one independent reading. ``motions`` (M,) are the clusters that are fitted, by default
+    all.
     """
     values = np.where(active, values, 0.0)
     joint_of = np.array([one.joint for one in model.parameters])
@@ -85,8 +77,8 @@ def fit(
             continue
         point = Point.at(model, values, now)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        sets = np.vstack([values, _ahead(model, values, own, matrix, vector, sizes)])
-        costs = _costs(model, sets, used, point.noise, sizes)
+        sets = np.vstack([values, _ahead(model, values, own, matrix, vector)])
+        costs = _costs(model, sets, used, point.noise)
         before, least = costs[:, 0].sum(), costs.min(axis=1).sum()
         if shared:
             whole = costs.sum(axis=0)
@@ -101,26 +93,26 @@ def fit(
     return values
 
 
-def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Array, sizes: Array) -> Array:
+def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Array) -> Array:
     """(S, P) values after steps of all dampings, by least squares with the parameters' bounds."""
     lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
     found = np.tile(values, (len(settings.DAMPINGS), 1))
     inside = matrix[np.ix_(own, own)]
     for one, damping in zip(found, settings.DAMPINGS, strict=True):
-        whole = inside + np.diag(damping * np.diag(inside) + sizes[own] ** -2.0)
+        whole = inside + np.diag(damping * np.diag(inside) + model.sizes[own] ** -2.0)
         root = np.linalg.cholesky(whole)
         pull = np.linalg.solve(root, vector[own] + damping * np.diag(inside) * values[own])
         one[own] = lsq_linear(root.T, pull, bounds=(lower, np.inf), method="bvls").x
     return found
 
 
-def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array, sizes: Array) -> Array:
+def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:
     """(J, S) log posterior, times −2, of sets (S, P) of parameters: squares of readings in use over their noise.
 
     And of each parameter over its prior size, with its joint; with the last where joints share it.
     """
     found = np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
-    np.add.at(found, [one.joint for one in model.parameters], ((sets / sizes) ** 2).T)
+    np.add.at(found, [one.joint for one in model.parameters], ((sets / model.sizes) ** 2).T)
     return found
 
 
@@ -148,13 +140,13 @@ def ratios(point: Point) -> Array:
     return found
 
 
-def deflated(model: JointModel, point: Point, deflation: Array) -> Gram:
+def deflated(point: Point, deflation: Array) -> Gram:
     """Return normal equations, in units of prior sizes, with the information that motions bring.
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
     """
     matrix, vector = (one.sum(axis=(0, 1)) for one in point.products[:2])
-    sizes = np.array([one.size for one in model.parameters])
+    sizes, parameters = point.model.sizes, point.model.parameters
     wide = np.diag((settings.WIDE * sizes) ** -2.0)
     found = np.linalg.solve(matrix + wide, vector)
     less = np.diag(sizes / np.sqrt(deflation))
@@ -169,9 +161,9 @@ def deflated(model: JointModel, point: Point, deflation: Array) -> Gram:
         equations + float(found / sizes @ along),
         tuple(slice(i, i + 1) for i in k),
         tuple(np.eye(1) for _ in k),
-        np.array([one.positive for one in model.parameters]),
+        np.array([one.positive for one in parameters]),
         tuple(int(whole[i, i] > settings.SEEN) for i in k),
-        np.array([one.spread for one in model.parameters]),
+        np.array([one.spread for one in parameters]),
         equations,
-        0.0,
+        noise_dof=0.0,
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion.log import Channel, Motion, MotionLog
-from thermal_robot.motion.settings import FEWEST_CLUSTERS, LONGEST_LAG, STRIDE
+from thermal_robot.motion.settings import CLUSTERS, LONGEST_LAG, STRIDE
 
 _SMALL = 1e-12  # rad² below which nothing has moved
 
@@ -65,7 +65,7 @@ def clusters(log: MotionLog) -> list[Moves]:
 
 def parts(log: MotionLog) -> int:
     """Return into how many parts each motion falls, so that there are enough that scatter."""
-    return -(-FEWEST_CLUSTERS // len(log.motions))
+    return -(-CLUSTERS // len(log.motions))
 
 
 @dataclass(frozen=True)
@@ -86,12 +86,8 @@ class Correlation:
         shifts = np.arange(-reach, reach + 1)
         each = [np.fft.irfft(np.conj(u) * q[:, [i]], size, axis=0)[shifts] for i in range(q.shape[1])]
         sums = np.stack(each, axis=1).astype(np.float64)
-        return cls(
-            np.array(shifts * moves.step, dtype=np.float64),
-            sums,
-            (moves.commanded**2).sum(axis=0),
-            (moves.measured**2).sum(axis=0),
-        )
+        squares = ((values**2).sum(axis=0) for values in (moves.commanded, moves.measured))
+        return cls(np.array(shifts * moves.step, dtype=np.float64), sums, *squares)
 
     @property
     def peaks(self) -> Array:

@@ -29,7 +29,7 @@ from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import PARQUET, read_table, table_from_frame, without_library
 from thermal_robot.campaign.write import ROBOT_NAME
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import is_file, whole, write_text
+from thermal_robot.files import is_file, write_text
 from thermal_robot.motion.columns import sources
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.read import FILE_NAME, KINDS, Declaration, build_motions, joints_of, robot_of
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 _TOPIC = text("the name of a topic")
 _MAPPED = {**KINDS, "recording": {"joints": _TOPIC, "command": _TOPIC}}
-Frames = dict[str, "pd.DataFrame"]
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,9 @@ class Asked:
 
 
 class Taken(NamedTuple):
-    """Tables by their names, the unit of angles where the format states it, and what was left out, in sentences."""
+    """Parts of tables by their names, the unit of angles if the format states it, what was left out, in sentences."""
 
-    frames: Frames
+    parts: Mapping[str, Sequence[pd.DataFrame]]
     angle_unit: str = ""
     notes: tuple[str, ...] = ()
 
@@ -79,17 +78,9 @@ def _frame(motion: str, time: Array, columns: Mapping[str, Array]) -> pd.DataFra
 def _named(quantity: str, joints: Sequence[str], values: Array, file: str) -> dict[str, Array]:
     """Return columns of a quantity; refuse another number of them than joints."""
     if values.ndim != 2 or values.shape[1] != len(joints):
-        found, expected = str(values.shape), f"{len(joints)} values a row: {listed(joints)}"
-        raise CampaignError(
-            file, f"{quantity} has another number of values than joints", found=found, expected=expected
-        )
+        problem, expected = "has another number of values than joints", f"{len(joints)} values a row: {listed(joints)}"
+        raise CampaignError(file, f"{quantity} {problem}", found=str(values.shape), expected=expected)
     return {f"{quantity}.{joint}": values[:, j] for j, joint in enumerate(joints)}
-
-
-def _stacked(frames: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.concat(frames, ignore_index=True)
 
 
 def _lists(file: Path, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
@@ -112,8 +103,7 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
     folders = sorted({found.parent for file in files for found in file.rglob("control.csv")})
     if not folders:
         raise CampaignError(", ".join(map(str, files)), "no folder with control.csv", expected="folders of motions")
-    states: list[pd.DataFrame] = []
-    commands: list[pd.DataFrame] = []
+    parts: dict[str, list[pd.DataFrame]] = {"state.csv": [], "command.csv": []}
     for folder in folders:
         names = folder / "joint_list.txt"
         joints = names.read_text(encoding="utf-8").split() if is_file(names) else asked.robot.joint_names
@@ -123,8 +113,8 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
             at = dict(zip(events.text("event"), events.numbers("timestamp"), strict=True))
             begin, end = at.get("MOTION_START", begin), at.get("DISABLE", end)
         for name, quantities, kept in (
-            ("control.csv", {"positions": "cmd"}, commands),
-            ("state_motor.csv", {"positions": "q", "velocities": "qd", "torques": "torque"}, states),
+            ("control.csv", {"positions": "cmd"}, parts["command.csv"]),
+            ("state_motor.csv", {"positions": "q", "velocities": "qd", "torques": "torque"}, parts["state.csv"]),
         ):
             stamps, held = _lists(folder / name, list(quantities))
             time = stamps * (1e-6 if np.median(np.diff(stamps)) > 1.0 else 1.0)  # no log has a row a second
@@ -132,7 +122,7 @@ def _sage(files: Sequence[Path], asked: Asked) -> Taken:
             columns = [_named(quantities[k], joints, v[inside], str(folder / name)) for k, v in held.items()]
             kept.append(_frame(folder.name, time[inside], {k: v for each in columns for k, v in each.items()}))
     note = "torques are kept as torque.*, unread: robots differ in what they report; state it as tau under [channels]"
-    return Taken({"state.csv": _stacked(states), "command.csv": _stacked(commands)}, "rad", (note,))
+    return Taken(parts, "rad", (note,))
 
 
 def _lerobot(files: Sequence[Path], asked: Asked) -> Taken:
@@ -148,7 +138,7 @@ def _lerobot(files: Sequence[Path], asked: Asked) -> Taken:
         raise without_library(str(files[0]), PARQUET[0]) from error
     if not tables:
         raise CampaignError(str(files[0]), "has no data/*/*.parquet", expected="a dataset")
-    rows, columns = _stacked(tables), dict[str, Array]()
+    rows, columns = pd.concat(tables, ignore_index=True), dict[str, Array]()
     for feature, quantity in (("action", "cmd"), ("observation.state", "q")):
         names = info.get("features", {}).get(feature, {}).get("names")
         names = next(iter(names.values()), None) if isinstance(names, dict) else names
@@ -163,7 +153,7 @@ def _lerobot(files: Sequence[Path], asked: Asked) -> Taken:
     notes = ["stamps are counted frames, not measured: neither jitter nor a late reading shows"]
     beside = [name for name in columns if name not in kept]
     notes += [f"no joints of the robot: {listed(beside)}"] if beside else []
-    return Taken({"log.csv": frame}, "", tuple(notes))
+    return Taken({"log.csv": [frame]}, "", tuple(notes))
 
 
 def _arrays(file: Path) -> dict[str, Array]:
@@ -187,7 +177,7 @@ def _mujoco(files: Sequence[Path], asked: Asked) -> Taken:
 
     if asked.mjcf is None:
         raise CampaignError("import", "arrays have no names", expected="--robot MODEL.xml, the MJCF that was simulated")
-    where, frames, notes = places(asked.mjcf), [], []
+    (where, step), frames, notes = places(asked.mjcf), [], []
     for file in files:
         arrays = _arrays(file)
         if "qpos" not in arrays or "ctrl" not in arrays:
@@ -195,15 +185,15 @@ def _mujoco(files: Sequence[Path], asked: Asked) -> Taken:
         several = arrays["qpos"].ndim == 3
         for k in range(len(arrays["qpos"]) if several else 1):
             own = {name: values[k] if several and values.ndim > 1 else values for name, values in arrays.items()}
-            time = own.get("time", where.step * np.arange(len(own["qpos"])))
+            time = own.get("time", step * np.arange(len(own["qpos"])))
             columns = {
                 f"{quantity}.{joint}": own[name][:, at] * scale
                 for name, quantity in (("ctrl", "cmd"), ("qpos", "q"), ("qvel", "qd"), ("qfrc_actuator", "tau"))
-                for joint, (at, scale) in (where.arrays[name].items() if name in own else ())
+                for joint, (at, scale) in (where[name].items() if name in own else ())
             }
             frames.append(_frame(f"{file.stem}_{k}" if several else file.stem, np.ravel(time), columns))
         notes += [] if "time" in arrays else [f"{file.name} has no time: counted by the model's step"]
-    return Taken({"log.csv": _stacked(frames)}, "rad", tuple(notes))
+    return Taken({"log.csv": frames}, "rad", tuple(notes))
 
 
 _BAM = {"goal_position": "cmd", "position": "q", "speed": "qd", "input_volts": "volts", "temp": "temperature"}
@@ -223,7 +213,7 @@ def _bam(files: Sequence[Path], asked: Asked) -> Taken:
             expected = "entries with position, goal_position and timestamp"
             raise CampaignError(str(file), "cannot be read", found=str(error), expected=expected) from error
     note = "kp is a register of the firmware, and no stiffness: state it in N·m/rad under [servo.<joint>]"
-    return Taken({"log.csv": _stacked(frames)}, "rad", (note,))
+    return Taken({"log.csv": frames}, "rad", (note,))
 
 
 _COMMANDS = {
@@ -250,9 +240,8 @@ def _rosbag(files: Sequence[Path], asked: Asked) -> Taken:
             kinds = [kind for kind, topic in others if asked.topics.get("command", topic) == topic][:1]
             if not kinds or not found:
                 expected = f"JointState, and one of {', '.join(_COMMANDS)}"
-                raise CampaignError(
-                    str(file), "has no command or no joint states", found=listed(topics), expected=expected
-                )
+                problem = "has no command or no joint states"
+                raise CampaignError(str(file), problem, found=listed(topics), expected=expected)
             topic = asked.topics.get("command") or (others[0][1] if kinds[0] in JOINT_STATES else None)
             asked_for = messages(str(file), reader, kinds, topic, "command")
         rows = [(instant(s, m), m.name, m.position) for s, m, _ in found]
@@ -262,7 +251,7 @@ def _rosbag(files: Sequence[Path], asked: Asked) -> Taken:
             states[-1] = states[-1].join(_by_name("", "qd", speeds).drop(columns=["motion", "time"]))
         commands.append(_by_name(file.stem, "cmd", list(_commanded(asked_for, asked.robot.joint_names))))
     note = "efforts are left out: ROS means N·m, and drivers publish a current"
-    return Taken({"state.csv": _stacked(states), "command.csv": _stacked(commands)}, "rad", (note,))
+    return Taken({"state.csv": states, "command.csv": commands}, "rad", (note,))
 
 
 def _commanded(found: Sequence[Any], joints: Sequence[str]) -> Iterator[tuple[float, Sequence[str], Any]]:
@@ -323,19 +312,21 @@ def import_motion(
     CampaignError
         As :func:`~thermal_robot.motion.read_motion`, and files that cannot be used or would be overwritten.
     """
-    document = Document(mapping, _MAPPED, FILE_NAME) if mapping else None
-    raw = dict(document.data) if document else {}
+    import pandas as pd
+    import tomli_w
+
+    raw = dict(Document(mapping, _MAPPED, FILE_NAME).data) if mapping else {}
     topics, said = raw.pop("recording", {}), {**raw.pop("robot", {}), **robot}
     folder = mapping.parent if mapping and "urdf" not in robot and "mjcf" not in robot else Path()
     loaded, servos = robot_of(said, mapping or Path("import"), folder, ())
     taken = MOTION_FORMATS[format].read(files, Asked(loaded, folder / said["mjcf"] if "mjcf" in said else None, topics))
-    names = (FILE_NAME, ROBOT_NAME, *taken.frames)
-    require_imported(files, directory, names)
+    frames = {name: pd.concat(parts, ignore_index=True) for name, parts in taken.parts.items()}
+    require_imported(files, directory, (FILE_NAME, ROBOT_NAME, *frames))
     unit = raw.get("motion", {}).get("angle_unit") or angle_unit or taken.angle_unit
     if not unit:
         problem = f"{format} states no unit of angles, and may hold shares of a range, which are none"
         raise CampaignError("import", problem, expected="--angle-unit, or a mapping with [channels]")
-    tables = [table_from_frame(frame, str(directory / name), first_row=2) for name, frame in taken.frames.items()]
+    tables = [table_from_frame(frame, str(directory / name), first_row=2) for name, frame in frames.items()]
     if "tool_frame" not in said:
         held = sources(tables, {})
         loaded, _ = robot_of(said, mapping or Path("import"), folder, joints_of(held))
@@ -344,28 +335,18 @@ def import_motion(
     sections = {
         **raw,
         "robot": {"urdf": ROBOT_NAME, **ends},
-        "motion": {"log": list(taken.frames), **raw.get("motion", {}), "angle_unit": unit},
+        "motion": {"log": list(frames), **raw.get("motion", {}), "angle_unit": unit},
         "servo": {**own, **raw.get("servo", {})},
     }
     fitted = fitted_sections(KINDS, sections)
     held = sources(tables, fitted.get("channels", {}))
-    log = build_motions(tables, held, Declaration.stated(directory.resolve().name, fitted), loaded)
-    file = _written(
-        directory, sections, loaded.urdf, taken.frames, f"{IMPORTED} {format}` from {listed(map(str, files))}."
-    )
-    return log, file, (*taken.notes, *log.notes)
-
-
-def _written(directory: Path, sections: Mapping[str, Any], urdf: str, frames: Frames, origin: str) -> Path:
-    import tomli_w
-
+    log = build_motions(tables, held, Declaration.stated(directory.resolve().name, fitted, {}), loaded)
+    origin = f"{IMPORTED} {format}` from {listed(map(str, files))}."
+    texts = {ROBOT_NAME: loaded.urdf, FILE_NAME: f"# {' '.join(origin.split())}\n{tomli_w.dumps(sections)}"}
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        for name, frame in frames.items():
-            with whole(directory / name) as place:
-                frame.to_csv(place, index=False)
-        write_text(directory / ROBOT_NAME, urdf)
-        write_text(directory / FILE_NAME, f"# {' '.join(origin.split())}\n{tomli_w.dumps(sections)}")
+        for name, content in ({name: frame.to_csv(index=False) for name, frame in frames.items()} | texts).items():
+            write_text(directory / name, content)
     except OSError as error:
         raise CampaignError(str(directory), f"cannot be written: {error.strerror}") from error
-    return directory / FILE_NAME
+    return log, directory / FILE_NAME, (*taken.notes, *log.notes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -59,6 +59,12 @@ class Motion:
     current: Channel | None = None
     volts: Channel | None = None
     temperature: Channel | None = None
+
+    def with_channels(self, names: Iterable[str], change: Callable[[Channel], Channel]) -> Motion:
+        """Return the motion with channels changed, by the names of their fields; those that are not there stay so."""
+        held = {name: getattr(self, name) for name in names}
+        changed: dict[str, Any] = {name: change(channel) for name, channel in held.items() if channel is not None}
+        return replace(self, **changed)
 
 
 @dataclass(frozen=True)
@@ -128,14 +134,13 @@ class MotionLog:
     about: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def kinds(self) -> dict[str, str]:
-        """Type of every joint of the robot's description, by name, on the chain or beside it."""
-        return joint_kinds(self.robot)
-
-    @property
     def commanded(self) -> bool:
         """Whether commands were recorded; where none were, they are the encoder's readings, and torques tell."""
         return any(motion.command is not motion.position for motion in self.motions)
+
+    def servo(self, joint: str) -> Servo:
+        """Return what is known of a joint's servo."""
+        return self.servos.get(joint, Servo())
 
     def visible_from(self, joint: str, noise: float) -> float:
         """Return by what a joint's output must move to be told: twice its noise, and what is tolerated of it."""
@@ -145,19 +150,15 @@ class MotionLog:
         """Return the log of some of its joints."""
         at = [self.joints.index(name) for name in joints]
 
-        def cut(channel: Channel | None) -> Channel | None:
-            return None if channel is None else Channel(channel.time, channel.values[:, at])
-
         def only(motion: Motion) -> Motion:
-            position = Channel(motion.position.time, motion.position.values[:, at])
-            command = Channel(motion.command.time, motion.command.values[:, at])
-            command = position if motion.command is motion.position else command
-            rest: dict[str, Any] = {
-                name: cut(getattr(motion, name)) for name in ("velocity", "torque", "current", "volts", "temperature")
-            }
-            return replace(motion, command=command, position=position, **rest)
+            cut = motion.with_channels(CHANNELS, lambda channel: Channel(channel.time, channel.values[:, at]))
+            return replace(cut, command=cut.position) if motion.command is motion.position else cut
 
-        return replace(self, joints=tuple(joints), motions=tuple(only(motion) for motion in self.motions))
+        return replace(self, joints=tuple(joints)).with_motions(only)
+
+    def with_motions(self, change: Callable[[Motion], Motion]) -> MotionLog:
+        """Return the log with every motion changed."""
+        return replace(self, motions=tuple(map(change, self.motions)))
 
     def __repr__(self) -> str:
         seconds = sum(float(motion.position.time[-1] - motion.position.time[0]) for motion in self.motions)
@@ -168,12 +169,7 @@ CHANNELS = ("command", "position", "velocity", "torque", "current", "volts", "te
 """Fields of a motion that are channels."""
 
 
-def with_channels(motion: Motion, channels: Mapping[str, Any]) -> Motion:
-    """Return a motion with other channels, by the names of their fields."""
-    return replace(motion, **channels)
-
-
 def joint_kinds(robot: Robot) -> dict[str, str]:
-    """Type of every joint of a robot's description, by name."""
+    """Type of every joint of a robot's description, by name, on the chain or beside it."""
     joints = etree.fromstring(robot.urdf.encode()).iter("{*}joint")
     return {joint.get("name", ""): joint.get("type", "fixed") for joint in joints}

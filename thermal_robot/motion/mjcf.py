@@ -7,7 +7,7 @@ each body's frame is shifted there. Geoms, tendons and equalities are left out; 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -23,21 +23,16 @@ _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _FAR = 1e3  # m: limit of a joint that slides without one
 
 
-def _model(file: Path) -> Any:
+def opened(file: Path) -> Any:
+    """Return the compiled ``mujoco.MjModel`` of an MJCF."""
     if not file.is_file():
         raise CampaignError(str(file), "there is no such file", expected="the robot's MJCF")
     return compiled(file)[1]
 
 
-def gravity_of_mjcf(file: Path) -> tuple[float, float, float]:
-    """Return gravity in the world's frame, m/s²."""
-    x, y, z = map(float, _model(file).opt.gravity)
-    return x, y, z
-
-
 def servos_of_mjcf(file: Path) -> dict[str, Servo]:
     """Return stiffness, damping and limit of the position actuators, by joint, as they act on the joint."""
-    mujoco, model, found = mujoco_or_error(), _model(file), {}
+    mujoco, model, found = mujoco_or_error(), opened(file), {}
     for k in range(model.nu):
         joint, gear = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0])
         gain, (_, stiff, damp) = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k, :3]
@@ -50,24 +45,20 @@ def servos_of_mjcf(file: Path) -> dict[str, Servo]:
     return found
 
 
-class Places(NamedTuple):
-    """Where each joint stands in the arrays of ``mjData``: index and scale, by array and joint; and the step, s."""
+def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
+    """Return index and scale of each joint in ``mjData``, by array and joint, and the step, s.
 
-    arrays: dict[str, dict[str, tuple[int, float]]]
-    step: float
-
-
-def places(file: Path) -> Places:
-    """Return where the joints of an MJCF stand in qpos, qvel, qfrc_actuator and, by position actuators, in ctrl."""
-    model, ctrl = _model(file), {}
+    Arrays are qpos, qvel, qfrc_actuator and, by position actuators, ctrl.
+    """
+    model, servos, ctrl = opened(file), servos_of_mjcf(file), {}
     for k in range(model.nu):
         joint = model.joint(int(model.actuator_trnid[k, 0])).name
-        if joint in servos_of_mjcf(file):
+        if joint in servos:
             ctrl[joint] = (k, 1.0 / float(model.actuator_gear[k, 0]))
     single = [k for k in range(model.njnt) if model.jnt_type[k] in (_SLIDE, _HINGE)]
     q = {model.joint(k).name: (int(model.jnt_qposadr[k]), 1.0) for k in single}
     v = {model.joint(k).name: (int(model.jnt_dofadr[k]), 1.0) for k in single}
-    return Places({"ctrl": ctrl, "qpos": q, "qvel": v, "qfrc_actuator": v}, float(model.opt.timestep))
+    return {"ctrl": ctrl, "qpos": q, "qvel": v, "qfrc_actuator": v}, float(model.opt.timestep)
 
 
 def urdf_of_mjcf(file: Path) -> str:
@@ -78,7 +69,7 @@ def urdf_of_mjcf(file: Path) -> str:
     CampaignError
         If MuJoCo is not installed or does not take the file, or if a joint is a ball.
     """
-    model = _model(file)
+    model = opened(file)
     robot = ElementTree.Element("robot", name=file.stem)
     anchors, links = {0: np.zeros(3)}, {0: "world"}
     ElementTree.SubElement(robot, "link", name="world")

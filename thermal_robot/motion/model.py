@@ -18,12 +18,13 @@ from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
-from thermal_robot.motion.log import MotionLog, Servo
+from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Mask = NDArray[np.bool_]
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -56,10 +57,19 @@ class JointModel(ABC):
     """What all models of a log's joints share: parameters by name, and work on several joints at a time."""
 
     parameters: tuple[Parameter, ...] = ()
+    motions: list[NDArray[np.int64]]  # of each joint the motions (N,) of its readings
     unit = "rad"
 
     def __init__(self, log: MotionLog) -> None:
         self.log, self.joints = log, range(len(log.joints))
+        self.servos = [log.servo(name) for name in log.joints]
+        payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
+        self.dynamics = Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """(P,) expected sizes of the parameters: one sigma of their priors."""
+        return np.array([one.size for one in self.parameters])
 
     @cached_property
     def clusters(self) -> int:
@@ -78,31 +88,30 @@ class JointModel(ABC):
         place = np.arange(len(motion)) - (np.cumsum(counts) - counts)[motion]
         return np.asarray(motion * self.pieces + place * self.pieces // np.maximum(counts[motion], 1))
 
+    @cached_property
+    def keys(self) -> list[tuple[str, str]]:
+        """Effect and joint of each parameter, the joint empty where all share it."""
+        return [(one.effect, "" if one.joint == SHARED else self.log.joints[one.joint]) for one in self.parameters]
+
     def index(self, effect: str, joint: int = SHARED) -> int | None:
         """Return the place of a parameter, ``None`` where the model has none of it."""
-        found = [p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)]
-        return found[0] if found else None
+        return next((p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)), None)
 
-    def dynamics_of(self, log: MotionLog) -> Dynamics:
-        """Rigid-body dynamics of the log's joints."""
-        payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
-        return Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
-
-    def own(self, joint: int, wanted: NDArray[np.bool_] | None) -> NDArray[np.int64]:
+    def own(self, joint: int, wanted: Mask | None = None) -> NDArray[np.int64]:
         """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
         places = [p for p, one in enumerate(self.parameters) if one.joint in (joint, SHARED)]
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
-    def rated(self, torque: Array) -> float:
-        """Return the expected payload, kg: a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
+    def payload(self, torque: Array) -> Parameter:
+        """Payload, expected as a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
         most = np.abs(torque).max(axis=0)
-        servos = [self.log.servos.get(name, Servo()) for name in self.log.joints]
-        limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in servos])
-        return settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
+        limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
+        size = settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
+        return Parameter("payload", SHARED, "mass", "kg", size, 1.0, False, "payload")
 
-    @abstractmethod
     def start(self) -> Array:
-        """(P,) values from which all effects are fitted."""
+        """(P,) values from which all effects are fitted: of a problem that is nearly linear none."""
+        return np.zeros(len(self.parameters))
 
     @abstractmethod
     def refreshed(self, values: Array) -> None:
@@ -113,30 +122,56 @@ class JointModel(ABC):
         """(S, N) residual of a joint for S sets (S, P) of all parameters."""
 
     @abstractmethod
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
-
-    @abstractmethod
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
 
     @abstractmethod
     def noise(self, joint: int) -> float:
         """One sigma of the readings of a joint."""
 
     @abstractmethod
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what the residual of a joint may follow, by name."""
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) what the residual of a joint may follow: position, velocity, load and time."""
 
     @abstractmethod
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """(N,) what is drawn of a joint, by name."""
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, command, what was measured, and load, at the readings of a joint."""
+
+    def motion_of(self, joint: int) -> NDArray[np.int64]:
+        """(N,) number of the cluster of each reading of a joint."""
+        return self.cluster_of(self.motions[joint])
+
+    def quantities(self, joint: int) -> dict[str, Array]:
+        """(N,) what the residual of a joint may follow, by name."""
+        names = f"the position of {self.log.joints[joint]}", "velocity", "load", "time"
+        return dict(zip(names, self.followed(joint), strict=True))
 
     def curves(self, joint: int, values: Array) -> pd.DataFrame:
-        """Table of what is drawn of a joint: motion, time, command, measured, nominal, simulated and load."""
+        """Table of what is drawn of a joint; ``nominal`` is simulated without any effect."""
         import pandas as pd
 
-        return pd.DataFrame(self.drawn(joint, values))
+        time, command, measured, load = self.drawn(joint)
+        nominal, simulated = measured - self.residuals(joint, np.stack([np.zeros_like(values), values]))
+        given = {"motion": self.motions[joint], "time": time, "command": command, "measured": measured}
+        return pd.DataFrame({**given, "nominal": nominal, "simulated": simulated, "load": load})
+
+    def moves(self, values: Array) -> dict[tuple[str, str], float]:
+        """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.
+
+        By effect and joint, of what all joints share in each; of the values (P,) what is zero is no part of the fit.
+        """
+
+        def of_joint(joint: int) -> dict[tuple[str, str], float]:
+            own = self.own(joint, values != 0.0)
+            effects = list(dict.fromkeys(self.parameters[p].effect for p in own))
+            sets = np.tile(values, (1 + len(effects), 1))
+            for p in own:
+                sets[1 + effects.index(self.parameters[p].effect), p] = 0.0
+            left = self.residuals(joint, sets)
+            sizes = np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1))
+            return {(name, self.log.joints[joint]): float(x) for name, x in zip(effects, sizes, strict=True)}
+
+        return {key: size for one in self.each(of_joint) for key, size in one.items()}
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
@@ -147,10 +182,6 @@ class JointModel(ABC):
         """Residual (N,) of every joint at the parameters (P,)."""
         return self.each(lambda joint: self.residuals(joint, values[None])[0])
 
-    def all_rows(self, values: Array, wanted: NDArray[np.bool_] | None = None) -> list[Rows]:
-        """Residual and derivatives of every joint at the parameters (P,)."""
-        return self.each(lambda joint: self.rows(joint, values, wanted))
-
 
 class ServoModel(JointModel):
     """Residual and derivative of a log's encoder readings by the parameters of the servo model.
@@ -160,23 +191,22 @@ class ServoModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        self.dynamics = self.dynamics_of(log)
-        self.servos = [log.servos.get(name, Servo()) for name in log.joints]
         self.coupled = all(servo.kp for servo in self.servos)
         self._grids()
+        self.measured = np.concatenate([motion.position.values for motion in log.motions])
+        self.reach = np.nanmin(self.measured, axis=0), np.nanmax(self.measured, axis=0)
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
-        self.about = np.stack([np.clip(self.commanded[:, j], *self._range(j)) for j in self.joints], axis=1)
+        self.about = np.clip(self.commanded, *self.reach)
         self.loads = self.dynamics.along(self.about)
         self.moving = False
-        self.touching, self.pressing = 0.0, np.zeros_like(self.about)
-        self.contact = np.zeros_like(self.about)
         self.lowest = float(self._heights(self.commanded)[0].min())
+        self.motions = [samples[3] for samples in self._samples]
         self.parameters = self._parameters()
+        self._press(np.zeros(len(self.parameters)))
 
     def _grids(self) -> None:
         motions = self.log.motions
-        spacing = np.concatenate([np.diff(m.position.time) for m in motions])
-        self.step = float(np.median(spacing))
+        self.step = float(np.median(np.concatenate([np.diff(m.position.time) for m in motions])))
         if self.coupled:
             self.step /= max(1, int(np.ceil(self.step / settings.STEP)))
         self.substeps = max(1, int(np.ceil(self.step / settings.STEP)))
@@ -184,10 +214,6 @@ class ServoModel(JointModel):
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first = np.array([m.position.time[0] for m in motions])
         self.grid = np.concatenate([t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)])
-
-    def _range(self, joint: int) -> tuple[float, float]:
-        measured = np.concatenate([m.position.values[:, joint] for m in self.log.motions])
-        return float(np.nanmin(measured)), float(np.nanmax(measured))
 
     def _held(self, joint: int) -> Array:
         """(n,) the command of a joint on the grid, held between its stamps."""
@@ -214,7 +240,7 @@ class ServoModel(JointModel):
     def _samples(self) -> list[tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]]:
         """Of each joint the readings (N,), their place on the grid and the part of a step beyond it, and motions."""
         found = []
-        for j in range(len(self.log.joints)):
+        for j in self.joints:
             parts = []
             for k, motion in enumerate(self.log.motions):
                 q, t = motion.position.values[:, j], motion.position.time
@@ -233,27 +259,24 @@ class ServoModel(JointModel):
             if e.number not in (("droop",) if servo.kp else ("kp",))
         ]
         if self.log.robot.has_masses:
-            size_of = self.rated(self.loads.torque[1])
-            found.append(Parameter("payload", SHARED, "mass", "kg", size_of, 1.0, False, "payload"))
-            found.append(
-                Parameter("contact", SHARED, "height above the lowest command", "m", 0.1, 1.5, True, "contact")
-            )
+            height = "height above the lowest command"
+            found.append(self.payload(self.loads.torque[1]))
+            found.append(Parameter("contact", SHARED, height, "m", 0.1, 1.5, True, "contact"))
         return tuple(found)
 
     def start(self) -> Array:
         """(P,) values from which all effects are fitted: those of most, and stops and limits where the joint ends."""
         values = np.array([0.5 * one.size if one.positive else 0.0 for one in self.parameters])
-        for joint in range(len(self.log.joints)):
-            command, (low, high) = self.commanded[:, joint], self._range(joint)
-            at = {name: self.index(name, joint) for name in ("low_stop", "high_stop", "torque_limit")}
-            values[at["low_stop"]] = max(low - command.min(), 0.0)
-            values[at["high_stop"]] = max(command.max() - high, 0.0)
+        for joint in self.joints:
+            command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
+            values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
+            values[self.index("high_stop", joint)] = max(command.max() - high, 0.0)
             measured, place, _, _ = self._samples[joint]
             error = np.abs(command[place] - measured)
-            values[at["torque_limit"]] = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
+            limit = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
+            values[self.index("torque_limit", joint)] = limit
         if (p := self.index("contact")) is not None:
-            measured = np.concatenate([m.position.values for m in self.log.motions])
-            height, _ = self._heights(measured[np.isfinite(measured).all(axis=1)])
+            height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
         return values
 
@@ -294,9 +317,8 @@ class ServoModel(JointModel):
         """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free`` of any contact."""
         numbers, weights = self.numbers(joint, values)
         parts = self.loads.torque[:2, :, joint]
-        contact = np.zeros_like(self.contact) if free else self.contact
-        pressing = 0.0 if free else self.pressing[:, joint]
-        loads = np.stack([parts[0] + pressing, parts[1], contact[:, joint]])
+        contact, pressing = (0.0 if free else 1.0) * np.stack([self.contact[:, joint], self.pressing[:, joint]])
+        loads = np.stack([parts[0] + pressing, parts[1], contact])
         inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
         around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
         begun = [motion.position.of(joint)[1][0] for motion in self.log.motions]
@@ -311,7 +333,7 @@ class ServoModel(JointModel):
         simulated = self.positions(joint, values)
         return np.asarray(measured - (1.0 - beyond) * simulated[:, at] - beyond * simulated[:, at + 1])
 
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
         own = self.own(joint, wanted)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
@@ -320,37 +342,21 @@ class ServoModel(JointModel):
         found = self.residuals(joint, sets)
         return Rows(found[0], (found[0] - found[1:]).T / steps, own, self.motion_of(joint))
 
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
-        return self.cluster_of(self._samples[joint][3])
-
     def noise(self, joint: int) -> float:
         """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""
         steps = np.abs(np.diff(np.unique(np.round(self._samples[joint][0], 9))))
         return max(float(np.median(steps)) / np.sqrt(12.0) if len(steps) else 0.0, settings.LEAST_NOISE)
 
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what a joint's residual may follow, at its readings: position, velocity, load and time."""
-        _, at, _, motion = self._samples[joint]
-        velocity = np.gradient(self.about[:, joint], self.step)
-        load = self.loads.torque[0, :, joint]
-        return {
-            f"the position of {self.log.joints[joint]}": self.about[at, joint],
-            "velocity": velocity[at],
-            "load": load[at],
-            "time": self.grid[at] - self.first[motion],
-        }
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) position, velocity, load and time at the step before each reading."""
+        (_, at, _, motion), velocity = self._samples[joint], np.gradient(self.about[:, joint], self.step)
+        return self.about[at, joint], velocity[at], self.loads.torque[0, at, joint], self.grid[at] - self.first[motion]
 
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """Command, measured and simulated positions of a joint at its readings, rad; simulated without effects, too."""
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, s, command and measured position, rad, and load, N·m."""
         measured, at, beyond, motion = self._samples[joint]
-        left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        return {
-            "motion": motion, "time": self.grid[at] + beyond * self.step - self.first[motion],
-            "command": self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
-            "measured": measured, "nominal": measured - left[0],
-            "simulated": measured - left[1], "load": self.loads.torque[0, at, joint],
-        }  # fmt: skip
+        time, near = self.grid[at] + beyond * self.step - self.first[motion], np.where(beyond > 0.5, at + 1, at)
+        return time, self.commanded[near, joint], measured, self.loads.torque[0, at, joint]
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.
@@ -359,7 +365,6 @@ class ServoModel(JointModel):
         positive mass matrix that is scaled by its diagonal lie between 0 and J.
         """
         share, rounds = (2.0 / (len(self.joints) + 1), settings.WAVES) if self.coupled else (1.0, 1)
-        self._touch(None)
         for _ in range(rounds):
             about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
             loads = self._loads(about)
@@ -369,34 +374,32 @@ class ServoModel(JointModel):
             self.about, self.loads = about, loads
             if moved < min(self.noise(joint) for joint in self.joints):
                 break
-        self._touch(values)
+        self._press(values)
 
     def _loads(self, about: Array) -> Loads:
         """Return the loads along positions (n, J) on the grid; those of their motion where coupled."""
-        speed = rate = None
-        if self.coupled:
-            speed, rate = np.zeros_like(about), np.zeros_like(about)
-            for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
-                if b - a > 2:
-                    speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
-                    rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
+        if not self.coupled:
+            return self.dynamics.along(about)
+        speed, rate = np.zeros_like(about), np.zeros_like(about)
+        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+            if b - a > 2:
+                speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
+                rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
         return self.dynamics.along(about, speed, rate)
-
-    def _touch(self, values: Array | None) -> None:
-        p = self.index("contact")
-        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
-        if p is not None and values is not None and values[p] > 0.0:
-            self._press(values)
 
     def _press(self, values: Array) -> None:
         """Let the tool rest on a plane: the joints' springs yield to the force that keeps it there, without friction.
 
         The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
         """
+        p = self.index("contact")
+        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
+        if p is None or values[p] <= 0.0:
+            return
         height, slope = self._heights(self.about)
         compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
-        self.touching = float(values[self.index("contact")])
+        self.touching = float(values[p])
         into = self.lowest + self.touching - height
         self.contact = np.where(into > 0.0, 1.0, 0.0)[:, None] * -slope / yields[:, None]
         self.pressing = self.contact * np.maximum(into, 0.0)[:, None]

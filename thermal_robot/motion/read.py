@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,8 +40,6 @@ FILE_NAME = "motion.toml"
 _COLUMN = text("the name of a column")
 _PATH = text("the path of a table")
 _OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": NOT_NEGATIVE}
-SERVOS = mapping(record(_OF_A_SERVO, may_lack=_OF_A_SERVO))
-PAYLOAD = record({"mass": NOT_NEGATIVE, "com": kinds.VECTOR}, may_lack=["com"])
 TOLERANCE = mapping(NOT_NEGATIVE)
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "robot": {
@@ -58,7 +57,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "angle_unit": kinds.ANGLE_UNIT,
         "length_unit": kinds.LENGTH_UNIT,
     },
-    "servo": SERVOS,
+    "servo": mapping(record(_OF_A_SERVO, may_lack=_OF_A_SERVO)),
     "payload": {"mass": NOT_NEGATIVE, "com": kinds.VECTOR},
     "channels": channels_kind,
     "tolerance": TOLERANCE,
@@ -72,30 +71,25 @@ class Declaration:
     """What motion.toml says of its tables, or a call; lengths of the payload in m, the rest of the servo in SI."""
 
     name: str
-    units: Units = field(default_factory=Units)
-    labels: Mapping[str, str] = field(default_factory=dict)  # columns of time, motion and kind, where stated
-    channels: Mapping[str, Stated] = field(default_factory=dict)
-    servos: Mapping[str, Servo] = field(default_factory=dict)
-    payload: tuple[float, Array] | None = None
-    tolerance: Mapping[str, float] = field(default_factory=dict)
-    about: Mapping[str, str] = field(default_factory=dict)
+    units: Units
+    labels: Mapping[str, str]  # columns of time, motion and kind, where stated
+    channels: Mapping[str, Stated]
+    servos: Mapping[str, Servo]
+    payload: tuple[float, Array] | None
+    tolerance: Mapping[str, float]
+    about: Mapping[str, str]
 
     @classmethod
-    def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]]) -> Declaration:
-        """Return what sections of motion.toml say."""
+    def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]], servos: Mapping[str, Servo]) -> Declaration:
+        """Return what sections of motion.toml say, and of servos what is known beside them."""
         motion, payload = sections["motion"], sections.get("payload", {})
         units = Units(motion["angle_unit"], motion.get("length_unit", "m"))
         com = np.array(payload.get("com", (0.0, 0.0, 0.0))) * units.length_scale
-        return cls(
-            name,
-            units,
-            {key: motion[key] for key in ("time", "motion", "kind") if motion.get(key)},
-            sections.get("channels", {}),
-            {joint: Servo(**said) for joint, said in sections.get("servo", {}).items()},
-            (payload["mass"], com) if "mass" in payload else None,
-            sections.get("tolerance", {}),
-            sections.get("about", {}),
-        )
+        labels = {key: motion[key] for key in ("time", "motion", "kind") if motion.get(key)}
+        servos = {**servos, **{joint: Servo(**said) for joint, said in sections.get("servo", {}).items()}}
+        held = (payload["mass"], com) if "mass" in payload else None
+        channels, tolerance, about = (sections.get(key, {}) for key in ("channels", "tolerance", "about"))
+        return cls(name, units, labels, channels, servos, held, tolerance, about)
 
 
 def declares_motion(path: Path) -> bool:
@@ -136,20 +130,24 @@ def read_motion(path: str | Path, *, folder: str | Path | None = None) -> Motion
     ...     print(error)
     no_such_folder: there is no such file...
     """
-    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
-    document = Document(file, KINDS, FILE_NAME)
-    base = file.parent if folder is None else Path(folder)
-    log = document.required("motion", "log")
+    file, base, document, logs = _declared(path, folder)
     document.required("motion", "angle_unit")
-    tables = [read_table(base / each) for each in ((log,) if isinstance(log, str) else log)]
-    declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections)
-    held = sources(tables, declaration.channels)
+    tables = [read_table(each) for each in logs]
+    held = sources(tables, document.sections.get("channels", {}))
     robot, servos = robot_of(document.sections.get("robot", {}), file, base, joints_of(held))
-    declaration = replace(declaration, servos={**servos, **declaration.servos})
+    declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections, servos)
     for section in ("servo", "tolerance"):
         lines = {joint: document.row(section, joint) for joint in document.sections.get(section, {})}
         check_joints(str(file), section, lines, robot.joint_names, lines)
     return build_motions(tables, held, declaration, robot)
+
+
+def _declared(path: str | Path, folder: str | Path | None) -> tuple[Path, Path, Document, list[Path]]:
+    """Return a motion.toml, the folder of the paths in it, its document, and the files of its tables."""
+    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
+    document, base = Document(file, KINDS, FILE_NAME), file.parent if folder is None else Path(folder)
+    log = document.required("motion", "log")
+    return file, base, document, [base / each for each in ((log,) if isinstance(log, str) else log)]
 
 
 def robot_of(
@@ -162,11 +160,11 @@ def robot_of(
     servos: dict[str, Servo] = {}
     reference: str | Path
     if "mjcf" in said:
-        from thermal_robot.motion.mjcf import gravity_of_mjcf, servos_of_mjcf, urdf_of_mjcf
+        from thermal_robot.motion.mjcf import opened, servos_of_mjcf, urdf_of_mjcf
 
         mjcf = folder / said["mjcf"]
         reference, servos = urdf_of_mjcf(mjcf), servos_of_mjcf(mjcf)
-        said = {"gravity": gravity_of_mjcf(mjcf), **said}
+        said = {"gravity": tuple(opened(mjcf).opt.gravity.tolist()), **said}
     else:
         reference = robot_reference(said["urdf"], folder)
     ends = {"root_frame": said.get("root_frame"), "gravity": said.get("gravity")}
@@ -183,10 +181,8 @@ def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints:
     described, source, _ = urdf_text(reference)
     chains = []
     for leaf in leaf_links(described, source):
-        try:
+        with suppress(RobotError):  # a hand beside the arm may have joints of another kind, or none
             chains.append(stated_robot(file, reference, leaf, **ends))
-        except RobotError:  # a hand beside the arm may have joints of another kind, or none
-            continue
     if not chains:  # say why
         return stated_robot(file, reference, "", **ends)
     return max(chains, key=lambda robot: len(set(joints) & set(robot.joint_names)))
@@ -194,12 +190,10 @@ def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints:
 
 def files_of(path: str | Path, folder: Path | None = None) -> list[Path]:
     """Return the files that a log is read from: motion.toml, its tables, and the robot where it is a file."""
-    file = declared_file(stated_path("read_motion()", path, FILE_NAME), FILE_NAME, "motion")
-    document, base = Document(file, KINDS, FILE_NAME), file.parent if folder is None else folder
-    log, said = document.required("motion", "log"), document.sections.get("robot", {})
-    robot = [base / said["mjcf"]] if "mjcf" in said else [robot_reference(said.get("urdf", ""), base)]
-    tables = [base / each for each in ((log,) if isinstance(log, str) else log)]
-    return [file, *tables, *(one for one in robot if isinstance(one, Path))]
+    file, base, document, logs = _declared(path, folder)
+    said = document.sections.get("robot", {})
+    robot = base / said["mjcf"] if "mjcf" in said else robot_reference(said.get("urdf", ""), base)
+    return [file, *logs, *([robot] if isinstance(robot, Path) else [])]
 
 
 def motion_from_table(
@@ -260,16 +254,13 @@ def motion_from_table(
     for frame in frames:
         require(f"{call}, table", frame, (pd.DataFrame,), "pandas DataFrames")
     tables = [table_from_frame(f, "<table>" if len(frames) == 1 else f"<table {k}>") for k, f in enumerate(frames)]
-    units = Units(angle_unit, length_unit)
-    declaration = Declaration(
-        given(call, "name", name, text(empty=True)),
-        units,
-        {key: column for key, column in (("time", time), ("motion", motion), ("kind", kind)) if column},
-        given(call, "channels", channels or {}, channels_kind),
-        dict(servos or {}),
-        None if payload is None else (float(payload[0]), np.array(payload[1], dtype=float) * units.length_scale),
-        given(call, "tolerance", tolerance or {}, TOLERANCE),
-    )
+    sections = {
+        "motion": {"angle_unit": angle_unit, "length_unit": length_unit, "time": time, "motion": motion, "kind": kind},
+        "channels": given(call, "channels", channels or {}, channels_kind),
+        "payload": {} if payload is None else {"mass": float(payload[0]), "com": payload[1]},
+        "tolerance": given(call, "tolerance", tolerance or {}, TOLERANCE),
+    }
+    declaration = Declaration.stated(given(call, "name", name, text(empty=True)), sections, servos or {})
     for key, named in (("servos", declaration.servos), ("tolerance", declaration.tolerance)):
         check_joints(call, key, named, robot.joint_names)
     return build_motions(tables, sources(tables, declaration.channels), declaration, robot)
@@ -284,13 +275,13 @@ def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: 
     """Validate tables and return the log; what cannot be used is refused with row and column."""
     joints, notes = _joints(tables, held, robot)
     clocks = [_Clock.of(table, declaration) for table in tables]
-    _require_labels(tables, clocks)
+    _require_labels(clocks)
     notes += [note for clock in clocks for note in clock.notes]
     read = {source.column for source in held} | {clock.column for clock in clocks} | set(declaration.labels.values())
     unread = [c for table in tables for c in table.columns if c not in read and c not in ("motion", "kind")]
     notes += [f"columns that were not read: {listed(unread, 6)}"] if unread else []
     channels = {
-        name: _channel(tables, clocks, [s for s in held if s.quantity == q], declaration, robot, joints)
+        name: _channel(clocks, [s for s in held if s.quantity == q], declaration, robot, joints)
         for q, name in FIELDS.items()
     }
     motions: list[Motion] = []
@@ -304,22 +295,14 @@ def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: 
             continue
         kind = next((clock.kinds[label] for clock in clocks if clock.kinds.get(label)), "")
         motions += _motions(label or declaration.name, kind, parts, notes)
+    files = " and ".join(table.file for table in tables)
     if not motions:
-        files = " and ".join(table.file for table in tables)
         expected = "motions with both, of the same label and clock"
         raise CampaignError(files, "no motion has command and position", expected=expected)
-    log = MotionLog(
-        declaration.name,
-        robot,
-        joints,
-        tuple(motions),
-        declaration.servos,
-        declaration.payload,
-        declaration.tolerance,
-        (*(warning for table in tables for warning in table.warnings), *notes),
-        declaration.about,
-    )
-    return refused(log, " and ".join(table.file for table in tables))
+    own = {key: getattr(declaration, key) for key in ("servos", "payload", "tolerance", "about")}
+    warnings = (warning for table in tables for warning in table.warnings)
+    log = MotionLog(declaration.name, robot, joints, tuple(motions), notes=(*warnings, *notes), **own)
+    return refused(log, files)
 
 
 def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tuple[tuple[str, ...], list[str]]:
@@ -342,9 +325,8 @@ def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tu
         raise CampaignError(files, "no joint's position is recorded", expected="columns q.<joint>, or [channels]")
     if torques and not both:
         problem = "no command is recorded, and no torque: nothing says what the joints should have done"
-        raise CampaignError(
-            files, problem, expected="columns cmd.<joint>, or tau.<joint>: a current times its constant"
-        )
+        expected = "columns cmd.<joint>, or tau.<joint>: a current times its constant"
+        raise CampaignError(files, problem, expected=expected)
     if not both:
         found = f"{listed(named)}; the robot has {listed(robot.joint_names)}"
         raise CampaignError(files, "no joint has command and position", found=found, expected="both")
@@ -360,6 +342,7 @@ def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tu
 class _Clock:
     """Stamps of a table's rows, (N,) s, and to which motion each belongs: (N,) indices into ``order``."""
 
+    table: Table
     column: str
     time: Array
     order: tuple[str, ...]
@@ -371,20 +354,19 @@ class _Clock:
     @classmethod
     def of(cls, table: Table, declaration: Declaration) -> _Clock:
         """Read the clock of a table; refuse rows out of order."""
-        column = declaration.labels.get("time", "time")
         stated = declaration.channels.get("time", Stated())
-        column = stated.column or column
+        column = stated.column or declaration.labels.get("time", "time")
         if column not in table.columns:
             problem = f"has no column of time{did_you_mean(column, table.columns)}"
             raise table.error(problem, column, expected="stamps of the rows; its name is [motion] time")
         time = table.numbers(column) * (stated.scale or 1.0)
         label = declaration.labels.get("motion", "motion")
-        labels = np.array(table.text(label) if label in table.columns else [""] * len(time), dtype=np.str_)
-        found, first, index = np.unique(labels, return_index=True, return_inverse=True)
-        rank = np.argsort(np.argsort(first))
-        order = tuple(str(found[k]) for k in np.argsort(first))
-        kept, notes = _in_order(table, column, time, rank[index])
-        return cls(column, time, order, rank[index], _kinds(table, declaration, order, rank[index]), kept, notes)
+        labels = table.text(label) if label in table.columns else [""] * len(time)
+        order = tuple(dict.fromkeys(labels))
+        places = {name: k for k, name in enumerate(order)}
+        index = np.array([places[name] for name in labels])
+        kept, notes = _in_order(table, column, time, index)
+        return cls(table, column, time, order, index, _kinds(table, declaration, order, index), kept, notes)
 
 
 def _in_order(
@@ -400,10 +382,8 @@ def _in_order(
         raise table.error("rows are out of order, or two motions have one label", column, at, **told)
     kept = np.ones(len(time), dtype=bool)
     kept[rows[1:][same & (step == 0.0)]] = False
-    repeated = int((~kept).sum())
-    return kept, (
-        f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before",
-    ) if repeated else ()
+    said = f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before"
+    return kept, () if kept.all() else (said,)
 
 
 def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion: NDArray[np.int64]) -> dict[str, str]:
@@ -422,22 +402,17 @@ def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion:
     return found
 
 
-def _require_labels(tables: Sequence[Table], clocks: Sequence[_Clock]) -> None:
+def _require_labels(clocks: Sequence[_Clock]) -> None:
     """Refuse a table without labels beside one with several."""
     several = any(len(clock.order) > 1 for clock in clocks)
-    for table, clock in zip(tables, clocks, strict=True):
+    for clock in clocks:
         if several and clock.order == ("",):
             expected = "a column that says which motion each row belongs to, as in the other table"
-            raise CampaignError(table.file, "has no labels of motions", expected=expected)
+            raise CampaignError(clock.table.file, "has no labels of motions", expected=expected)
 
 
 def _channel(
-    tables: Sequence[Table],
-    clocks: Sequence[_Clock],
-    held: Sequence[Source],
-    declaration: Declaration,
-    robot: Robot,
-    joints: tuple[str, ...],
+    clocks: Sequence[_Clock], held: Sequence[Source], declaration: Declaration, robot: Robot, joints: Sequence[str]
 ) -> dict[str, Channel]:
     """Return the samples of a quantity by motion, clocks as recorded; rows in which no joint has any are left out."""
     kinds_of = joint_kinds(robot)
@@ -449,7 +424,7 @@ def _channel(
             if source.joint and source.joint not in joints:
                 continue
             scale = scale_of(source, declaration.channels, declaration.units, kinds_of.get(source.joint, "revolute"))
-            cells = tables[number].numbers(source.column, gaps=True) * scale
+            cells = clock.table.numbers(source.column, gaps=True) * scale
             chosen = joints.index(source.joint) if source.joint else slice(None)
             values[:, chosen] = cells if source.joint else cells[:, None]
         some = clock.kept & ~np.isnan(values).all(axis=1)
@@ -462,14 +437,10 @@ def _channel(
 
 def _merged(parts: Sequence[tuple[Array, Array]]) -> Channel:
     """Return the samples of one or several tables in the order of their stamps."""
-    if len(parts) == 1:
-        return _frozen(*parts[0])
-    time = np.unique(np.concatenate([stamps for stamps, _ in parts]))
-    values = np.full((len(time), parts[0][1].shape[1]), np.nan)
-    for stamps, own in parts:
-        at = np.searchsorted(time, stamps)
-        values[at] = np.where(np.isnan(own), values[at], own)
-    return _frozen(time, values)
+    import pandas as pd
+
+    merged = pd.concat([pd.DataFrame(values, index=stamps) for stamps, values in parts]).groupby(level=0).last()
+    return _frozen(merged.index.to_numpy(copy=True), merged.to_numpy(copy=True))
 
 
 def _frozen(time: Array, values: Array) -> Channel:

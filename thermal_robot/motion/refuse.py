@@ -16,7 +16,9 @@ from thermal_robot.motion.settings import FOREIGN, LEAST_RATE, LONGEST_LAG, NO_L
 
 def refused(log: MotionLog, files: str) -> MotionLog:
     """Return the log with notes on what is doubtful; refuse one that tells nothing, naming its files."""
-    _refuse_slow(log, files)
+    rate = 1.0 / float(np.median([usual_step(motion.position) for motion in log.motions]))
+    if rate < LEAST_RATE:
+        raise CampaignError(files, "is sampled too slowly", found=f"{rate:.3g} Hz", expected="at least 30 Hz")
     if not log.commanded:
         return log
     guided = [motion.name for motion in log.motions if _foreign(motion) > FOREIGN]
@@ -35,12 +37,6 @@ def refused(log: MotionLog, files: str) -> MotionLog:
             raise CampaignError(files, f"{problem}; a cascaded controller's gap tells no effect", expected=expected)
         notes.append(f"{problem}; the torque tells, and the gap does not")
     return replace(log, notes=tuple(notes))
-
-
-def _refuse_slow(log: MotionLog, files: str) -> None:
-    rate = 1.0 / float(np.median([usual_step(motion.position) for motion in log.motions]))
-    if rate < LEAST_RATE:
-        raise CampaignError(files, "is sampled too slowly", found=f"{rate:.3g} Hz", expected="at least 30 Hz")
 
 
 def _foreign(motion: Motion) -> float:
@@ -68,7 +64,7 @@ def explains_torques(log: MotionLog) -> bool:
 def fed_forward(log: MotionLog) -> bool:
     """Whether every joint that moves, and whose servo is not stated, follows its command without a lag."""
     lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
-    lags = lags[:, [log.servos.get(joint) is None or log.servos[joint].kp is None for joint in log.joints]]
+    lags = lags[:, [log.servo(joint).kp is None for joint in log.joints]]
     moving = ~np.isnan(lags).all(axis=0)
     return bool(moving.any()) and bool((np.abs(np.nanmedian(lags[:, moving], axis=0)) < NO_LAG).all())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,9 +12,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import SCHEMA, estimate_table
 from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import EFFECTS
-from thermal_robot.motion.log import MotionLog, Servo
-from thermal_robot.motion.physical import physical
+from thermal_robot.motion.effects import EFFECTS, physical
+from thermal_robot.motion.log import MotionLog, joint_kinds
 from thermal_robot.renderer import RenderedPage, registered_renderer
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ class MotionDiagnosis(RenderedPage):
     unit
         SI unit of the gap of a joint that turns: rad, or N·m where torques were recorded.
     moves
-        By effect and joint, how far it alone moves what is simulated: see :func:`~thermal_robot.motion.moves.moves`.
+        By effect and joint, rms by which it alone moves what is simulated.
 
     Examples
     --------
@@ -125,7 +124,7 @@ class MotionDiagnosis(RenderedPage):
 
     def unit_of(self, joint: str) -> str:
         """Return the SI unit of a joint's gap."""
-        slides = self.log.kinds.get(joint) == "prismatic"
+        slides = joint_kinds(self.log.robot).get(joint) == "prismatic"
         return {"rad": "m", "N·m": "N"}[self.unit] if slides else self.unit
 
     def title(self, effect: str, joint: str = "") -> str:
@@ -172,9 +171,8 @@ class MotionDiagnosis(RenderedPage):
         for estimate in self.finding(effect).parameters:
             joint = self.joint_of(estimate)
             if joint in seen or (seen and not joint):
-                servo = self.log.servos.get(joint) or Servo()
                 commanded = self.curves[joint]["command"] if joint in self.curves else ()
-                found.append(physical(effect, estimate, servo, np.asarray(commanded)))
+                found.append(physical(effect, estimate, self.log.servo(joint), np.asarray(commanded)))
         return tuple(found)
 
     def joint_of(self, estimate: Estimate) -> str:
@@ -185,12 +183,12 @@ class MotionDiagnosis(RenderedPage):
     @property
     def rms_before(self) -> float:
         """Root mean square of the gap over all joints and readings, rad."""
-        return _rms([one.before for one in self.joints.values()])
+        return rms([one.before for one in self.joints.values()])
 
     @property
     def rms_after(self) -> float:
         """The same once the effects are at work."""
-        return _rms([one.after for one in self.joints.values()])
+        return rms([one.after for one in self.joints.values()])
 
     def finding(self, effect: str) -> Finding:
         """Return the finding of one effect; :class:`KeyError` where there is none of that name."""
@@ -212,20 +210,12 @@ class MotionDiagnosis(RenderedPage):
         """
         import pandas as pd
 
-        told = {
-            name: pd.DataFrame(
-                {
-                    "motion": one["motion"],
-                    "time": one["time"],
-                    "gap": one["measured"] - one["nominal"],
-                    "remainder": one["measured"] - one["simulated"],
-                }
-            )
-            for name, one in self.curves.items()
-        }
-        if not told:
+        if not self.curves:
             return pd.DataFrame(columns=["gap", "remainder"])
-        return pd.concat(told, names=["joint"]).set_index(["motion", "time"], append=True).droplevel(1)
+        whole = pd.concat(dict(self.curves), names=["joint"]).set_index(["motion", "time"], append=True).droplevel(1)
+        return pd.DataFrame(
+            {"gap": whole["measured"] - whole["nominal"], "remainder": whole["measured"] - whole["simulated"]}
+        )
 
     @property
     def gaps(self) -> pd.DataFrame:
@@ -258,23 +248,16 @@ class MotionDiagnosis(RenderedPage):
         return dict(jsonable(plain))
 
     def _campaign(self) -> dict[str, Any]:
-        return {
-            "name": self.log.name,
-            "robot": self.log.robot.name,
-            "tool_frame": self.log.robot.tool_frame,
-            "samples": sum(len(motion.position.time) for motion in self.log.motions),
-            "motions": len(self.log.motions),
-            "measures": "motion",
-            "outliers": [],
-            "faults": self.faults,
-            "warnings": self.warnings,
-        }
+        log, samples = self.log, sum(len(motion.position.time) for motion in self.log.motions)
+        plain = {"name": log.name, "robot": log.robot.name, "tool_frame": log.robot.tool_frame, "samples": samples}
+        plain |= {"motions": len(log.motions), "measures": "motion", "outliers": []}
+        return {**plain, "faults": self.faults, "warnings": self.warnings}
 
     def _gap(self) -> dict[str, Any]:
         return {
             "rms_before": self.rms_before,
             "rms_after": self.rms_after,
-            "noise_floor": _rms([one.noise for one in self.joints.values()]),
+            "noise_floor": rms([one.noise for one in self.joints.values()]),
             "noise_source": "scatter",
             "orientation": None,
             "held_out": asdict(self.held_out),
@@ -283,22 +266,14 @@ class MotionDiagnosis(RenderedPage):
 
     def _left(self) -> dict[str, Any]:
         left = self.unexplained
-        return {
-            "rms": left.rms,
-            "p_value": left.p_value,
-            "reasons": left.reasons,
-            "locations": [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations],
-            "depends_on": [asdict(one) for one in left.depends_on],
-        }
+        places = [{"kind": one.kind, "name": one.name, "probability": one.share} for one in left.locations]
+        told = {"rms": left.rms, "p_value": left.p_value, "reasons": left.reasons, "locations": places}
+        return {**told, "depends_on": [asdict(one) for one in left.depends_on]}
 
     def __repr__(self) -> str:
         return f"MotionDiagnosis({self.log.name!r}: {', '.join(self.verdict) or 'no effect'})"
 
 
-def _rms(values: list[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
-
-
-def rms(values: Array) -> float:
+def rms(values: Array | Sequence[float]) -> float:
     """Root mean square; zero of nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

@@ -80,13 +80,12 @@ def rollout(found: MotionDiagnosis, mjcf: str | Path, log: MotionLog) -> Rollout
     values = values_in(found, model)
     zero = np.zeros_like(values)
     model.refreshed(zero)
-    nominal = [rms(model.residuals(j, zero[None])[0]) for j in model.joints]
+    nominal = tuple(map(rms, model.all_residuals(zero)))
     for _ in range(settings.REFRESHES):
         model.refreshed(values)
-    told = [rms(model.residuals(j, values[None])[0]) for j in model.joints]
-    left = [_gap(motion, each) for motion, each in zip(log.motions, simulated(mjcf, log), strict=True)]
-    by_joint = [rms(np.concatenate([one[np.isfinite(one[:, j]), j] for one in left])) for j in model.joints]
-    return Rollout(log.joints, tuple(nominal), tuple(told), tuple(by_joint))
+    told = tuple(map(rms, model.all_residuals(values)))
+    left = (model.measured - np.concatenate(simulated(mjcf, log))).T
+    return Rollout(log.joints, nominal, told, tuple(rms(one[np.isfinite(one)]) for one in left))
 
 
 def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
@@ -129,10 +128,8 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
 def _servo(model: Any, joint: int | None) -> int | None:
     """Return the number of the position actuator of a joint."""
     hinge = mujoco_or_error().mjtTrn.mjTRN_JOINT
-    for k in range(model.nu):
-        if model.actuator_trntype[k] == hinge and model.actuator_trnid[k, 0] == joint and model.actuator_biasprm[k, 1]:
-            return k
-    return None
+    at_joint = (model.actuator_trntype == hinge) & (model.actuator_trnid[:, 0] == joint)
+    return next(iter(np.flatnonzero(at_joint & (model.actuator_biasprm[:, 1] != 0.0)).tolist()), None)
 
 
 def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence[Any], held: list[int]) -> Array:
@@ -156,12 +153,6 @@ def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence
 
 def _rest(mujoco: Any, model: Any, data: Any, servos: Sequence[Any], command: Array) -> None:
     """Fill the histories of delayed actuators with the command that they had while the arm was at rest."""
-    if not getattr(model, "nhistory", 0):
-        return
     for k, value in zip(servos, command, strict=True):
-        if model.actuator_delay[k] > 0.0:
+        if getattr(model, "nhistory", 0) and model.actuator_delay[k] > 0.0:
             mujoco.mj_initCtrlHistory(model, data, k, None, np.full(int(model.actuator_history[k, 0]), value))
-
-
-def _gap(motion: Motion, path: Array) -> Array:
-    return np.asarray(motion.position.values - path)

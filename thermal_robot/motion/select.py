@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.inference.evidence import Combination, Gram
+from thermal_robot.inference.algebra import total_probability
+from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
-from thermal_robot.inference.settings import PRIOR_PROBABILITY
 from thermal_robot.motion import settings
 from thermal_robot.motion.fit import Point, deflated, fit, ratios
-from thermal_robot.motion.model import JointModel
+from thermal_robot.motion.model import JointModel, Mask
 
-Mask = NDArray[np.bool_]
 PLAIN = ("zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
@@ -27,44 +26,40 @@ ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 class Choice:
     """The effects that were chosen, and the model there.
 
-    ``active`` (P,) parameters; ``point`` of the exact fit, ``best`` and ``search`` the evidence there, ``gram`` its
-    normal equations, ``deflation`` (P,) the ratios; ``sizes`` (P,) prior standard deviations.
+    ``active`` (P,) parameters; ``point`` of the exact fit, ``best`` and ``search`` the evidence there, ``deflation``
+    (P,) the ratios.
     """
 
     active: Mask
     point: Point
     best: Combination
     search: Search
-    gram: Gram
     deflation: Array
-    sizes: Array
 
-    def probability(self, blocks: Sequence[int]) -> float:
-        """Posterior probability that any of some parameters is at work."""
-        found, weights = self.search.probabilities()
-        return min(float(sum(w for c, w in zip(found, weights, strict=True) if set(blocks) & set(c.blocks))), 1.0)
+    def probability(self, block: int) -> float:
+        """Posterior probability that a parameter is at work."""
+        found = zip(*self.search.probabilities(), strict=True)
+        return total_probability([weight for one, weight in found if block in one.blocks])
+
+    def without(self, block: int) -> Mask:
+        """(P,) parameters of the choice but one."""
+        return np.asarray(self.active & (np.arange(len(self.active)) != block))
 
     def odds(self, block: int) -> float:
         """Log odds of a parameter of the choice against nothing in its place."""
-        without = self.search.evaluate([b for b in self.best.blocks if b != block], self.best)
+        without = self.search.evaluate(np.flatnonzero(self.without(block)).tolist(), self.best)
         return self.best.log_evidence - without.log_evidence
 
     def alternatives(self, block: int) -> list[int]:
         """Parameters that could stand in the place of one: their evidence is near that of the choice."""
-        rest, found = [b for b in self.best.blocks if b != block], []
-        for other in range(len(self.active)):
-            if other in self.best.blocks or not self.gram.ranks[other]:
-                continue
-            there = self.search.evaluate([*rest, other], self.best)
-            if there.log_evidence > self.best.log_evidence - settings.ALIKE:
-                found.append(other)
-        return found
+        rest, least = np.flatnonzero(self.without(block)).tolist(), self.best.log_evidence - settings.ALIKE
+        others = [b for b, rank in enumerate(self.search.gram.ranks) if rank and b not in self.best.blocks]
+        return [b for b in others if self.search.evaluate([*rest, b], self.best).log_evidence > least]
 
     def deviations(self) -> Array:
         """(P,) posterior standard deviations of the chosen parameters, NaN of the others."""
-        found = np.full(len(self.active), np.nan)
-        sizes = np.array([self.sizes[b] for b in self.best.blocks])
-        found[list(self.best.blocks)] = sizes * np.sqrt(np.maximum(np.diag(self.best.covariance), 0.0))
+        found, own = np.full(len(self.active), np.nan), list(self.best.blocks)
+        found[own] = self.point.model.sizes[own] * np.sqrt(np.maximum(np.diag(self.best.covariance), 0.0))
         return found
 
 
@@ -73,69 +68,60 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
 
     From ``start``, by default from a fit of plain servos; effects that are abrupt start where the joints end.
     """
-    sizes, begun = np.array([one.size for one in model.parameters]), np.where(allowed, model.start(), 0.0)
+    begun = np.where(allowed, model.start(), 0.0)
     if start is None:
         plain = allowed & np.array([one.effect in PLAIN for one in model.parameters])
-        start = fit(model, np.where(plain, begun, 0.0), plain, sizes)
+        start = fit(model, begun, plain)
     abrupt = allowed & (start == 0.0) & np.array([one.effect in ABRUPT for one in model.parameters])
     values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)
-        values = fit(model, values, allowed, sizes)
+        values = fit(model, values, allowed)
     return values
 
 
 def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Choice:
     """Search the effects by evidence at the fit of all, then at the exact fit of the choice, and prune by one rule."""
-    sizes = np.array([one.size for one in model.parameters])
     values = everything(model, allowed, start, progress)
-    deflation = None
+    deflation: Array | None = None
     known: Mask | None = None
     fitted: list[tuple[float, Choice]] = []
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
-        choice = _weighed(model, values, allowed, sizes, deflation, known)
+        choice = _weighed(model, values, allowed, deflation, known)
         deflation = choice.deflation
         if known is not None and (choice.active == known).all():
             break
         known = choice.active
-        values = fit(model, np.where(known, values, 0.0), known, sizes)
+        values = fit(model, values, known)
         model.refreshed(values)
-        values = fit(model, values, known, sizes)
-        choice = _weighed(model, values, allowed, sizes, deflation, known, final=True)
-        left = held_out_loss(choice.point, known, sizes).sum(axis=1) * choice.point.noise**2
+        values = fit(model, values, known)
+        choice = _weighed(model, values, allowed, deflation, known, final=True)
+        left = held_out_loss(choice.point, known).sum(axis=1) * choice.point.noise**2
         counts = [len(one.residual) for one in choice.point.rows]
         fitted.append((float(counts @ np.log(np.maximum(left, 1e-300))), choice))
     # a search that left the neighbourhood of its point may have chosen worse than the round before
     choice = min(fitted, key=lambda one: one[0])[1]
     model.refreshed(choice.point.values)
-    return _pruned(model, choice, allowed, choice.point.values)
+    return _pruned(choice, allowed)
 
 
 def _weighed(
-    model: JointModel,
-    values: Array,
-    allowed: Mask,
-    sizes: Array,
-    deflation: Array | None,
-    start: Mask | None,
-    final: bool = False,
+    model: JointModel, values: Array, allowed: Mask, deflation: Array | None, start: Mask | None, final: bool = False
 ) -> Choice:
     """Search by evidence at some values; where ``final`` the choice is the start, and the search tells its rivals."""
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
-    gram = deflated(model, point, deflation)
     barred = frozenset(np.flatnonzero(~allowed).tolist())
-    prior = float(np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY)))
-    search = Search(gram, [prior] * len(values), out=barred)
-    best = search.run(() if start is None else np.flatnonzero(start).tolist())
-    if final and start is not None:
-        best = search.evaluate(np.flatnonzero(start).tolist())
-    return Choice(np.isin(np.arange(len(values)), best.blocks), point, best, search, gram, deflation, sizes)
+    search = Search(deflated(point, deflation), [log_odds()] * len(values), out=barred)
+    first = [] if start is None else np.flatnonzero(start).tolist()
+    best = search.run(first)
+    best = search.evaluate(first) if final else best
+    return Choice(np.isin(np.arange(len(values)), best.blocks), point, best, search, deflation)
 
 
-def held_out_loss(point: Point, active: Mask, sizes: Array) -> Array:
+def held_out_loss(point: Point, active: Mask) -> Array:
     """Leave-one-motion-out, linearised: squared residual (J, M) over the noise, of joints in motions held out."""
     matrix, vector, total = point.products
     own = np.flatnonzero(active)
@@ -143,54 +129,54 @@ def held_out_loss(point: Point, active: Mask, sizes: Array) -> Array:
         return total
     whole, along = matrix[:, :, own[:, None], own], vector[:, :, own]
     others, pull = (one.sum(axis=(0, 1)) - one.sum(axis=0) for one in (whole, along))
-    found = np.linalg.solve(others + np.diag(sizes[own] ** -2.0), pull[:, :, None])[:, :, 0]
+    found = np.linalg.solve(others + np.diag(point.model.sizes[own] ** -2.0), pull[:, :, None])[:, :, 0]
     fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
     return np.asarray(total + fitted - 2.0 * (found * along).sum(axis=2))
 
 
-def _pruned(model: JointModel, choice: Choice, allowed: Mask, values: Array) -> Choice:
+def _pruned(choice: Choice, allowed: Mask) -> Choice:
     """Backward elimination by odds below nine to one or harm in motions held out, the worst first.
 
     What stays is fitted exactly, and judged again there.
     """
+    model = choice.point.model
     for _ in range(settings.SELECTIONS):
-        kept = _kept(model, choice)
+        kept = _kept(choice)
         allowed = allowed & (kept | ~choice.active)
-        values = fit(model, np.where(kept, values, 0.0), kept, choice.sizes)
-        choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, kept, final=True)
-        if (_kept(model, choice) == kept).all():
+        values = fit(model, choice.point.values, kept)
+        choice = _weighed(model, values, allowed, choice.deflation, kept, final=True)
+        if (_kept(choice) == kept).all():
             break
-    return _needed(model, choice, allowed)
+    return _needed(choice, allowed)
 
 
-def _needed(model: JointModel, choice: Choice, allowed: Mask) -> Choice:
+def _needed(choice: Choice, allowed: Mask) -> Choice:
     """Likelihood-ratio test of the weakest effect at the exact fit without it, counting what motions are worth.
 
     No odds exceed that ratio; but a linear problem misses what other effects can do together in its place.
     """
+    model = choice.point.model
     worth = [len(one.residual) / choice.deflation[one.columns].mean() for one in choice.point.rows]
     while choice.active.any():
-        less = choice.active.copy()
-        less[min(choice.best.blocks, key=choice.odds)] = False
-        values = fit(model, choice.point.values, less, choice.sizes)
+        less = choice.without(min(choice.best.blocks, key=choice.odds))
+        values = fit(model, choice.point.values, less)
         if worth @ np.log(Point.at(model, values, less).noise / choice.point.noise) >= np.log(settings.ODDS):
             break
         allowed = allowed & (less | ~choice.active)
-        choice = _weighed(model, values, allowed, choice.sizes, choice.deflation, less, final=True)
+        choice = _weighed(model, values, allowed, choice.deflation, less, final=True)
     return choice
 
 
-def _kept(model: JointModel, choice: Choice) -> Mask:
+def _kept(choice: Choice) -> Mask:
     """Backward elimination at a fit: mask of the parameters with enough odds that do no harm on held-out rows."""
-    active, search = choice.active & seen(model, choice.point), choice.search
+    active, search = choice.active & seen(choice.point), choice.search
     while active.any():
         best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)
-        whole, worst = held_out_loss(choice.point, active, choice.sizes).sum(), None
+        whole, worst = held_out_loss(choice.point, active).sum(), None
         for block in best.blocks:
-            less = active.copy()
-            less[block] = False
+            less = active & (np.arange(len(active)) != block)
             odds = best.log_evidence - search.evaluate(np.flatnonzero(less).tolist(), best).log_evidence
-            harm = whole - held_out_loss(choice.point, less, choice.sizes).sum()
+            harm = whole - held_out_loss(choice.point, less).sum()
             if (odds < np.log(settings.ODDS) or harm > 0.0) and (worst is None or odds < worst[0]):
                 worst = odds, block
         if worst is None:
@@ -199,9 +185,9 @@ def _kept(model: JointModel, choice: Choice) -> Mask:
     return active
 
 
-def seen(model: JointModel, point: Point) -> Mask:
+def seen(point: Point) -> Mask:
     """(P,) whether a parameter moves a joint's output by twice its noise, root mean square, or by what is tolerated."""
-    found = np.zeros(len(point.values), dtype=bool)
+    found, model = np.zeros(len(point.values), dtype=bool), point.model
     for joint, one in zip(model.joints, point.rows, strict=True):
         least = model.log.visible_from(model.log.joints[joint], model.noise(joint))
         moved = np.sqrt(np.mean(one.derivative**2, axis=0)) * np.abs(point.values[one.columns])

@@ -26,27 +26,12 @@ from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
 from thermal_robot.errors import EstimationError
 
-PARAMETERS = (
-    "zero",
-    "gain",
-    "delay",
-    "lag",
-    "inertia",
-    "droop",
-    "coulomb",
-    "load_friction",
-    "stribeck",
-    "dead_zone",
-    "saturation",
-    "low",
-    "high",
-    "derivative",
+PARAMETERS = tuple(
+    "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative".split()
 )
 """Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s."""
 STRIBECK_VELOCITY = 0.1
 """rad/s: v_s, at which sliding has begun: BAM's measured servos, 0.05 to 0.2."""
-
-
 NEAR = 0.5
 """rad: farther from where it was taken a load grows no more; it is a sine."""
 FASTEST = 1e3
@@ -135,25 +120,15 @@ def _kernel() -> Any:
 
 
 def simulate(
-    numbers: Array,
-    weights: Array,
-    grid: tuple[Any, ...],
-    command: tuple[Any, ...],
-    around: tuple[Array, ...],
-    start: Array,
-    step: float,
-    substeps: int,
-) -> Array:
+    numbers: Array, weights: Array, grid: tuple[Any, ...], command: tuple[Any, ...], around: tuple[Array, ...],
+    start: Array, step: float, substeps: int,
+) -> Array:  # fmt: skip
     """Time stepping of one joint in all motions, for S sets of numbers: (S, n) rad on the grid.
 
     ``numbers`` (S, 14) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
     kg·m²; ``grid`` begins of motions and their first instants; ``command`` stamps, integral with slope and begins;
     ``around`` loads, their slope (n,), N·m/rad, the position (n,) at which they hold, and inertias; ``start`` (M,) rad.
     """
-    begins, first = grid
-    times, integral, command_begins = command
-    loads, slope, about, inertias = around
-    out = np.empty((len(numbers), begins[-1]))
-    _kernel()(numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about,
-              inertias, start, out)  # fmt: skip
+    out = np.empty((len(numbers), grid[0][-1]))
+    _kernel()(numbers, weights, *grid, step, substeps, *command, *around, start, out)
     return out

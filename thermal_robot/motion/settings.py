@@ -24,11 +24,9 @@ NO_LAG = 2e-3
 """s: a position servo lags by its damping over its stiffness, 50 to 100 ms in hobby servos and 10 ms in the stiffest
 simulated ones; a controller that lags by less knows the velocity beforehand."""
 CLEAR = 3.0
-"""Standard errors from which on a fault is told: one log in 400 by chance."""
+"""Standard errors from which on a fault of a log, or a change between two, is told: one in 400 by chance."""
 LEAST_AGAINST = -0.5
 """Slope of recorded over needed torque below which the sign is the other one: nearer to −1 than to 0."""
-FEWEST_CLUSTERS = 8
-"""Motions below which each is parted for the scatter between them: fewer give no standard error worth the name."""
 WINDOW = 1.0
 """s over which position and the integral of velocity are compared: a velocity's filter of 50 ms takes 0.2 % there, and
 2 % over a tenth of it."""
@@ -70,7 +68,8 @@ STEP = 4e-3
 DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
 CLUSTERS, BLOCKS = 8, 20
-"""Motions from which they count as independent; below, they are cut into so many blocks, and ± is said to be weak."""
+"""Motions from which they count as independent: fewer give no standard error worth the name. Below, a fit cuts them
+into so many blocks, and ± is said to be weak."""
 ROUNDS = 12
 """Gauss-Newton steps at most of one fit."""
 SETTLED = 1e-3
@@ -109,8 +108,6 @@ SURE = 0.9
 """Probability from which an effect is told for itself, though another could stand in its place."""
 VISIBLE = 2.0
 """Times the encoder's noise: an effect that moves its joint by less is not shown, since nobody could see it go."""
-CHANGED = 3.0
-"""Standard deviations of a difference from which on it counts as a change: one in 400 of equal values lies beyond."""
 NOISY = 1.5
 """Times the encoder's noise: what remains below it is that noise."""
 STRUCTURE, LEVELS = 0.1, 10

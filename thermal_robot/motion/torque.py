@@ -19,8 +19,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
 from thermal_robot.motion.following import at, slope, usual_step
-from thermal_robot.motion.log import Channel, MotionLog, Servo
-from thermal_robot.motion.model import SHARED, JointModel, Parameter, Rows
+from thermal_robot.motion.log import Channel, MotionLog
+from thermal_robot.motion.model import SHARED, JointModel, Mask, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
 
 _SECOND = tuple(f"second moment of {{}}, {axes}" for axes in ("xx", "xy", "yy", "xz", "yz", "zz"))
@@ -34,26 +34,21 @@ class TorqueModel(JointModel):
 
     def __init__(self, log: MotionLog) -> None:
         super().__init__(log)
-        dynamics = self.dynamics_of(log)
         parts = [_sampled(motion.position, motion.torque) for motion in log.motions if motion.torque]
         self._time, self._q, self._v, self._a, *others = (np.concatenate(one) for one in zip(*parts, strict=True))
         self._sign, self._slow, self._measured, self._scatter = others
-        self._loads = dynamics.along(self._q, self._v, self._a, whole=True)
-        self._inertial, self._bodies = dynamics.inertial(self._q, self._v, self._a), dynamics.bodies
+        self._loads = self.dynamics.along(self._q, self._v, self._a, whole=True)
+        self._inertial, self._bodies = self.dynamics.inertial(self._q, self._v, self._a), self.dynamics.bodies
         self._motion = np.repeat(np.arange(len(parts)), [len(one[0]) for one in parts])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
+        self.motions = [self._motion[rows] for rows in self._used]
         self.parameters = self._parameters()
 
-    def _limits(self) -> list[float]:
-        """Torque limits by joint, N·m, by which sizes are expected: as stated, else no less than the masses leave."""
-        left = np.abs(self._measured - self._loads.torque[0])
-        most = np.where(np.isfinite(left), left, 0.0).max(axis=0)
-        stated = [self.log.servos.get(name, Servo()).limit for name in self.log.joints]
-        return [own or max(settings.TORQUE_LIMIT, float(gap)) for own, gap in zip(stated, most, strict=True)]
-
     def _parameters(self) -> tuple[Parameter, ...]:
-        found, limits = [], self._limits()
-        for j, (name, limit) in enumerate(zip(self.log.joints, limits, strict=True)):
+        found, left = [], np.nan_to_num(np.abs(self._measured - self._loads.torque[0])).max(axis=0)
+        for j, servo in enumerate(self.servos):
+            # sizes go by the torque limit: as stated, else no less than the masses leave
+            limit = servo.limit or max(settings.TORQUE_LIMIT, float(left[j]))
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for name, label, unit, size, spread, positive in (
                 ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),
@@ -66,15 +61,12 @@ class TorqueModel(JointModel):
             ):
                 found.append(Parameter(name, j, label, unit, size, spread, positive, name))
         if self.log.robot.has_masses:
-            found.append(
-                Parameter("payload", SHARED, "mass", "kg", self.rated(self._loads.torque[1]), 1.0, False, "payload")
-            )
+            found.append(self.payload(self._loads.torque[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
-                for i, what in enumerate(_INERTIAL):
-                    size, unit = (0.1, "") if not i else (0.1 * numbers[0] * settings.LINK, "kg·m")
-                    size, unit = (size * settings.LINK, "kg·m²") if i > 3 else (size, unit)
-                    label = what.format(name)
-                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {10 * k + i}"))
+                first = 0.1 * numbers[0] * settings.LINK
+                known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
+                for i, (what, (size, unit)) in enumerate(zip(_INERTIAL, known, strict=True), 10 * k):
+                    found.append(Parameter("masses", SHARED, what.format(name), unit, size, 1.0, False, f"mass {i}"))
         return tuple(found)
 
     @cached_property
@@ -86,7 +78,6 @@ class TorqueModel(JointModel):
             bodies = self._inertial[:, j].copy()
             bodies[:, :, 0] = np.einsum("nbi,bi->nb", bodies, np.array(list(self._bodies.values())))
             own = {
-                "offset": np.ones(len(self._q)),
                 "coulomb": sign,
                 "stribeck": self._slow[:, j],
                 "viscous": self._v[:, j],
@@ -101,50 +92,31 @@ class TorqueModel(JointModel):
 
     def residuals(self, joint: int, values: Array) -> Array:
         """(S, N) measured torque minus the model's, N·m."""
-        columns = self._columns[joint]
-        found = []
+        columns, found = self._columns[joint], []
         for one in values:
-            told, factor = columns["nominal"].copy(), 1.0
-            for p, parameter in enumerate(self.parameters):
-                if parameter.joint in (joint, SHARED) and one[p]:
-                    if parameter.number == "torque_constant":
-                        factor = 1.0 + one[p]
-                    elif parameter.number != "offset":
-                        told += one[p] * columns[parameter.number]
-            offset = self.index("offset", joint)
-            found.append(
-                self._measured[self._used[joint], joint] - factor * told - (one[offset] if offset is not None else 0)
-            )
+            told = columns["nominal"].copy()
+            for p in self.own(joint, one != 0.0):
+                if self.parameters[p].number in columns:
+                    told += one[p] * columns[self.parameters[p].number]
+            bias = one[self.index("offset", joint)]
+            found.append(self._measured[self._used[joint], joint] - self._factor(joint, one) * told - bias)
         return np.array(found)
 
-    def rows(self, joint: int, values: Array, wanted: NDArray[np.bool_] | None = None) -> Rows:
-        """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
-        columns, own, found = self._columns[joint], self.own(joint, wanted), []
-        constant = self.index("torque_constant", joint)
-        factor = 1.0 + (values[constant] if constant is not None else 0.0)
-        left = self.residuals(joint, values[None])[0]
-        measured = self._measured[self._used[joint], joint]
-        offset = self.index("offset", joint)
-        inside = (measured - left - (values[offset] if offset is not None else 0.0)) / factor
-        for p in own:
-            number = self.parameters[p].number
-            if number == "torque_constant":
-                found.append(inside)
-            else:
-                found.append(columns[number] * (1.0 if number == "offset" else factor))
-        derivative = np.stack(found, axis=1) if found else np.zeros((len(left), 0))
-        return Rows(left, derivative, own, self.motion_of(joint))
+    def _factor(self, joint: int, values: Array) -> float:
+        return 1.0 + float(values[self.index("torque_constant", joint)])
 
-    def start(self) -> Array:
-        """(P,) values from which all effects are fitted: the problem is nearly linear."""
-        return np.zeros(len(self.parameters))
+    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
+        """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
+        own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
+        bare = self._measured[self._used[joint], joint] - left - values[self.index("offset", joint)]
+        apart, columns = {"offset": np.ones(len(left)), "torque_constant": bare / factor}, self._columns[joint]
+        numbers = [self.parameters[p].number for p in own]
+        found = [apart[name] if name in apart else columns[name] * factor for name in numbers]
+        derivative = np.ascontiguousarray(np.reshape(found, (len(own), len(left))).T)
+        return Rows(left, derivative, own, self.motion_of(joint))
 
     def refreshed(self, values: Array) -> None:
         """Nothing: loads are those of the measured motion."""
-
-    def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
-        return self.cluster_of(self._motion[self._used[joint]])
 
     def signs(self) -> tuple[Array, Array]:
         """Regression of the measured torques on the rigid-body model's: slope (J,) and its standard error.
@@ -163,26 +135,16 @@ class TorqueModel(JointModel):
         """One sigma of a joint's smoothed torque, N·m."""
         return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
 
-    def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what a joint's residual may follow: position, velocity, load and time."""
+    def followed(self, joint: int) -> tuple[Array, ...]:
+        """(N,) position, velocity, load and time."""
         rows = self._used[joint]
-        return {
-            f"the position of {self.log.joints[joint]}": self._q[rows, joint],
-            "velocity": self._v[rows, joint],
-            "load": self._loads.torque[0, rows, joint],
-            "time": self._time[rows],
-        }
+        return self._q[rows, joint], self._v[rows, joint], self._loads.torque[0, rows, joint], self._time[rows]
 
-    def drawn(self, joint: int, values: Array) -> dict[str, Array]:
-        """Measured and modelled torques at the readings of a joint."""
-        left = self.residuals(joint, np.stack([np.zeros_like(values), values]))
+    def drawn(self, joint: int) -> tuple[Array, ...]:
+        """(N,) time, s, position, rad, and measured torque and load, N·m."""
         rows = self._used[joint]
-        measured = self._measured[rows, joint]
-        return {
-            "motion": self._motion[rows], "time": self._time[rows], "command": self._q[rows, joint],
-            "measured": measured, "nominal": measured - left[0], "simulated": measured - left[1],
-            "load": self._loads.torque[0, rows, joint],
-        }  # fmt: skip
+        load = self._loads.torque[0, rows, joint]
+        return self._time[rows], self._q[rows, joint], self._measured[rows, joint], load
 
 
 def _sums(labels: NDArray[np.int64], values: Array) -> Array:

@@ -9,7 +9,6 @@ offset and gain, and acts on its joint times its gear:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -98,14 +97,11 @@ class Cause:
 
 def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
     """Return what was found of each joint of the log, in their order."""
-    log = found.log
-    motions = [m for m in log.motions if (m.kind or m.name) not in found.refused]
-    told = []
-    for j, name in enumerate(log.joints):
-        command = np.concatenate([m.command.values[:, j] for m in motions])
-        reach = float(np.nanmin(command)), float(np.nanmax(command))
+    log, told = found.log, []
+    commands = np.concatenate([motion.command.values for motion in log.motions])
+    for name, low, high in zip(log.joints, np.nanmin(commands, axis=0), np.nanmax(commands, axis=0), strict=True):
         values = {effect: value for (effect, joint), value in found.values.items() if joint == name}
-        told.append(Cause(name, log.servos.get(name, Servo()), values, reach))
+        told.append(Cause(name, log.servo(name), values, (float(low), float(high))))
     return tuple(told)
 
 
@@ -132,8 +128,7 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
     written, joints = Written(), {joint.name: joint for joint in spec.joints}
     for cause in causes(found):
         if cause.name not in joints:
-            own = ", ".join(joints) or "no joint"
-            raise CampaignError(name, f"has no joint {cause.name!r}", found=own)
+            raise CampaignError(name, f"has no joint {cause.name!r}", found=", ".join(joints) or "no joint")
         _into_joint(joints[cause.name], cause, written)
         if cause.torque("coulomb") is not None:
             stick(spec, joints[cause.name])
@@ -171,15 +166,11 @@ def _need_stiffness(cause: Cause, written: Written, *effects: str) -> None:
 
 def _into_joint(joint: Any, cause: Cause, written: Written) -> None:
     _need_stiffness(cause, written, "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay")
-    put: dict[str, tuple[str, str, Callable[[float], None]]] = {
-        "coulomb": ("frictionloss", "N·m", lambda value: setattr(joint, "frictionloss", value)),
-        "lag": ("damping", "N·m·s/rad", lambda value: set_damping(joint, value)),
-        "armature": ("armature", "kg·m²", lambda value: setattr(joint, "armature", value)),
-    }
-    for effect, (what, unit, setter) in put.items():
+    put = {"frictionloss": ("coulomb", "N·m"), "damping": ("lag", "N·m·s/rad"), "armature": ("armature", "kg·m²")}
+    for what, (effect, unit) in put.items():
         value = cause.torque(effect)
         if value is not None:
-            setter(value)
+            set_damping(joint, value) if what == "damping" else setattr(joint, what, value)
             _said(written, cause, what, value, unit)
     if cause.stops != (None, None):
         limited = joint.limited != mujoco_or_error().mjtLimited.mjLIMITED_FALSE and joint.range[0] < joint.range[1]
@@ -207,8 +198,13 @@ def _into_servo(spec: Any, cause: Cause, written: Written) -> None:
         actuator.forcelimited = mujoco_or_error().mjtLimited.mjLIMITED_TRUE
         actuator.forcerange = [-limit / abs(gear), limit / abs(gear)]
         _said(written, cause, "forcerange", limit, "N·m")
-    if "delay" in told:
-        _delay(actuator, float(spec.option.timestep), cause, written)
+    delay = cause.values.get("delay", 0.0)
+    if "delay" in told and hasattr(actuator, "delay"):  # with the samples that MuJoCo keeps for it
+        actuator.delay, actuator.nsample = delay, int(np.ceil(delay / float(spec.option.timestep))) + 1
+        _said(written, cause, "delay", delay, "s")
+    elif "delay" in told:
+        reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
+        written.kept.append(f"delay of {cause.name}: {reason}")
 
 
 def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
@@ -222,17 +218,6 @@ def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
     actuator.set_to_position(kp=1.0)
     written.held.append(f"a position actuator of {cause.name}, which had none")
     return actuator
-
-
-def _delay(actuator: Any, step: float, cause: Cause, written: Written) -> None:
-    """Give an actuator the delay of its command, with the samples that MuJoCo keeps for it."""
-    delay = cause.values["delay"]
-    if hasattr(actuator, "delay"):
-        actuator.delay, actuator.nsample = delay, int(np.ceil(delay / step)) + 1
-        _said(written, cause, "delay", delay, "s")
-    else:
-        reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
-        written.kept.append(f"delay of {cause.name}: {reason}")
 
 
 def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
