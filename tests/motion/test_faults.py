@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -14,6 +15,7 @@ from motion.arms import JOINTS, STEP, log, tables
 
 from thermal_robot.motion import Channel, find_faults, read_motion
 from thermal_robot.motion.clocks import reclocked
+from thermal_robot.motion.description import text
 
 Q = [f"q.{joint}" for joint in JOINTS]
 QD = [f"qd.{joint}" for joint in JOINTS]
@@ -123,6 +125,10 @@ def test_a_frozen_reading_is_left_out_and_a_frozen_joint_too():
     found, said = told(state.assign(**{"q.joint_2": 0.1}), command)
     assert said == [("stale", "joint_2")]
     assert found.joints == tuple(joint for joint in JOINTS if joint != "joint_2")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (line,) = (line for line in text(found.log, found).splitlines() if "not read" in line)
+    assert line.split()[0] == "joint_2"
 
 
 UNITS = [("q.joint_4", 180 / np.pi, "taken for deg"), ("cmd.joint_4", 180 / np.pi, "the command for deg")]

@@ -71,6 +71,15 @@ def test_friction_bias_and_second_moments_are_found_with_their_sizes(found):
     assert any("second moment of joint_2" in name for name in told.loc["masses"].index)
 
 
+def test_a_joint_stands_once_among_the_places(found):
+    listed = [[place.name for place in one.locations] for one in (*found.effects, found.unexplained)]
+    assert any(listed)
+    for names in listed:
+        assert len(names) == len(set(names))
+    masses = next(one for one in found.effects if one.name == "masses")
+    assert sum(place.share for place in masses.locations) <= masses.shrinkage + 1e-9
+
+
 def test_a_vibration_that_no_rigid_body_has_is_left_out_on_both_sides(found):
     """Of 70 mN·m rms at 31 Hz and 10 of noise, less than 20 remain in motions held out."""
     assert max(gap.held_out for gap in found.joints.values()) < 0.02

@@ -43,11 +43,18 @@ def _joints(sound: Sound) -> Iterator[Sequence[str]]:
     for j, joint in enumerate(log.joints):
         commanded = np.concatenate([motion.command.values[:, j] for motion in log.motions])
         gaps = [m.position.values[:, j] - at(m.command, m.position.time)[:, j] for m in log.motions]
-        gap = float(np.sqrt(np.nanmean(np.concatenate(gaps) ** 2)))
+        gap = np.concatenate(gaps)
+        gap = gap[np.isfinite(gap)]
         unit, servo = "m" if kinds[joint] == "prismatic" else "rad", vars(log.servo(joint))
         told = ", ".join(f"{key} {value:g}" for key, value in servo.items() if value is not None) or "unknown"
         span = f"{np.nanmin(commanded):.3f} .. {np.nanmax(commanded):.3f} {unit}"
-        yield joint, span, f"{1e3 * gap:.3g} m{unit}", told, "" if joint in sound.joints else "left out"
+        yield (
+            joint,
+            span,
+            f"{1e3 * np.sqrt(np.mean(gap**2)):.3g} m{unit}" if len(gap) else "not read",
+            told,
+            "" if joint in sound.joints else "left out",
+        )
 
 
 def _channels(log: MotionLog) -> Iterator[Sequence[str]]:

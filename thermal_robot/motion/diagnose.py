@@ -174,17 +174,18 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     if not active:
         return Finding(name, "not_found", probability, 0.0, title=title)
     rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
-    places, estimates = [], []
+    places, estimates = dict[str, float](), []
     for p, one, joint in ((p, model.parameters[p], model.keys[p][1]) for p in active):
         called = f"{one.label}, {joint}" if joint else one.label
         estimates.append(Estimate(called, float(choice.point.values[p]), float(deviations[p]), one.unit, True))
-        places += [Location("joint", joint, float(share[p].sum()))] if joint else []
+        if joint:
+            places[joint] = places.get(joint, 0.0) + float(share[p].sum())
     status: Status = "confounded" if rivals and probability < settings.SURE else "found"
     total = float(sum(share[p].sum() for p in active))
     return Finding(
         name, status, probability, total, parameters=tuple(estimates), title=title,
         confounded_with=tuple(sorted(rivals)) if status == "confounded" else (),
-        locations=tuple(sorted(places, key=lambda one: -one.share)),
+        locations=tuple(Location("joint", *one) for one in sorted(places.items(), key=lambda one: -one[1])),
     )  # fmt: skip
 
 
@@ -200,7 +201,9 @@ def _unexplained(choice: Choice) -> Unexplained:
     flagged = sorted((one for one in tested if one[0] > settings.STRUCTURE), reverse=True)
     if not flagged:
         return Unexplained(False, 0.0, 1.0)
-    places = tuple(Location("joint", model.log.joints[j], gain) for gain, _, j in flagged[:3])
+    largest = {j: gain for gain, _, j in reversed(flagged)}
+    first = sorted(largest.items(), key=lambda one: -one[1])[:3]
+    places = tuple(Location("joint", model.log.joints[j], gain) for j, gain in first)
     reason = f"{100.0 * places[0].share:.0f} % of what remains in {places[0].name} follows {flagged[0][1]}"
     follows = dict.fromkeys(name for _, name, _ in flagged)
     remains = rms([rms(one.residual) for one in rows])
