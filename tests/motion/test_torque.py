@@ -114,6 +114,7 @@ def test_the_drag_of_a_strong_gear_is_found_whose_torque_limit_nobody_stated():
 def test_a_torque_of_the_other_sign_is_turned_round():
     """Whatever the offset; friction, which opposes the motion, turns with it."""
     sound = log(coulomb=COULOMB, offset=OFFSET)
+    assert not find_faults(sound).log.commanded
     assert not [fault for fault in find_faults(sound).faults if fault.what == "sign"]
     values = np.array([1.0, -1.0])
     turned = [replace(m, torque=replace(m.torque, values=m.torque.values * values)) for m in sound.motions]

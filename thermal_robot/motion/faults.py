@@ -212,7 +212,7 @@ def _gains(log: MotionLog) -> _Checked:
         done = f"taken for {word}" if word else "the joint is left out"
         told = f"q.{joint} moves {size:.4g} ± {sigma:.2g} times as far as cmd.{joint}: another unit, {done}"
         faults.append(Fault(joint, "unit", size, sigma, told))
-    return _changed(log, ["position"], lambda values: values / factor), faults, lost
+    return _changed(log, ["position"], lambda values: values / factor) if faults else log, faults, lost
 
 
 def _remedy(size: float, speeds: float) -> tuple[str, float]:
