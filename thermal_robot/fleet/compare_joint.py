@@ -25,6 +25,7 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare_sums import Candidate, Sums
 from thermal_robot.inference import settings as inference
+from thermal_robot.inference.algebra import total_probability
 from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.explain import log_odds, share_of_places
 from thermal_robot.inference.search import Search, gains
@@ -251,7 +252,7 @@ def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
     weighed = list(zip(*search.probabilities(), strict=True))
 
     def probability(blocks: set[int]) -> float:
-        return min(float(sum(w for c, w in weighed if not blocks.isdisjoint(c.blocks))), 1.0)
+        return total_probability([w for c, w in weighed if not blocks.isdisjoint(c.blocks)])
 
     def alike(part: JointBlock) -> set[int]:
         own = set(part.parameters)

@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import equations_of, solve, without
+from thermal_robot.inference.algebra import equations_of, solve, total_probability, without
 from thermal_robot.inference.explain import share_of_places
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import repeated_poses
@@ -514,7 +514,7 @@ class _Search:
             models.setdefault(frozenset(larger), own + factor + self._prior(larger))
         total = logsumexp(list(models.values()))
         return {
-            kind: min(float(sum(np.exp(p - total) for key, p in models.items() if kind in dict(key))), 1.0)
+            kind: total_probability([np.exp(p - total) for key, p in models.items() if kind in dict(key)])
             for kind in self.kinds
         }
 

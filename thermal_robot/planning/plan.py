@@ -454,32 +454,28 @@ def _best(found: Iterable[tuple[Campaign, Columns]], kinds: Sequence[Effect], re
 
 
 def _elsewhere(planned: Plan, measures: str, kinds: Sequence[Effect], seed: int) -> Plan:
-    """Plan of rows of another kind, from the poses of a plan: stands and planes are drawn anew as often as orders are.
-
-    An effect that needs more than the rows of this kind record is left without an expectation.
-    """
-    commands = planned.commands
-    found, lost = [], CampaignError("plan", "cannot be planned")
+    """Plan of rows of another kind, from the poses of a plan: stands and planes are drawn as often as orders are."""
+    lost, found = CampaignError("plan", "cannot be planned"), []
     for k in range(ORDERS):
         try:
-            rows = simulate(
-                commands.robot,
-                commands=commands,
-                measures=measures,
-                noise=commands.noise_position or NOISE,
-                seed=seed + k,
-            )
+            rows = _measured_by(planned.commands, measures, seed + k)
+            found.append((rows, _testable(observe(rows), kinds)))
         except CampaignError as error:  # out of reach
             lost = error
-            continue
-        if measures in TOUCHED:  # from which side a hand brings each joint is not known
-            given = {name: values for name, values in rows.covariates.items() if not name.startswith("approach.")}
-            rows = replace(rows, covariates=given)
-        found.append((replace(rows, name=commands.name), _testable(observe(rows), kinds)))
     if not found:
         raise lost
     best = _best(found, kinds, planned.repeats)
     return replace(best, artefacts=register(best.commands).artefacts)
+
+
+def _measured_by(commands: Campaign, measures: str, seed: int) -> Campaign:
+    """Rows of another kind by a sound robot, as far as they are known before."""
+    noise = commands.noise_position or NOISE
+    rows = simulate(commands.robot, commands=commands, measures=measures, noise=noise, seed=seed)
+    # from which side a hand brings each joint is not known
+    hidden = [name for name in rows.covariates if measures in TOUCHED and name.startswith("approach.")]
+    given = {name: values for name, values in rows.covariates.items() if name not in hidden}
+    return replace(rows, name=commands.name, covariates=given)
 
 
 def _in_order(
