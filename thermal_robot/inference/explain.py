@@ -25,6 +25,7 @@ from thermal_robot.inference.kernels import (
     DesignMatrix,
     Kernel,
     KernelCovariance,
+    SmoothKernel,
     decomposed,
 )
 from thermal_robot.inference.problem import (
@@ -102,7 +103,13 @@ class ModelSearch:
         return found
 
     def without_columns(self) -> ModelSearch:
-        """Copy without the rows' columns, unless a per-pose discrepancy still needs them."""
+        """Copy without the rows' columns, unless a per-pose discrepancy still needs them.
+
+        Cholesky factors of smooth kernels, a large matrix for each amplitude, are freed: few are asked for again.
+        """
+        for spectrum in self._spectra:
+            if isinstance(spectrum, SmoothKernel):
+                spectrum.factors.clear()
         if any(kernel.grouped for kernel in self.kernels):
             return self
         found = copy(self)
