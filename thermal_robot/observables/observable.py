@@ -28,6 +28,10 @@ class Artefact(Protocol):
     def width(self) -> int:
         """Number of its free parameters."""
 
+    @property
+    def words(self) -> str:
+        """Where it is, mm."""
+
     def moved(self, step: Array) -> Any:
         """Return it after a step (width,) of its parameters."""
 

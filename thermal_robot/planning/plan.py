@@ -266,8 +266,8 @@ class Plan:
     repeats
         How often each pose is measured.
     artefacts
-        Stands, planes or anchors by name, where rows are of these: ``points``, ``normal`` and ``offset``, ``place``, m,
-        in the root frame.
+        Stands, planes, anchors or cameras by name, where rows are of these: ``points``, ``normal`` and ``offset``,
+        ``place``, ``pose``, m, in the root frame.
 
     Examples
     --------
@@ -368,8 +368,8 @@ def plan(
         Seed of the random candidates; the same seed gives the same plan.
     measures
         ``"socket"``, ``"plane"``, ``"distance"`` or ``"pixel"`` where no instrument measures positions: the plan then
-        says where stands, planes, the anchors of a draw wire or cameras are best placed; its joints are postures near
-        the former.
+        says where stands are best placed, or where planes, the anchors of a draw wire or cameras about the middle of
+        all poses; its joints are postures at stands and planes.
 
     Returns
     -------
@@ -454,9 +454,12 @@ def _best(found: Iterable[tuple[Campaign, Columns]], kinds: Sequence[Effect], re
 
 
 def _elsewhere(planned: Plan, measures: str, kinds: Sequence[Effect], seed: int) -> Plan:
-    """Plan of rows of another kind, from the poses of a plan: stands and planes are drawn as often as orders are."""
+    """Plan of rows of another kind, from the poses of a plan: stands are drawn as often as orders are.
+
+    Planes, anchors and cameras follow from the poses, and stand about their middle: a second draw is the same.
+    """
     lost, found = CampaignError("plan", "cannot be planned"), []
-    for k in range(ORDERS):
+    for k in range(ORDERS if measures == "socket" else 1):
         try:
             rows = _measured_by(planned.commands, measures, seed + k)
             found.append((rows, _testable(observe(rows), kinds)))
