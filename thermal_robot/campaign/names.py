@@ -27,6 +27,10 @@ KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "controller": ((*POSITION, *ORIENTATION), ()),
 }
 """Columns of each kind of measurement: its figures and its labels."""
+TOUCHED = tuple(kind for kind, (figures, _) in KINDS.items() if not figures)
+"""Kinds whose rows hold no figure: the robot is led to what they name."""
+BESIDE = tuple(kind for kind, (figures, _) in KINDS.items() if not {*POSITION} & {*figures})
+"""Kinds that need no instrument for positions."""
 KIND = "kind"  # Column that says which kind each row is
 OPTIONAL = {
     "plane": ("height",),

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from thermal_robot.blind import command as blind
 from thermal_robot.campaign.importers.plan import Format
 from thermal_robot.campaign.importers.run import FORMATS
+from thermal_robot.campaign.names import BESIDE
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.errors import CampaignError
 from thermal_robot.fleet.settings import TIME_LIMIT
@@ -197,7 +198,7 @@ COMMANDS = {
             _option("--length-unit", choices=LENGTH_UNITS, default="mm", help="of lengths in the table (mm)"),
             _option(
                 "--measures",
-                choices=("socket", "plane", "distance", "pixel"),
+                choices=BESIDE,
                 help="without an instrument: what rows say",
             ),
             _value("N", "--seed", "of the candidates (0)", type=int, default=0),

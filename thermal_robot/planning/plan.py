@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
+from thermal_robot.campaign import names as names_of
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.write import write_commands, write_planned
 from thermal_robot.diagnosis import settings as design
@@ -39,7 +40,6 @@ from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.schema import fitted, optional, word
 from thermal_robot.simulation import schedule
-from thermal_robot.simulation.brought import TOUCHED
 from thermal_robot.simulation.schedule import RISE
 from thermal_robot.simulation.simulate import simulate
 from thermal_robot.tables import aligned
@@ -242,8 +242,6 @@ ROWS, CRASH_ROWS = 60, 40
 CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
 """Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
 than that."""
-MEASURES = ("socket", "plane", "distance", "pixel")
-"""What rows may say where no instrument measures positions."""
 FEWEST_ROWS, MOST_ROWS = 6, 1000
 """Rows that a plan may have: with fewer not even the frames are known, more are not planned but measured."""
 ORDERS = 16
@@ -393,7 +391,7 @@ def plan(
     """
     require("plan()", robot, (Robot,), "a robot, from load_robot")
     _check(robot, rows, repeats, noise, noise_orientation, rise, loads)
-    measures = fitted(optional(word(MEASURES)), measures, "plan", "measures")
+    measures = fitted(optional(word(names_of.BESIDE)), measures, "plan", "measures")
     kinds = choose(() if effects is None else effects)
     rng = np.random.default_rng(seed)
     given = schedule.conditions(rows, rise, loads)
@@ -476,7 +474,7 @@ def _measured_by(commands: Campaign, measures: str, seed: int) -> Campaign:
     noise = commands.noise_position or NOISE
     rows = simulate(commands.robot, commands=commands, measures=measures, noise=noise, seed=seed)
     # from which side a hand brings each joint is not known
-    hidden = [name for name in rows.covariates if measures in TOUCHED and name.startswith("approach.")]
+    hidden = [name for name in rows.covariates if measures in names_of.TOUCHED and name.startswith("approach.")]
     given = {name: values for name, values in rows.covariates.items() if name not in hidden}
     return replace(rows, name=commands.name, covariates=given)
 

@@ -73,8 +73,6 @@ def brought(
     raise CampaignError(plan.name, "the robot does not reach what it is to touch", expected="another place or seed")
 
 
-TOUCHED = ("socket", "plane")
-"""Kinds of which the robot is led to what a row says."""
 STANDS, SOCKETS, PLANES, ANCHORS, CAMERAS = 3, 2, 3, 4, 2
 """Of a campaign that is simulated: the fewest of which one can be held out; as printed; a corner; the fewest that see
 every direction twice; the fewest that see a point's place."""

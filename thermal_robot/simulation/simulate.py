@@ -28,7 +28,7 @@ from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.robot import ENDS, Robot, joint_range, load_robot
 from thermal_robot.schema import LARGEST, MisfitError, boolean, fitted, matrix, number, optional, shown, whole, word
 from thermal_robot.simulation import schedule
-from thermal_robot.simulation.brought import TOUCHED, as_kind, touched
+from thermal_robot.simulation.brought import as_kind, touched
 
 if TYPE_CHECKING:
     from thermal_robot.urdf_text import WritesUrdf
@@ -256,7 +256,7 @@ def _number(effect: Effect, place: Parameter, value: Any) -> float:
         raise EffectError(str(error)) from None
 
 
-_MEASURES = ("position", "pose", "socket", "plane", "distance", "pixel", "controller")
+_MEASURES = tuple(columns.KINDS)
 _TURNED = ("pose", "controller")
 _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 """Quaternion wxyz of no turn: it tells effects that orientations will be measured."""
@@ -474,7 +474,7 @@ def simulate(
     plan, frames = _placed(plan, base, tool, base_known, tool_known)
     seen = observe(plan, frames)
     at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
-    if what in TOUCHED:
+    if what in columns.TOUCHED:
         systematic = [(effect, values) for effect, values in at_work if not isinstance(effect, RandomEffect)]
         return touched(what, plan, frames, systematic, noises[0], readings)
     return as_kind(what, _measured(plan, frames, at_work, (noises[0], noises[1]), joints, readings))
