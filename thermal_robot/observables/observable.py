@@ -38,7 +38,7 @@ class Artefact(Protocol):
 
 def in_mm(point: Array) -> str:
     """Coordinates of a point (3,) m, in words."""
-    return f"({', '.join(f'{1e3 * part:.0f}' for part in point)}) mm"
+    return f"({', '.join(f'{round(1e3 * part)}' for part in point)}) mm"
 
 
 @dataclass(frozen=True, eq=False)
