@@ -89,6 +89,20 @@ def test_an_injected_law_is_found_with_place_and_quantity(rv_m2, law, values, se
     assert [effect.name for effect, _ in own.effects] == ["discovered.1"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_no_gain_stands_beside_the_wrong_side_of_a_bend(rv_m2, side, seed):
+    """A gain takes a bend's straight part first; what is left bends the other way, which the gain must not survive."""
+    joint = rv_m2.joint_names.index("joint_2")
+    q = with_law(rv_m2, BEND, [0.0, 0.0], seed=seed)[0].q[:, joint]
+    bend = replace(BEND, place="joint_2", quantity="joint_2", marks=(float(np.median(q)), side), span=2.0)
+    found = tr.diagnose(with_law(rv_m2, bend, [0.0, 3e-3], seed=seed)[0])
+    names = [effect.name for effect, _ in found.fit.effects]
+    assert "joint_gain" not in names
+    assert "discovered.1" in names
+
+
 def test_a_law_of_the_base_is_placed_there(rv_m2):
     """A tracker that is warmed: the base moves with the temperature."""
     shape = Discovered(kind="base", place="base", quantity="temperature", shape="step", marks=(22.0,))

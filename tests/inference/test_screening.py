@@ -105,6 +105,17 @@ def test_the_shape_is_found_and_its_mark_to_within_the_rows_beside_it(scanned, n
         assert best.law.marks[1] == law.marks[1]
 
 
+@pytest.mark.parametrize("beyond", [6, 8])
+def test_a_law_bends_where_rows_lie_on_both_sides(rv_m2, beyond):
+    """A bend before the last few of 120 rows is placed before a sixteenth of them, or it would follow one or two."""
+    speed = np.sort(with_law(rv_m2, *PUT_IN["base"], seed=3)[0].covariates["speed"])
+    law = Discovered(place="joint_2", quantity="speed", shape="hinge", marks=(float(speed[-beyond]), 1.0))
+    here, target = seen(with_law(rv_m2, law, [0.0, 0.01], seed=3)[0])
+    found = shaped(here, target, replace(law, shape="ramp", marks=())).law
+    assert found.shape == "hinge"
+    assert (speed > found.marks[0]).sum() >= len(speed) // 16
+
+
 def test_no_shape_gains_over_a_straight_line_where_the_law_is_straight(scanned):
     """By chance one of sixty may, by a few natural logarithms."""
     for name in ("joint", "base"):

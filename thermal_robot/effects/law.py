@@ -96,6 +96,11 @@ class Discovered(Fading):
         return 1.0 / self.tried
 
     @property
+    def sides(self) -> tuple[Discovered, ...]:
+        """The law itself; of one that bends also that with the other side of the bend."""
+        return (self, replace(self, marks=(self.marks[0], -self.marks[1]))) if self.shape == "hinge" else (self,)
+
+    @property
     def follows(self) -> str:
         """Quantity, or product of two, as a diagnosis reports it."""
         return f"{self.quantity} * {self.by}" if self.by else self.quantity

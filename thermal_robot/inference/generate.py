@@ -535,7 +535,8 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
     """Candidate laws by log evidence, best first; possible events before all others.
 
     Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
-    have absorbed an unlisted cause. A law is called ``discovered.<number>``.
+    have absorbed an unlisted cause. A bend comes with its other side: the two differ by a straight line, which a known
+    effect may have absorbed. A law is called ``discovered.<number>``.
     """
     sample = RowSample.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
@@ -548,7 +549,8 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
     named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
-    return tuple(islice((law for law in named if not listed(sample, law)), settings.COMPARED_LAWS))
+    compared = islice((law for law in named if not listed(sample, law)), settings.COMPARED_LAWS)
+    return tuple(dict.fromkeys(side for law in compared for side in law.sides))
 
 
 def listed(sample: RowSample, law: Discovered) -> bool:
@@ -574,7 +576,7 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
     yield best
     if len(effects) > 1 or fit.explanation.discrepancy.probability > settings.SMOOTH_PRIOR:
         yield laws
-    if 2 < len(effects) <= settings.LEFT_OUT or (len(effects) == 2 and laws):
+    if 1 < len(effects) <= settings.LEFT_OUT:
         yield from (tuple(b for b in best if b != out) for out in effects)
 
 

@@ -776,11 +776,13 @@ def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
 
 
 def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
-    """Pattern search over marks and widths."""
-    step = settings.MARK_STEP
+    """Pattern search over marks and widths; a law bends where rows lie on both sides, or it would follow one of them."""
+    step, low, high = settings.MARK_STEP, -np.inf, np.inf
+    if not best.law.starts:
+        low, high = np.quantile(best.law.values(cache.observations), [settings.INNER_MARKS, 1.0 - settings.INNER_MARKS])
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
-        near = [law.shifted(s * step * law.span) for s in (1, -1)]
+        near = [law.shifted(s * step * law.span) for s in (1, -1) if low <= mark + s * step * law.span <= high]
         if SHAPES[law.shape].width:
             near += [
                 replace(law, marks=(mark, width[0] * f))
