@@ -776,10 +776,11 @@ def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
 
 
 def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
-    """Pattern search over marks and widths; a law bends where rows lie on both sides, or it would follow one of them."""
+    """Pattern search over marks and widths; a law bends where rows lie on both sides, or it would follow one row."""
     step, low, high = settings.MARK_STEP, -np.inf, np.inf
-    if not best.law.starts:
-        low, high = np.quantile(best.law.values(cache.observations), [settings.INNER_MARKS, 1.0 - settings.INNER_MARKS])
+    values = None if best.law.starts else best.law.values(cache.observations)
+    if values is not None:
+        low, high = np.quantile(values, [settings.INNER_MARKS, 1.0 - settings.INNER_MARKS])
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
         near = [law.shifted(s * step * law.span) for s in (1, -1) if low <= mark + s * step * law.span <= high]
