@@ -237,11 +237,12 @@ def test_rows_that_go_together_are_one_event_at_its_place(kind, span):
     known, (first, *_) = with_events(data)
     assert first.kind == kind
     assert first.place == ("joint_2" if kind == "joint" else kind)
-    inside = first.at_rows(known.nominal)[0][:, 1] > 0.0
+    ((named, _),) = lawful(known).effects
+    inside = named.at_rows(known.nominal)[0][:, 1] > 0.0
     true = np.zeros(ROWS, dtype=bool)
     true[slice(*span)] = True
     assert (inside == true).all() or (inside == ~true).all()
-    assert first.shape == ("run" if span == (35, 55) else "step")
+    assert named.shape == ("run" if span == (35, 55) else "step")
 
 
 def test_an_event_is_found_where_no_frame_is_fitted():
