@@ -74,6 +74,8 @@ def test_a_probability_is_never_certain(value, written):
 
 def test_shares_p_values_and_places():
     assert [units.percent(share) for share in (-0.031, -0.0003, None)] == ["−3.1 %", "0.0 %", "–"]
+    assert units.interval((-36730.0, 0.99999)) == "< −1000 to 99.999"
+    assert units.percent(12.3) == "> 1000 %"
     assert units.interval((-0.004, 0.006)) == "−0.4 to 0.6"
     assert units.interval(None) == ""
     told = ["p = 0.43", "p = 0.012", "p = 3e-9", "p < 1e-12"]
