@@ -237,7 +237,7 @@ def test_facts_are_verdict_campaign_rows_and_effects_left_out():
     assert told == {
         "Verdict": "thermal_elongation; probability of exactly this explanation 97.8 %",
         "Campaign": "hall_3_morning: robot ur10, tool frame tool0, 120 rows, position measured",
-        "Set aside": "as outliers: rows 17, 80 of the file (its header is row 1)",
+        "Set aside": "as outliers: rows 17, 80 (lines of the file; of a data frame, its index)",
         "Rows used": "118 of 120 rows, 2 set aside",
     }
     nothing = facts(case("nothing"))
@@ -246,7 +246,7 @@ def test_facts_are_verdict_campaign_rows_and_effects_left_out():
     assert facts(case("unexplained"))["Verdict"].endswith("; a remainder stays unexplained")
     single = facts(case("confounded", samples=1, campaign=""))["Campaign"]
     assert single == "robot ur10, tool frame tool0, 1 row, position and orientation measured"
-    assert ": row 17 of" in facts(case("found", outliers=(17,)))["Set aside"]
+    assert ": row 17 (" in facts(case("found", outliers=(17,)))["Set aside"]
     many = text(case("found", outliers=tuple(range(2, 18))))
     assert "104 of 120 rows, 16 set aside" in many
     assert "set aside  as outliers: rows 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 6 more" in many

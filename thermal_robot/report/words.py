@@ -359,7 +359,7 @@ def facts(diagnosis: Diagnosis) -> dict[str, str]:
     told = {"Verdict": "none: robot and table do not belong together", "Campaign": campaign}
     if diagnosis.usable:
         told["Verdict"] = verdict(diagnosis, in_words(diagnosis.verdict))
-        aside = f"as outliers: {_rows(diagnosis.outliers)} of the file (its header is row 1)"
+        aside = f"as outliers: {_rows(diagnosis.outliers)} (lines of the file; of a data frame, its index)"
         told["Set aside"] = aside if diagnosis.outliers else "no row"
         told |= {"Rows used": rows_used(diagnosis), "Left out": _left_out(diagnosis)}
     elif diagnosis.misfit and diagnosis.misfit.fault and diagnosis.misfit.fault.rows:
