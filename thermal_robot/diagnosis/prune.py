@@ -303,8 +303,8 @@ def undetermined(fit: Fit) -> dict[str, Refused]:
     e, seen = fit.explanation, set()
     for b in e.best.blocks:
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
-        least = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))[0]
-        if least < settings.DETERMINED**2:
+        variances = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))
+        if variances.min(initial=np.inf) < settings.DETERMINED**2:
             seen.add(fit.families[b])
     lost = sorted(fit.names_of(e.best) - seen)
     return {name: Refused(min(fit.probability(name), settings.PRIOR_PROBABILITY)) for name in lost}

@@ -576,7 +576,7 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
     yield best
     if len(effects) > 1 or fit.explanation.discrepancy.probability > settings.SMOOTH_PRIOR:
         yield laws
-    if 1 < len(effects) <= settings.LEFT_OUT:
+    if 2 < len(effects) <= settings.LEFT_OUT or (len(effects) == 2 and laws):
         yield from (tuple(b for b in best if b != out) for out in effects)
 
 
