@@ -220,13 +220,26 @@ def with_events(campaign, *only):
     return known, events(known)
 
 
+def assert_rows(event, known, span):
+    """An event has the rows of a span and no other, and the simplest shape of these."""
+    inside = event.at_rows(known.nominal)[0][:, 1] > 0.0
+    true = np.zeros(ROWS, dtype=bool)
+    true[slice(*span)] = True
+    assert (inside == true).all() or (inside == ~true).all()
+    assert event.shape == ("run" if span == (35, 55) else "step")
+
+
 SPANS = {"base": (0, 30), "tool": (50, ROWS), "joint": (35, 55)}
+TOOL_FIRST = ("tool", "base")  # what moves, and of which kind the span is
+FIVE_LEFT_OUT = pytest.mark.xfail(reason="five of thirty rows stand outside the event offered first", strict=True)
 
 
 @pytest.mark.parametrize(
     ("kind", "span"),
     [
-        pytest.param(kind, span, marks=() if own == kind else pytest.mark.slow)
+        pytest.param(
+            kind, span, marks=[pytest.mark.slow] * (own != kind) + [FIVE_LEFT_OUT] * ((kind, own) == TOOL_FIRST)
+        )
         for kind in SPANS
         for own, span in SPANS.items()
     ],
@@ -237,12 +250,17 @@ def test_rows_that_go_together_are_one_event_at_its_place(kind, span):
     known, (first, *_) = with_events(data)
     assert first.kind == kind
     assert first.place == ("joint_2" if kind == "joint" else kind)
+    assert_rows(first, known, span)
+
+
+@pytest.mark.slow
+def test_what_is_named_of_an_event_has_all_of_its_rows():
+    """Also where the event offered first leaves out some."""
+    span = SPANS[TOOL_FIRST[1]]
+    known, _ = with_events(spliced(measured(), shifted(TOOL_FIRST[0], 1e-3), slice(*span)))
     ((named, _),) = lawful(known).effects
-    inside = named.at_rows(known.nominal)[0][:, 1] > 0.0
-    true = np.zeros(ROWS, dtype=bool)
-    true[slice(*span)] = True
-    assert (inside == true).all() or (inside == ~true).all()
-    assert named.shape == ("run" if span == (35, 55) else "step")
+    assert named.kind == TOOL_FIRST[0]
+    assert_rows(named, known, span)
 
 
 def test_an_event_is_found_where_no_frame_is_fitted():

@@ -783,7 +783,8 @@ def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
         low, high = np.quantile(values, [settings.INNER_MARKS, 1.0 - settings.INNER_MARKS])
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
-        near = [law.shifted(s * step * law.span) for s in (1, -1) if low <= mark + s * step * law.span <= high]
+        moved = (law.shifted(s * step * law.span) for s in (1, -1))
+        near = [own for own in moved if low <= own.marks[0] <= high]
         if SHAPES[law.shape].width:
             near += [
                 replace(law, marks=(mark, width[0] * f))
