@@ -1,4 +1,4 @@
-"""The four channels: the displaced robot against its linear response, by central differences."""
+"""The four channels: the displaced robot against its linear response, by a five-point stencil."""
 
 import io
 
@@ -10,8 +10,8 @@ import yourdfpy
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
 
-STEP = 1e-5
-TOLERANCE = 2e-9  # STEP² times lengths of a metre or two, and rounding over STEP
+STEP = 1e-3
+TOLERANCE = 1e-10  # STEP⁴ times lengths of a metre or two, by what mimic joints multiply; rounding over STEP
 ROWS = 20
 
 
@@ -30,8 +30,9 @@ def response(robot, q, **channel):
     about |= {"base": rng.normal(0, 0.3, 6), "tool": rng.normal(0, 0.3, 6)}
     about = about if name in ("joint", "segment") else {name: np.zeros(6)}
     for unit in units:
-        ends = (kin.Displacement(**{**about, name: about[name] + h * unit}) for h in (-STEP, STEP))
-        yield twist_between(*(kin.tool_poses(robot, q, moved) for moved in ends)) / (2 * STEP)
+        steps = (-2 * STEP, -STEP, STEP, 2 * STEP)
+        poses = [kin.tool_poses(robot, q, kin.Displacement(**{**about, name: about[name] + h * unit})) for h in steps]
+        yield (8 * twist_between(*poses[1:3]) - twist_between(poses[0], poses[3])) / (12 * STEP)
     yield kin.chain_frames(robot, q, kin.Displacement(**about))
 
 
