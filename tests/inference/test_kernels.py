@@ -264,6 +264,19 @@ def test_a_joint_that_never_moves_does_not_scatter(rv_m2):
     assert "poses, joint_3" not in names
 
 
+@pytest.mark.parametrize("part", [0.5, 2.0])
+def test_a_second_joint_errs_beside_the_first_and_independently_of_it(part):
+    """Their covariances add up; the second's root mean square at the target is so many times the first's."""
+    campaign, noise = campaign_of("ur10"), np.full(3, NOISE)
+    one, other = (
+        f for f in discrepancy_kernels(seen(campaign)) if f.name in ("poses, elbow_joint", "poses, wrist_1_joint")
+    )
+    both = one.with_joint(other, part)
+    assert (both.name, both.joints) == ("poses, elbow_joint, wrist_1_joint", ("elbow_joint", "wrist_1_joint"))
+    expected = (dense(one_hot(one), noise) + part**2 * dense(one_hot(other), noise)) / (1.0 + part**2)
+    np.testing.assert_allclose(dense(one_hot(both), noise), expected, rtol=0, atol=1e-10)
+
+
 def test_visits_of_a_pose_share_what_the_pose_brings_and_not_what_a_visit_brings():
     campaign = campaign_of("rv_m2", 3)
     noise = np.full(3, NOISE)

@@ -249,6 +249,11 @@ class ModelSearch:
             self._last = key, self._spectra[kernel].along(self._stack.some_columns(kept))
         return self._last[1]
 
+    def likeliest_joints(self) -> Kernel | None:
+        """Kernel of scattering joints with the most evidence, whatever it was weighed beside."""
+        asked = [(log, k) for ((k, _), _), log in self._log_evidences.items() if k >= 0 and self.kernels[k].joints]
+        return self.kernels[max(asked)[1]] if asked else None
+
     def plausible_kernels(self, best: Combination) -> tuple[Kernel, ...]:
         """Kernels with substantial posterior probability beside the best combination.
 
@@ -453,6 +458,7 @@ def explain(
     else:
         whitening, alive = replace(before.whitening, smooth=None), {kernel.name for kernel in before.kernels}
         beside, kernel = [kernel for kernel in kernels if kernel.name in alive], before.discrepancy.kernel
+        beside += [kernel for kernel in before.kernels if kernel.further]
         history += [_state(seed, kernel, whitening) for seed in seeds[:1]]
 
     def settled(found: _Iteration) -> bool:
@@ -467,7 +473,7 @@ def explain(
         history.append(found.state)
         whitening, aside = reweigh(found.rough_residual, noise, found.leverage, linear.measures)
         seeds = [found.best.blocks]
-        beside = kernels if first else found.models.plausible_kernels(found.best)
+        beside = kernels if first else found.next_kernels(kernels)
         first = False
         del found  # before the next one takes as much memory
 
@@ -530,6 +536,13 @@ class _Iteration:
     @property
     def kernel(self) -> Kernel | None:
         return self.models.kernels[self.hyper[0]] if self.hyper[0] >= 0 else None
+
+    def next_kernels(self, kernels: Sequence[Kernel]) -> Sequence[Kernel]:
+        """Forward selection of scattering joints: plausible kernels, and beside scatter those of one joint more."""
+        likely, known = self.models.plausible_kernels(self.best), {kernel.name for kernel in self.models.kernels}
+        own = self.models.likeliest_joints() if self.kernel and self.kernel.grouped else None
+        more = own.with_one_more(kernels) if own else []
+        return [*likely, *(wider for wider in more if wider.name not in known)]
 
     @property
     def state(self) -> tuple[object, ...]:

@@ -289,8 +289,8 @@ class Kernel:
 
     ``functions`` (N, k) are smooth in what is commanded and recorded; of one that is ``grouped`` (N,) the number of
     each pose or visit. ``moves`` (N, m, c) or, the same for all rows, (m, c): displacement of the target by each
-    component, root frame axes, m and rad. ``place`` is where it enters; empty
-    where it may be anywhere.
+    component, root frame axes, m and rad. ``place`` is where it enters, the first of several joints (``further``);
+    empty where it may be anywhere.
     """
 
     name: str
@@ -298,6 +298,32 @@ class Kernel:
     moves: Array
     grouped: bool = False
     place: tuple[str, str] = ("", "")
+    further: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Kind of the kernel, the first word of its name."""
+        return self.name.split(", ")[0]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that scatter in this kernel, by pose or visit; of others none."""
+        kind, name = self.place
+        return (name, *self.further) if self.grouped and kind == "joint" else ()
+
+    def with_joint(self, other: Kernel, part: float) -> Kernel:
+        """Add one more joint (sum of two kernels), whose rms is a part of that of all joints so far."""
+        length = [np.sqrt((kernel.moves**2).sum(axis=2).mean()) for kernel in (self, other)]
+        moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
+        name = ", ".join((self.kind, *sorted((*self.joints, *other.joints))))
+        return replace(self, name=name, moves=moves, further=(*self.further, *other.joints))
+
+    def with_one_more(self, kernels: Iterable[Kernel]) -> list[Kernel]:
+        """Add each joint that is not in this kernel to it, at several relative sizes."""
+        if len(self.joints) >= settings.SCATTERING:
+            return []
+        more = [k for k in kernels if k.kind == self.kind and k.joints and k.joints[0] not in self.joints]
+        return [self.with_joint(kernel, part) for kernel in more for part in settings.PARTS]
 
     def over(self, relative: Array | None) -> Kernel:
         """Kernel with each row divided by its relative noise (N, m); ``None`` if all are one."""

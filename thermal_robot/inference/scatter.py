@@ -766,11 +766,11 @@ def _without_influential_rows(
 
 
 def _in_joints(fit: Fit) -> list[Component]:
-    """Variance component, kind and joint, of a per-pose or per-visit discrepancy, if any."""
+    """Variance components, kind and joint, of a per-pose or per-visit discrepancy, if any."""
     kernel, names = fit.explanation.discrepancy.kernel, fit.campaign.robot.joint_names
-    if kernel is None or not kernel.grouped or kernel.place[0] != "joint":
+    if kernel is None:
         return []
-    return [("visit" if kernel.name.startswith("visits") else "pose", names.index(kernel.place[1]))]
+    return [("visit" if kernel.kind == "visits" else "pose", names.index(joint)) for joint in kernel.joints]
 
 
 def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None) -> Array:

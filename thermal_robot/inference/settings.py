@@ -47,6 +47,10 @@ LEVER = 0.3
 """Lever arm, m: a discrepancy of the tool rotates it by its displacement over this length."""
 STARTS = 3
 """Number of start combinations, the best ones, beside which each kernel of a discrepancy is tried."""
+SCATTERING = 3
+"""Largest number of joints with a per-pose or per-visit discrepancy beside each other."""
+PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
+"""Rms of a further joint over that of those before it, in halves of an octave."""
 KERNEL_REACH = 20.0
 """Deficit of log evidence at which a kernel of the discrepancy is dropped while a fit iterates."""
 AMPLITUDE_REACH = 5.4
