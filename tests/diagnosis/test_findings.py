@@ -270,8 +270,7 @@ def weighed(known, odds):
     """The same fit, where sets of effects are as probable as said; the best is what was found."""
     e = known.explanation
     sets = [e.best.blocks, *(tuple(known.blocks_of(name)[0] for name in names) for names in odds)]
-    nothing = np.zeros(0)
-    compared = [Combination(blocks, 0.0, 1.0, {}, nothing, nothing, 0.0) for blocks in sets]
+    compared = [Combination(blocks, 0.0, 1.0, {}, 0.0) for blocks in sets]
     weight = np.array([1.0, *odds.values()])
     said = replace(known, explanation=replace(e, combinations=compared, probabilities=weight / weight.sum()))
     return confounding(said, {"joint_offset": e.best.blocks[0]})

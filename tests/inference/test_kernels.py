@@ -14,6 +14,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.kernels import (
+    DesignMatrix,
     GroupKernel,
     Kernel,
     KernelCovariance,
@@ -113,7 +114,7 @@ def test_products_and_the_mean_are_those_of_the_dense_covariance(case, tau, chun
     mean = tau**2 * case.across @ np.linalg.solve(case.covariance(tau), left)
     for own in case.spectra:
         smooth = KernelCovariance(own, tau)
-        close(smooth.products(stack), expected)
+        close(smooth.products(DesignMatrix.from_array(stack, case.measures)), expected)
         # from some columns that were carried over once
         some = [along[:, [4, 1]] for along in own.along(stack)]
         close(own.products(tau, some, plain[np.ix_([4, 1], [4, 1])]), expected[np.ix_([4, 1], [4, 1])])
@@ -129,7 +130,10 @@ def test_whitened_columns_the_determinant_and_what_is_followed_are_those_of_the_
     for own in case.spectra:
         smooth = KernelCovariance(own, tau)
         close(smooth.whitened(case.stack), whitened, 1e-8)
-        close(smooth.whitened(case.stack).T @ smooth.whitened(case.stack), smooth.products(case.stack))
+        close(
+            smooth.whitened(case.stack).T @ smooth.whitened(case.stack),
+            smooth.products(DesignMatrix.from_array(case.stack, case.measures)),
+        )
         assert smooth.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-10)
         followed = np.trace(np.linalg.solve(covariance, tau**2 * case.inside))
         assert smooth.degrees == pytest.approx(followed, rel=1e-10)
@@ -151,7 +155,8 @@ def test_a_spectrum_puts_the_covariance_together(name, tau):
     assert few.shape[1] == len(large) < len(variance)
     # no columns, as where both frames are known and no effect is found, have no products
     none = case.stack[:, :0]
-    assert KernelCovariance(spectrum, tau).products(none).shape == spectrum.spread(tau, none).shape == (0, 0)
+    nothing = DesignMatrix.from_array(none, case.measures)
+    assert KernelCovariance(spectrum, tau).products(nothing).shape == spectrum.spread(tau, none).shape == (0, 0)
     assert KernelCovariance(spectrum, tau).whitened(none).shape == none.shape
 
 
@@ -203,7 +208,7 @@ def test_a_unit_of_a_form_is_the_noise(name):
         functions = kernel.functions if groups is not None else 7.0 * kernel.functions
         other = replace(kernel, moves=factor * kernel.moves, functions=functions)
         smooth = KernelCovariance(decomposed(other, np.ones(count), noise), 2.0)
-        covariance = np.linalg.inv(smooth.products(np.eye(count * measures)))
+        covariance = np.linalg.inv(smooth.products(DesignMatrix.from_array(np.eye(count * measures), measures)))
         assert (np.diag(covariance) - 1.0).mean() == pytest.approx(4.0, rel=1e-8)
 
 

@@ -182,7 +182,7 @@ def test_what_is_held_at_zero_hides_nothing_from_a_further_block():
         linear = Linear(linear.gap, linear.frames, (linear.blocks[0], held, like))
         search = Search(gram(linear, whitening), (0.0,) * 3)
         alone, beside = search.evaluate(()), search.evaluate((1,))
-        assert beside.values.tolist() == [0.0]
+        assert search.gram.posterior(beside)[0].tolist() == [0.0]
         brought = [dict((b, gain) for b, gain, _ in gains(search.gram, base, [2]))[2] for base in (alone, beside)]
         assert brought[0] > 20.0
         assert brought[1] == pytest.approx(brought[0], abs=2.0)

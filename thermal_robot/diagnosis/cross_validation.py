@@ -141,19 +141,12 @@ class Model:
 
         The place of an instrument's stand is no property of the robot: a held-out stand is judged by its scatter.
         """
-        key = test.tobytes()
-        if key not in self._test_columns:
-            found, own = self.linear.stack[test], self.own_artefacts(test)
-            if len(own):
-                root = np.sqrt(self.whitening.weights[test])[:, None, None] / self.whitening.sigma(test)[:, :, None]
-                white = equations_of(found * root)
-                found = found - found[:, :, own] @ np.linalg.lstsq(white[:, own], white, rcond=settings.ALIAS)[0]
-            self._test_columns[key] = found
-        return self._test_columns[key]
-
-    @cached_property
-    def _test_columns(self) -> dict[bytes, Array]:
-        return {}
+        found, own = self.linear.stack[test], self.own_artefacts(test)
+        if not len(own):
+            return found
+        root = np.sqrt(self.whitening.weights[test])[:, None, None] / self.whitening.sigma(test)[:, :, None]
+        white = equations_of(found * root)
+        return found - found[:, :, own] @ np.linalg.lstsq(white[:, own], white, rcond=settings.ALIAS)[0]
 
     @cached_property
     def _of_all(self) -> Array:

@@ -35,7 +35,7 @@ from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.problem import Linear, whitened
+from thermal_robot.inference.problem import Linear, products
 from thermal_robot.inference.settings import FEW_LEVELS, IN_ITS_PLACE
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import joint_range
@@ -277,8 +277,7 @@ def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination])
     index = sorted({b for combination in leading for b in combination.blocks})
     items = [e.linear.blocks[b] for b in index]
     # rows that are alike are worth less, as in the explanation itself
-    whole = whitened(Linear(e.linear.gap, e.linear.frames, tuple(items)), e.whitening) / e.best.noise
-    gram = whole.T @ whole
+    gram = products(Linear(e.linear.gap, e.linear.frames, tuple(items)), e.whitening) / e.best.noise**2
     # the simulator's own tool is never refitted: its columns come last and are left out
     columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]
     asked = np.concatenate(columns, axis=2) / noise[:, None]

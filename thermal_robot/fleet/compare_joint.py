@@ -265,9 +265,10 @@ def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
         np.zeros((len(statistics), len(statistics[0].vector))),
         0,
     )
+    mode = search.gram.posterior(best)[0]
     for part in at_work:
         end = start + part.basis.shape[1]
-        values[np.ix_(part.where, part.parameters)] += part.basis @ best.values[start:end]
+        values[np.ix_(part.where, part.parameters)] += part.basis @ mode[start:end]
         start = end
     return Joint(at_work, changes, values, tuple(map(probability, of_effects)), looked_at)
 
@@ -322,8 +323,9 @@ def _change(search: Search, parts: Sequence[JointBlock], best: Combination, numb
     """Score test of a differing part, given all others of the best explanation, without its prior."""
     start = sum(parts[b].basis.shape[1] for b in best.blocks[: best.blocks.index(number)])
     own = slice(start, start + parts[number].basis.shape[1])
-    tight = np.linalg.inv(best.covariance[own, own])
+    values, covariance = search.gram.posterior(best)
+    tight = np.linalg.inv(covariance[own, own])
     information = tight - np.eye(len(tight)) / best.scales[number] ** 2
-    score = tight @ best.values[own]
+    score = tight @ values[own]
     chi2, degrees = float(score @ np.linalg.pinv(information) @ score), len(tight)
     return Change(parts[number], chi2, degrees, float(chdtrc(degrees, max(chi2, 0.0))), 0.0)

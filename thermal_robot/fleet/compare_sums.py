@@ -45,7 +45,7 @@ from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block, block, frame_columns, moved_by
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import distinct
-from thermal_robot.inference.problem import Linear, whitened
+from thermal_robot.inference.problem import Linear, products
 from thermal_robot.observations import Observations, observe
 from thermal_robot.prediction import Spread
 
@@ -279,8 +279,7 @@ def sums(found: Diagnosis | ModelAsFit, fit: Fit | ModelAsFit, listed: Sequence[
         Block(i.effect, i.compared, own, np.ones(len(i.compared))) for i, own in zip(listed, columns, strict=True)
     )
     linear = Linear(gap, frame_columns(at)[0], tuple(blocks))
-    stack = whitened(linear, e.whitening)
-    matrix, vector = _projected(stack.T @ stack / e.best.noise**2, linear.frames.shape[2])
+    matrix, vector = _projected(products(linear, e.whitening) / e.best.noise**2, linear.frames.shape[2])
     left = found.unexplained if found.remaining is None else found.remaining
     value, axes = np.linalg.eigh(matrix)
     value = np.maximum(value, 0.0)

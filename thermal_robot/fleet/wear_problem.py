@@ -30,7 +30,7 @@ from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.problem import Linear, Whitening, frame_step, whitened
+from thermal_robot.inference.problem import Linear, Whitening, frame_step, products
 from thermal_robot.inference.registration import moved
 from thermal_robot.observations import Frames, Observations, observe
 
@@ -187,10 +187,10 @@ class _Visit:
         gap = seen.gap + columns[:, :, : here.sum()] @ values[here]
         scale = np.concatenate([sizes[here], [p.size for p in self.own]])
         self.linear = Linear(gap, frame_columns(seen)[0], (Block(_GivenParameters(), (), columns, scale),))
-        stack = whitened(self.linear, self.whitening)
+        full = products(self.linear, self.whitening)
         matrix, vector = np.zeros((len(here), len(here))), np.zeros(len(here))
         flat = self.linear.frames.shape[2]
-        matrix[np.ix_(here, here)], vector[here] = _without_own(stack.T @ stack, flat, scale, int(here.sum()))
+        matrix[np.ix_(here, here)], vector[here] = _without_own(full, flat, scale, int(here.sum()))
         return matrix, vector
 
     def step(self, values: Array) -> None:

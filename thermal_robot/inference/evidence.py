@@ -263,6 +263,23 @@ class Gram:
         """Return the indices (D_γ,) of the reduced columns of some blocks."""
         return np.array([k for b in blocks for k in range(self.slices[b].start, self.slices[b].stop)], dtype=int)
 
+    def equations_of(self, blocks: Sequence[int]) -> Columns:
+        """Return the normal equations of one combination."""
+        used, widths = self.columns_of(blocks), [self.bases[b].shape[1] for b in blocks]
+        owner = np.repeat(np.arange(len(blocks)), widths)
+        return Columns(self.matrix[used[:, None], used], self.vector[used], owner, self.positive[used])
+
+    def posterior(self, found: Combination) -> tuple[Array, Array]:
+        """Posterior mode (D_γ,) and covariance (D_γ, D_γ) of the reduced columns at a combination's scales and noise.
+
+        Block after block; zero for those that would be negative and cannot, and where rounding hides all.
+        """
+        columns = self.equations_of(found.blocks)
+        if not np.isfinite(found.log_evidence):
+            return np.zeros_like(columns.vector), np.zeros_like(columns.matrix)
+        at = Posterior.at(columns, np.array([found.scales[b] for b in found.blocks]), found.noise**2)
+        return at.values, at.covariance
+
     def some(self, blocks: Sequence[int]) -> Gram:
         """Return the normal equations of a subset of the blocks."""
         widths = [self.bases[b].shape[1] for b in blocks]
@@ -286,17 +303,14 @@ class Combination:
     """One combination of blocks with its evidence, at the most probable prior scales and noise.
 
     ``log_evidence`` is the log marginal likelihood with log prior odds; ``noise`` s, in units of the whitening noise;
-    ``scales`` λ of each block; ``values`` and ``covariance`` the posterior mode of the reduced columns, block after
-    block, zero for those that would be negative and cannot; ``effective`` the number of determined parameters;
-    ``exact`` whether all scales are converged, else at most those of one block are.
+    ``scales`` λ of each block; ``effective`` the number of determined parameters; ``exact`` whether all scales are
+    converged, else at most those of one block are.
     """
 
     blocks: tuple[int, ...]
     log_evidence: float
     noise: float
     scales: dict[int, float]
-    values: Array
-    covariance: Array
     effective: float
     exact: bool = True
 
@@ -314,9 +328,7 @@ def evidence(
     The iteration starts at the noise and scales of ``start``, ends once their logarithms move less than ``settled``,
     and early where it is clear that the log evidence ``floor`` is not reached.
     """
-    used = gram.columns_of(blocks)
-    owner = np.repeat(np.arange(len(blocks)), [gram.slices[b].stop - gram.slices[b].start for b in blocks])
-    columns = Columns(gram.matrix[used[:, None], used], gram.vector[used], owner, gram.positive[used])
+    columns = gram.equations_of(blocks)
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, law = max(variance, settings.LEAST_VARIANCE), ScalePrior.of(gram.spreads[list(blocks)])
@@ -332,7 +344,7 @@ def evidence(
     effective = float(found.effective.sum())
     exact = peak.promised is None
     noise = float(np.sqrt(variance))
-    return Combination(blocks, log_evidence, noise, scales, found.values, found.covariance, effective, exact)
+    return Combination(blocks, log_evidence, noise, scales, effective, exact)
 
 
 @dataclass(frozen=True, eq=False)

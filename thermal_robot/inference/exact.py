@@ -23,7 +23,7 @@ from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, explain, log_odds
 from thermal_robot.inference.kernels import discrepancy_kernels
-from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values, whitened
+from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values, products, whitened_columns
 from thermal_robot.inference.registration import moved
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.weights import Noise, huber_weight
@@ -75,7 +75,7 @@ def _descended(
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
 
     def left(observations: Observations, state: Array) -> float:
-        gap = whitened(Linear(observations.gap, np.zeros((*observations.gap.shape, 0)), ()), beside)
+        gap = whitened_columns(observations.gap[:, :, None], beside)
         return float((gap**2).sum() + ((state / prior) ** 2).sum())
 
     observations = corrected_observations(campaign, frames, pairs(state))
@@ -83,10 +83,9 @@ def _descended(
     for _ in range(steps):
         flat, names = frame_columns(observations)
         items = tuple(block(observations, effect) for effect in effects)
-        stack = whitened(Linear(observations.gap, flat, items), beside)
-        products = stack.T @ stack
+        full = products(Linear(observations.gap, flat, items), beside)
         for damping in settings.DAMPINGS:
-            step, size = _step_inside(products, state, prior, least, damping)
+            step, size = _step_inside(full, state, prior, least, damping)
             tried = moved(frames, step[: len(names)], names), np.maximum(state + step[len(names) :], least)
             there = corrected_observations(campaign, tried[0], pairs(tried[1]))
             if (after := left(there, tried[1])) <= cost or size < settled:

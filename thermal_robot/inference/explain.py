@@ -362,9 +362,6 @@ class ModelSearch:
         return {hyper: [(c.log_evidence + stands.get(hyper, 0.0), c) for c in own] for hyper, own in seen.items()}
 
 
-NOTHING = np.zeros(0)
-
-
 @dataclass(frozen=True)
 class Discrepancy:
     """Posterior of a correlated discrepancy: the probability of any, and of each kernel by its name.
@@ -586,7 +583,7 @@ class _Iteration:
             white,
             search.gram,
             best,
-            [replace(c, values=NOTHING, covariance=NOTHING) for c in compared],
+            compared,
             probabilities,
             values,
             residual_of(linear, white, values),

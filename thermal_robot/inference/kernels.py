@@ -342,9 +342,11 @@ class KernelCovariance:
     spectrum: SmoothKernel | GroupKernel
     tau: float
 
-    def products(self, stack: Array) -> Array:
-        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S of (E, K) columns S."""
-        return self.spectrum.products(self.tau, self.spectrum.along(stack), stack.T @ stack)
+    def products(self, stack: DesignMatrix) -> Array:
+        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S (K, K) of the columns S."""
+        distinct = stack.some_columns(np.arange(len(stack.different)))
+        found = self.spectrum.products(self.tau, self.spectrum.along(distinct), distinct.products())
+        return np.asarray(found[np.ix_(stack.number, stack.number)])
 
     def whitened(self, stack: Array) -> Array:
         """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K); slower than :meth:`products`."""

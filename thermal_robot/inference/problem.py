@@ -94,11 +94,14 @@ class Whitening:
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
     """Return normal equations: frames projected out, each block reduced to the directions that the data determine."""
-    if whitening.smooth is None:  # rows are then apart, and never all held at once
-        stack = white_stack(DesignMatrix.of(linear.columns), whitening)
-        return normal_equations(linear, whitening, stack.products(), stack.equations)
-    white = whitened(linear, whitening)
-    return normal_equations(linear, whitening, white.T @ white, len(white))
+    equations = int((whitening.weights > 0).sum()) * linear.measures
+    return normal_equations(linear, whitening, products(linear, whitening), equations)
+
+
+def products(linear: Linear, whitening: Whitening) -> Array:
+    """Gram matrix (f + P + 1, f + P + 1) of the whitened columns; their rows are never all held at once."""
+    stack = white_stack(DesignMatrix.of(linear.columns), whitening)
+    return stack.products() if whitening.smooth is None else whitening.smooth.products(stack)
 
 
 def white_stack(stack: DesignMatrix, whitening: Whitening) -> DesignMatrix:
@@ -233,13 +236,14 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
     Directions that the data do not see keep their prior variance.
     """
     result, start = {}, 0
+    values, every = problem.posterior(found)
     for index in found.blocks:
         basis, sizes = problem.bases[index], linear.blocks[index].sizes
         stop = start + basis.shape[1]
-        mean = sizes * (basis @ found.values[start:stop])
+        mean = sizes * (basis @ values[start:stop])
         hidden = np.eye(len(sizes)) - basis @ basis.T
         hidden = hidden @ hidden.T * found.scales[index] ** 2  # a projection still, and rounding is not negative
-        covariance = basis @ found.covariance[start:stop, start:stop] @ basis.T + hidden
+        covariance = basis @ every[start:stop, start:stop] @ basis.T + hidden
         result[index] = (mean, sizes[:, None] * covariance * sizes)
         start = stop
     return result
@@ -250,9 +254,8 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     flat = linear.frames.shape[2]
     if not flat:
         return np.zeros(0)
-    stack = whitened(Linear(remainder, linear.frames, ()), replace(whitening, smooth=None))
-    products = stack.T @ stack if whitening.smooth is None else whitening.smooth.products(stack)
-    return solve(products[:flat, :flat], products[:flat, flat])
+    full = products(Linear(remainder, linear.frames, ()), whitening)
+    return solve(full[:flat, :flat], full[:flat, flat])
 
 
 def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:

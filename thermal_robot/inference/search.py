@@ -54,8 +54,9 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
     """First-order gain of log evidence by adding each block, its scale integrated out, and its best scale."""
     used = gram.columns_of(base.blocks)
     # a column that is held at zero takes nothing up
-    kept = np.flatnonzero((base.values != 0.0) | ~gram.positive[used])
-    used, values, covariance = used[kept], base.values[kept], base.covariance[kept[:, None], kept] / base.noise**2
+    values, covariance = gram.posterior(base)
+    kept = np.flatnonzero((values != 0.0) | ~gram.positive[used])
+    used, values, covariance = used[kept], values[kept], covariance[kept[:, None], kept] / base.noise**2
     left = gram.vector - gram.matrix[:, used] @ values
     log_scale = np.array(settings.SCALE_GRID)
     square = np.exp(2.0 * log_scale)[:, None]
@@ -227,12 +228,7 @@ class Search:
             if not key:
                 raise
             # rounding hides what blocks so nearly alike bring: nothing
-            width = len(self.gram.columns_of(key))
-            bare, nothing = self.evaluate(()), np.zeros((width, width))
-            scales = dict.fromkeys(key, 1.0)
-            return replace(
-                bare, blocks=key, log_evidence=-np.inf, scales=scales, values=np.zeros(width), covariance=nothing
-            )
+            return replace(self.evaluate(()), blocks=key, log_evidence=-np.inf, scales=dict.fromkeys(key, 1.0))
 
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Hill climbing with larger moves, until no move improves.
@@ -385,8 +381,6 @@ class Search:
                 base.log_evidence + gain + self.log_prior[b],
                 base.noise,
                 {**base.scales, b: scale},
-                base.values,
-                base.covariance,
                 base.effective,
                 exact=False,
             )

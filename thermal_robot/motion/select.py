@@ -59,7 +59,8 @@ class Choice:
     def deviations(self) -> Array:
         """(P,) posterior standard deviations of the chosen parameters, NaN of the others."""
         found, own = np.full(len(self.active), np.nan), list(self.best.blocks)
-        found[own] = self.point.model.sizes[own] * np.sqrt(np.maximum(np.diag(self.best.covariance), 0.0))
+        _, covariance = self.search.gram.posterior(self.best)
+        found[own] = self.point.model.sizes[own] * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return found
 
 
