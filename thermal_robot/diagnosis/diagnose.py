@@ -160,10 +160,9 @@ def _concluded(
     return replace(frames_alone(campaign, candidates), misfit=misfit)
 
 
-def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
+def _explained(fit: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
-    fit = known
-    for number in range(1, 1 if of_model(known.campaign) else settings.SELECTIONS):
+    for number in range(1, 1 if of_model(fit.campaign) else settings.SELECTIONS):
         wider = forward_selection(fit, number, progress)
         if wider is None:
             break
