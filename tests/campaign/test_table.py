@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign import table as tables
-from thermal_robot.campaign.checked import first_beyond, without_rounding
+from thermal_robot.campaign.checked import beyond, without_rounding
 from thermal_robot.campaign.table import Layout, Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 
@@ -360,9 +360,8 @@ def test_a_figure_larger_than_any_is_refused(cell: str, gaps: bool) -> None:
 
 @pytest.mark.parametrize("figure", [np.nan, np.inf, -np.inf, 1e21, -1e300])
 def test_the_first_figure_beyond_is_found_and_the_smallest_are_none(figure: float) -> None:
-    assert first_beyond(np.array([0.0, 1e20, figure, figure])) == 2
-    assert first_beyond(np.array([[0.0, 1.0], [2.0, figure]])) == 1
-    assert (first_beyond(np.array([0.0, -1e20])), first_beyond(np.array([0.0, 3.0]), most=2.0)) == (None, 1)
+    assert beyond(np.array([0.0, -1e20, 1e20, figure])).tolist() == [False, False, False, True]
+    assert beyond(np.array([[0.0, 3.0]]), most=2.0).tolist() == [[False, True]]
     assert without_rounding(np.array([1e-31, -5e-324, 2e-30, 0.0])).tolist() == [0.0, 0.0, 2e-30, 0.0]
     assert Table("t", {"a": ["1e-300", "-1e-29"]}, np.array([2, 3])).numbers("a").tolist() == [0.0, -1e-29]
 

@@ -418,9 +418,8 @@ class Campaign:
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Freeze an array, so that the constructor need not copy it."""
-    if array.base is None:
-        array.flags.writeable = False
+    """Freeze an array that nobody else holds, so that the constructor need not copy it."""
+    array.flags.writeable = False
     return array
 
 

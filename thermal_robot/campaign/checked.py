@@ -35,9 +35,9 @@ def first_true(refused: NDArray[np.bool_]) -> int | None:
     return int(np.argmax(rows)) if rows.any() else None
 
 
-def first_beyond(values: Array, most: float = LARGEST) -> int | None:
-    """Row of the first number that is not finite or too large, of (N,) or (N, k); ``None`` without one."""
-    return first_true(~(np.abs(values) <= most))
+def beyond(values: Array, most: float = LARGEST) -> NDArray[np.bool_]:
+    """Mask of the numbers that are not finite or too large, of the shape of the values."""
+    return ~(np.abs(values) <= most)
 
 
 def without_rounding(values: Array) -> Array:
@@ -46,15 +46,15 @@ def without_rounding(values: Array) -> Array:
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
 
 
-def no_orientation(quaternions: Array) -> int | None:
-    """Row of the first of (N, 4) quaternions that is not normalised; ``None`` without one."""
-    return first_true(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE)
+def no_orientation(quaternions: Array) -> NDArray[np.bool_]:
+    """Mask (N,) of the (N, 4) quaternions that are not normalised."""
+    return np.asarray(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE)
 
 
-def no_rotation(matrices: Array) -> int | None:
-    """Index of the first of (N, 3, 3) matrices that is no rotation, to two decimals; ``None`` without one."""
+def no_rotation(matrices: Array) -> NDArray[np.bool_]:
+    """Mask (N,) of the (N, 3, 3) matrices that are no rotations, to two decimals."""
     away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    return first_true((away > ROTATION_TOLERANCE) | (np.linalg.det(matrices) < 0.0))
+    return np.asarray((away > ROTATION_TOLERANCE) | (np.linalg.det(matrices) < 0.0))
 
 
 def refuse(
@@ -89,7 +89,7 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
     if array.shape != shape:
         raise CampaignError(file, "wrong shape", column=key, found=str(array.shape), expected=str(shape))
     if kind is np.float64:
-        wrong = ~(np.abs(array) <= (LARGEST_COMMAND if key == "q" else LARGEST))
+        wrong = beyond(array, LARGEST_COMMAND if key == "q" else LARGEST)
         expected, problem = "a finite number in every place", "not a figure of a campaign"
         refuse(file, key, wrong, problem, expected, lambda index: str(array[index]))
         array = without_rounding(array)
@@ -105,20 +105,20 @@ def _as_array(value: Any, kind: Any) -> NDArray[Any]:
     array = np.asarray(value)
     if kind is not np.str_ and array.dtype.kind not in "biufO":
         raise TypeError(f"{array.dtype} is no kind of number")
-    if kind is np.int64 and array.dtype.kind in "fO" and first_beyond(array.astype(np.float64).ravel()) is not None:
+    if kind is np.int64 and array.dtype.kind in "fO" and beyond(array.astype(np.float64)).any():
         raise ValueError("not a finite number")
     return array.astype(kind, copy=False)
 
 
 def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None = None) -> None:
     """Refuse (N, 4) quaternions that are not normalised."""
-    length = np.linalg.norm(quaternions, axis=1)
 
     def found(index: int) -> str:
-        return f"({', '.join(f'{part:g}' for part in quaternions[index])}) of length {length[index]:.3g}"
+        one = quaternions[index]
+        return f"({', '.join(f'{part:g}' for part in one)}) of length {np.linalg.norm(one):.3g}"
 
     problem, expected = "no orientation: the quaternion's length is not 1", "qw, qx, qy, qz of length 1"
-    refuse(file, key, np.abs(length - 1.0) > QUATERNION_TOLERANCE, problem, expected, found, rows)
+    refuse(file, key, no_orientation(quaternions), problem, expected, found, rows)
 
 
 def check_covariate(file: str, name: str, values: Array, rows: Rows | None = None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -175,7 +176,6 @@ def _range(low: float, high: float) -> str:
 def aligned(rows: Iterator[Sequence[str]]) -> list[str]:
     """Return the rows as lines, indented, every column as wide as its widest cell."""
     table = list(rows)
-    columns = max(len(row) for row in table)
-    widths = [max(len(row[i]) for row in table if i < len(row)) for i in range(columns)]
+    widths = [max(map(len, column)) for column in zip_longest(*table, fillvalue="")]
     lines = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in table]
     return [f"  {'   '.join(line)}".rstrip() for line in lines]

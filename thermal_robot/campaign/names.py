@@ -38,7 +38,6 @@ OPTIONAL = {
 }
 """Figures that rows of a kind may have, 0 where they have none."""
 OF_KINDS = tuple(dict.fromkeys(label for _, labels in KINDS.values() for label in labels))
-PIXELS = ("u", "v")
 NOISE = "noise"  # Column of the instrument's one sigma of each row
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
@@ -116,7 +115,7 @@ def of_kinds() -> set[str]:
 
 def reading_scale(column: str, length: float) -> float:
     """Return the SI size of one unit of a measured figure, lengths in a unit of ``length`` m."""
-    return 1.0 if column in (*ORIENTATION, *PIXELS) else length
+    return 1.0 if column in (*ORIENTATION, *KINDS["pixel"][0]) else length
 
 
 def split_name(column: str) -> tuple[str, str]:

@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, read_alike
-from thermal_robot.campaign.checked import (
-    LARGEST_COMMAND,
-    check_covariate,
-    check_joints,
-    check_quaternions,
-)
+from thermal_robot.campaign.checked import LARGEST_COMMAND, check_covariate, check_joints, check_quaternions
 from thermal_robot.campaign.document import FILE_NAME, read_declaration
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
@@ -35,7 +30,7 @@ from thermal_robot.campaign.settings import (
     as_vector,
     given,
 )
-from thermal_robot.campaign.table import Table, read_table, table_from_frame
+from thermal_robot.campaign.table import Table, listed_rows, read_table, table_from_frame
 from thermal_robot.campaign.targets import FEWEST, Posed, posed, propagated_sigma, telling
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import SI, Units, scale_of
@@ -255,7 +250,7 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
         warnings.append('where several targets sit on the tool is fitted: tool = "known" counts as "unknown"')
     if not kept.all():
         few = f"fewer than {FEWEST} targets, or targets on a line"
-        warnings.append(f"{table.listed_rows(~kept)} left out: {few} tell no pose")
+        warnings.append(f"{listed_rows(table.rows[~kept])} left out: {few} tell no pose")
     taken = table.take(kept)
     return taken, seen, [*warnings, *_doubts(taken, seen, settings)]
 
@@ -276,7 +271,7 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
     noise, found = settings.noise_position, []
     astray = told.deviation > ASTRAY * max(sigma, noise or 0.0)
     if astray.any():
-        far = f"{table.listed_rows(astray)}, by up to {float(told.deviation.max()) / scale:.3g} {unit}"
+        far = f"{listed_rows(table.rows[astray])}, by up to {float(told.deviation.max()) / scale:.3g} {unit}"
         asked = "is one of them exchanged for another, or has one moved?"
         found.append(f"the targets do not keep their places on the tool in {far}: {asked}")
     if noise and sigma > LOOSE * noise:

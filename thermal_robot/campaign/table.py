@@ -19,18 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.checked import first_true, refuse, without_rounding
+from thermal_robot.campaign.checked import beyond, first_true, refuse, without_rounding
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
-from thermal_robot.schema import LARGEST
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Cells: TypeAlias = "Sequence[str] | Array"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
-Shown: TypeAlias = "Callable[[int], str]"
 
 _FEW = 5  # rows that a sentence names
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
@@ -91,10 +89,6 @@ class Table:
             return repr(cell) if cell else "an empty cell"
         return "an empty cell" if np.isnan(cell) else f"{cell:.15g}"
 
-    def listed_rows(self, chosen: NDArray[np.bool_]) -> str:
-        """Count chosen rows (N,) and list a few of their numbers: ``3 rows (4, 7, 9)``."""
-        return listed_rows(self.rows[chosen])
-
     def numbers(self, column: str, *, gaps: bool = False) -> Array:
         """Column as (N,) numbers in the file's unit; with ``gaps`` empty cells are NaN.
 
@@ -109,7 +103,7 @@ class Table:
             expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
             self.refuse(text, "text where a number should be", column, expected)
         empty = np.isnan(values)
-        wrong = ~(np.abs(values) <= LARGEST) & ~(gaps & empty)
+        wrong = beyond(values) & ~(gaps & empty)
         if wrong.any():
             unfilled, first = len(values) > 1 and bool(empty.all()), values[np.argmax(wrong)]
             problem = "not a finite number" if np.isinf(first) else "larger than anything that is measured"

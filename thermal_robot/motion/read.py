@@ -21,7 +21,7 @@ from thermal_robot.campaign.document import Document, declared_file, robot_refer
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.read import name_of, stated_path, stated_robot
 from thermal_robot.campaign.settings import given
-from thermal_robot.campaign.table import Table, read_table, table_from_frame
+from thermal_robot.campaign.table import Table, listed_rows, read_table, table_from_frame
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.files import is_file, is_folder
@@ -382,7 +382,7 @@ def _in_order(
         raise table.error("rows are out of order, or two motions have one label", column, at, **told)
     kept = np.ones(len(time), dtype=bool)
     kept[rows[1:][same & (step == 0.0)]] = False
-    said = f"{table.file}: {table.listed_rows(~kept)} left out: the stamp of the row before"
+    said = f"{table.file}: {listed_rows(table.rows[~kept])} left out: the stamp of the row before"
     return kept, () if kept.all() else (said,)
 
 

@@ -35,9 +35,9 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.checked import first_beyond, no_rotation
+from thermal_robot.campaign.checked import beyond, first_true, no_rotation
 from thermal_robot.campaign.document import read_yaml
-from thermal_robot.campaign.importers.plan import Format, Plan, Source, column_name, planned
+from thermal_robot.campaign.importers.plan import IN_SI, Format, Plan, Source, column_name, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import ORIENTATION, POSITION
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table
@@ -58,8 +58,8 @@ def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
     except (TypeError, KeyError, ValueError) as error:
         raise CampaignError(file, f"samples lack {key}", expected="sixteen figures of a 4 × 4 matrix") from error
     found = found if np.allclose(found[:, 3], [0.0, 0.0, 0.0, 1.0]) else found.transpose(0, 2, 1)
-    wrong = first_beyond(found.reshape(-1, 16))
-    wrong = no_rotation(found[:, :3, :3]) if wrong is None else wrong
+    wrong = first_true(beyond(found.reshape(-1, 16)))
+    wrong = first_true(no_rotation(found[:, :3, :3])) if wrong is None else wrong
     if wrong is not None:
         raise CampaignError(file, "is no pose", key=f"[{wrong}].{key}", expected="a rotation and a place")
     return found
@@ -104,22 +104,17 @@ def _moveit(files: Sequence[Path], plan: Plan) -> Source:
     columns: dict[str, Cells] = dict(zip(joints, values.T, strict=True))
     columns |= dict(zip(POSITION, seen[:, :3, 3].T, strict=True))
     columns |= dict(zip(ORIENTATION, rotation_to_quaternion(seen[:, :3, :3]).T, strict=True))
-    units: dict[str, dict[str, Any]] = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
     where = "on the hand: the target is the camera" if mounted else "in the room: the target is the board"
     table = Table(file, columns, np.arange(1, len(listed) + 1))
-    return Source(table, planned(units), (f"the camera is {where}",))
+    return Source(table, planned(IN_SI), (f"the camera is {where}",))
 
 
 _COUNTED, _SIZED = whole(1), number(above=0.0, expected="a length above 0, m")
+_GRID = {"targetRows": _COUNTED, "targetCols": _COUNTED}
 _BOARDS: dict[str, dict[str, Kind]] = {
     "aprilgrid": {"tagRows": _COUNTED, "tagCols": _COUNTED, "tagSize": _SIZED, "tagSpacing": number(least=0.0)},
-    "checkerboard": {
-        "targetRows": _COUNTED,
-        "targetCols": _COUNTED,
-        "rowSpacingMeters": _SIZED,
-        "colSpacingMeters": _SIZED,
-    },
-    "circlegrid": {"targetRows": _COUNTED, "targetCols": _COUNTED, "spacingMeters": _SIZED, "asymmetricGrid": boolean},
+    "checkerboard": {**_GRID, "rowSpacingMeters": _SIZED, "colSpacingMeters": _SIZED},
+    "circlegrid": {**_GRID, "spacingMeters": _SIZED, "asymmetricGrid": boolean},
 }
 """Of each board of Kalibr what its YAML says: rows and columns first."""
 
@@ -127,9 +122,8 @@ _BOARDS: dict[str, dict[str, Kind]] = {
 def _board(file: Path) -> Array:
     """Points (K, 3) of a board of Kalibr, m, in the order of their numbers."""
     (said, *_) = read_yaml(file) or [{}]
-    kind = fitted(
-        word(tuple(_BOARDS)), said.get("target_type") if isinstance(said, dict) else said, str(file), "target_type"
-    )
+    stated = said.get("target_type") if isinstance(said, dict) else said
+    kind = fitted(word(_BOARDS), stated, str(file), "target_type")
     rows, columns, *sizes = (fitted(own, said.get(key), str(file), key) for key, own in _BOARDS[kind].items())
     twice = 2 if kind == "aprilgrid" else 1
     row, column = np.indices((twice * rows, twice * columns)).reshape(2, -1)
@@ -147,12 +141,9 @@ def _on_board(corners: Table, file: Path, unit: str) -> Table:
     """Corners with the places of their numbers on a board, in a unit of length."""
     name, points = column_name(corners, "corner"), _board(file) / LENGTH_UNITS[unit]
     numbers = corners.numbers(name)
-    wrong = np.flatnonzero(~np.isin(numbers, np.arange(len(points))))
-    if len(wrong):
-        expected = f"a whole number from 0 to {len(points) - 1}, as {file.name} has {len(points)} corners"
-        raise corners.error(
-            "is no corner of the board", name, int(wrong[0]), found=f"{numbers[wrong[0]]:g}", expected=expected
-        )
+    wrong = ~np.isin(numbers, np.arange(len(points)))
+    expected = f"a whole number from 0 to {len(points) - 1}, as {file.name} has {len(points)} corners"
+    corners.refuse(wrong, "is no corner of the board", name, expected, lambda row: f"{numbers[row]:g}")
     places = dict(zip("XYZ", points[numbers.astype(int)].T, strict=True))
     return replace(corners, columns={**corners.columns, **places})
 

@@ -24,7 +24,7 @@ from thermal_robot.campaign.read import build_campaign
 from thermal_robot.campaign.recognise import bare, defined, headings, size
 from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector, given
 from thermal_robot.campaign.settings import KINDS as OF_CAMPAIGN
-from thermal_robot.campaign.table import SPACE, Cells, Layout, Table
+from thermal_robot.campaign.table import SPACE, Cells, Layout, Table, listed_rows
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, unit_of
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
@@ -179,24 +179,25 @@ class Orientation:
         """
         from scipy.spatial.transform import Rotation
 
-        figures, wrong = np.column_stack([column.complete(table) for column in self.columns]), None
+        figures = np.column_stack([column.complete(table) for column in self.columns])
         if self.kind in (EULER, VECTOR):
             figures *= [ANGLE_UNITS.get(c.header_unit(table) or "", ANGLE_UNITS[self.unit]) for c in self.columns]
+        column, expected = str((self.columns[0].sources or ("orientation",))[0]), "an orientation"
+
+        def told(row: int) -> str:
+            return ", ".join(f"{figure:g}" for figure in figures[row])
+
         if self.kind == QUATERNION:
-            wrong, problem = no_orientation(figures), "a quaternion whose length is not 1"
+            table.refuse(no_orientation(figures), "a quaternion whose length is not 1", column, expected, told)
+            turned = Rotation.from_quat(figures, scalar_first=self.order == "wxyz")
         elif self.kind == MATRIX:
             matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
-            wrong, problem = no_rotation(matrices), "a matrix that is no rotation"
-        if wrong is not None:
-            column = str((self.columns[0].sources or ("orientation",))[0])
-            told = ", ".join(f"{figure:g}" for figure in figures[wrong])
-            raise table.error(problem, column, wrong, found=told, expected="an orientation")
-        if self.kind == QUATERNION:
-            turned = Rotation.from_quat(figures, scalar_first=self.order == "wxyz")
+            table.refuse(no_rotation(matrices), "a matrix that is no rotation", column, expected, told)
+            turned = Rotation.from_matrix(matrices)
         elif self.kind == EULER:
             turned = Rotation.from_euler(self.sequence, figures)
         else:
-            turned = Rotation.from_rotvec(figures) if self.kind == VECTOR else Rotation.from_matrix(matrices)
+            turned = Rotation.from_rotvec(figures)
         return np.asarray((turned.inv() if self.inverse else turned).as_quat(scalar_first=True))
 
     @property
@@ -302,6 +303,10 @@ class Plan:
         return Settings.stated(self.sections, urdf="", **ends)
 
 
+IN_SI: dict[str, dict[str, Any]] = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
+"""What a mapping says of a table in rad and m, as everywhere in ROS."""
+
+
 def planned(sections: Mapping[str, Mapping[str, Any]], file: str = "import") -> Plan:
     """Return the plan that a format brings along, written as a mapping is; errors name the ``file`` it is from."""
     return Plan("", given(file, "", sections, lambda stated, _: fitted_sections(KINDS, stated)))
@@ -372,7 +377,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     if not measured.all() and (set(names.POSITION) <= set(columns) or any(map(names.target_of, places))):
         if not measured.any():
             raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
-        notes.append(f"{table.listed_rows(~measured)} left out, without a measured position")
+        notes.append(f"{listed_rows(table.rows[~measured])} left out, without a measured position")
         table = table.take(measured)
     cells = _cells(table, columns, robot)
     used = list(columns.values())

@@ -27,13 +27,12 @@ from pathlib import Path
 from typing import Any
 
 from thermal_robot.campaign.document import is_yaml, read_yaml
-from thermal_robot.campaign.importers.plan import Format, Plan, Source, files_of, planned
+from thermal_robot.campaign.importers.plan import IN_SI, Format, Plan, Source, files_of, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 
-_UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 _POSE = "joints and as many positions, numbers"
 _SAMPLE = "joint_states, and observations with a sensor_name and a list of features, points of x, y and z"
 
@@ -52,12 +51,12 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
             expected = "the table of measured points as a second file"
             raise CampaignError(str(file), "holds poses and no measurements", expected=expected)
         both, notes = joined(read_table(tables[0], plan.layout()), commands)
-        return Source(both, planned(_UNITS), notes)
+        return Source(both, planned(IN_SI), notes)
     files_of(files, "SAMPLES.yaml, or POSES.yaml MEASURED.csv", 1, 1)
     sensor = plan.get("recording", "sensor") or _only_sensor(str(file), documents)
     feature = plan.get("recording", "feature", 1)
     table = _table(str(file), documents, partial(_sample, sensor=sensor, feature=feature), _SAMPLE)
-    return Source(table, planned(_UNITS), (f"feature {feature} of sensor {sensor!r} taken as the target",))
+    return Source(table, planned(IN_SI), (f"feature {feature} of sensor {sensor!r} taken as the target",))
 
 
 def _table(file: str, items: Sequence[Any], row: Callable[[Any], dict[str, float]], expected: str) -> Table:
@@ -120,7 +119,7 @@ def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
     tables, configurations = ([file for file in files if is_yaml(file) == wanted] for wanted in (False, True))
     files_of(tables, "DATA.csv [CONFIG.yaml]", 1, 1)
     table = read_table(tables[0], plan.layout())
-    sections = {**_UNITS, "columns": {axis: f"{axis}1" for axis in "xyz"}}
+    sections = {**IN_SI, "columns": {axis: f"{axis}1" for axis in "xyz"}}
     sections |= _configured(configurations[0]) if configurations else {}
     markers = sum(re.fullmatch(r"x\d{1,4}", name) is not None for name in table.columns)
     notes = [f"marker 1 of {markers} taken; [columns] in the mapping takes another"] if markers > 1 else []

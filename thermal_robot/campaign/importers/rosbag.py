@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
-from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
+from thermal_robot.campaign.importers.plan import IN_SI, Format, Plan, Source, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.recognise import joint_columns
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table
@@ -298,7 +298,6 @@ _TARGETS = {
     "geometry_msgs/msg/PointStamped": ("point",),
 }
 """Types of messages with a place, and the fields that hold it and a turn."""
-WITH_ROSBAGS = 'pip install "thermal-robot[ros]"'
 
 
 def read_bag(
@@ -324,7 +323,8 @@ def opened(path: Path) -> Iterator[Any]:
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise CampaignError(file, "bags need rosbags, which is not installed", expected=WITH_ROSBAGS) from error
+        expected = 'pip install "thermal-robot[ros]"'
+        raise CampaignError(file, "bags need rosbags, which is not installed", expected=expected) from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             yield reader
@@ -379,13 +379,12 @@ def _target_stream(file: str, messages: Sequence[Any]) -> Stream | None:
     return stream(file, np.array(times), np.array(rows, dtype=float), whole) if rows else None
 
 
-_UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 _LIMITS = ("tolerance", "standstill", "velocity", "settling")
 
 
 def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
     """Read both recordings, estimate their clock offset unless stated, and pair them at standstill."""
-    own, robot = planned(_UNITS), plan.robot()
+    own, robot = planned(IN_SI), plan.robot()
     settings = plan.over(own).settings(robot)
     joints, target = _streams(files, plan, robot)
     scale = np.array([settings.units.joint_scale(kind) for kind in robot.joint_types])  # SI values of one unit

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, column_name, planned
-from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.names import POSITION, listed
 from thermal_robot.campaign.table import PLAIN, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 
@@ -144,7 +144,6 @@ TABLE = Format(
 
 COMMENT = "//"
 _NAMES = ("collection", "group", "target")
-_AXES = ("x", "y", "z")
 
 
 def _read_points(files: Sequence[Path], plan: Plan) -> Source:
@@ -153,7 +152,7 @@ def _read_points(files: Sequence[Path], plan: Plan) -> Source:
     table = _called(read_table(files[0], plan.layout() if laid_out else _laid_out(files[0])), plan)
     stated, targets = plan.get("table", "key"), plan.get("table", "targets")
     key = column_name(table, stated) if stated else _NAMES[-1]
-    columns, told = {axis: axis for axis in _AXES}, []
+    columns, told = {axis: axis for axis in POSITION}, []
     if targets:
         (table, note), columns = grouped(table, key, targets), {}
         told.append(note)
@@ -167,7 +166,7 @@ def _laid_out(file: Path) -> Layout:
     """Detect the layout of a list of points; its first line that is no comment may be a header."""
     layout = Layout(header=False, comment=COMMENT)
     table = read_table(file, layout)
-    if len(table.columns) < len(_AXES):
+    if len(table.columns) < len(POSITION):
         expected = "lines of names and x y z, separated by blanks, commas or tabs"
         raise CampaignError(str(file), "is no list of points", expected=expected)
     first = table.take(np.array([0]))
@@ -178,12 +177,12 @@ def _called(table: Table, plan: Plan) -> Table:
     """Name the columns collection, group, target, x, y, z as far as they are there."""
     there = list(table.columns)
     if table.header is not None:
-        axes = {name: name.lower() for name in there if name.lower() in _AXES}
+        axes = {name: name.lower() for name in there if name.lower() in POSITION}
         first = min((there.index(name) for name in axes), default=0)
     else:
         first = _names_before(table)
-        axes = dict(zip(there[first:], _AXES, strict=False))
-    if sorted(axes.values()) != list(_AXES) and not plan.sections.get("columns"):
+        axes = dict(zip(there[first:], POSITION, strict=False))
+    if sorted(axes.values()) != list(POSITION) and not plan.sections.get("columns"):
         problem, expected = "x, y and z of the points are not found", "names, then x y z; or [columns] in the mapping"
         found = listed(there) if table.header is not None else f"{len(there)} fields in a line"
         raise CampaignError(table.file, problem, row=table.header, found=found, expected=expected)
@@ -194,7 +193,7 @@ def _called(table: Table, plan: Plan) -> Table:
 def _names_before(table: Table) -> int:
     """Return the number of leading name fields: text, or integers throughout where three fields remain."""
     for count, name in enumerate(list(table.columns)[: len(_NAMES)]):
-        spare = len(table.columns) - count > len(_AXES)
+        spare = len(table.columns) - count > len(POSITION)
         if table.first_text(name) is None and not (spare and all(map(str.isdigit, table.text(name)))):
             return count
     return min(len(_NAMES), len(table.columns))
@@ -219,9 +218,9 @@ def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
     row = lines.groupby(["pose", "visit"], sort=False).ngroup().to_numpy()
     _, first = np.unique(row, return_index=True)
     values = np.full((len(first), len(order), 3), np.nan)
-    values[row, lines["called"].map(order.index)] = np.stack([table.numbers(a, gaps=True) for a in _AXES], axis=1)
+    values[row, lines["called"].map(order.index)] = np.stack([table.numbers(a, gaps=True) for a in POSITION], axis=1)
     columns: dict[str, Cells] = {key: list(lines["pose"].iloc[first])}
-    columns |= {f"{axis}.{k + 1}": values[:, k, i] for k in range(len(order)) for i, axis in enumerate(_AXES)}
+    columns |= {f"{axis}.{k + 1}": values[:, k, i] for k in range(len(order)) for i, axis in enumerate(POSITION)}
     both = Table(table.file, columns, table.rows[first], table.header, warnings=table.warnings)
     return both, f"{len(order)} targets of each pose, numbered so: {listed(order)}"
 
