@@ -115,7 +115,10 @@ def test_a_known_robot_is_no_path_and_paths_start_from_the_file_or_from_a_folder
     assert (found.robot, found.table) == (tmp_path / "other" / ".." / "arm.urdf", tmp_path / "other" / "t.csv")
 
 
-@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6), ("inch", 0.0254)])
+METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
+
+
+@pytest.mark.parametrize(("unit", "metres"), METRES.items())
 def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres: float) -> None:
     more = "[frames]\ntarget = [1, 2, 3]\n[noise]\nposition = 4\norientation = 5\n[payload]\ncom = [6, 7, 8]\n"
     settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit=unit) + more).settings

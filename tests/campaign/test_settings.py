@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 
-import numpy as np
 import pytest
 from campaign.files import URDF, full
 
-from thermal_robot.campaign import Settings, Units, names, unit_of
-from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
-from thermal_robot.campaign.settings import as_vector
-from thermal_robot.campaign.units import scale_of
+from thermal_robot.campaign import Settings, Units, unit_of
+from thermal_robot.campaign.names import did_you_mean, listed, nearest
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 
@@ -51,13 +47,6 @@ def test_a_journey_through_json_changes_nothing():
         Settings.from_dict(data)
 
 
-@pytest.mark.parametrize("wrong", [[1, 2], [1, 2, 3, 4], ["x", 1, 2]])
-def test_a_vector_is_three_floats(wrong):
-    assert [type(value) for value in as_vector([1, 2, 3])] == [float] * 3
-    with pytest.raises(ValueError, match=r"."):
-        as_vector(wrong)
-
-
 # ---- units and names of columns
 
 
@@ -67,9 +56,9 @@ def robot() -> Robot:
 
 
 UNIT = {
-    **dict.fromkeys(("turn", "roll", "tilt.x", "tilt.beam.y", "encoder.turn"), ("rad", "deg")),
+    **dict.fromkeys(("turn", "roll", "tilt.x", "tilt.beam.y", "tilt.left.arm.x", "encoder.turn"), ("rad", "deg")),
     **dict.fromkeys(("slide", "x", "y.2", "sim.z", "noise", "encoder.slide"), ("m", "mm")),
-    **dict.fromkeys(("temperature", "temperature.beam"), ("°C", "°C")),
+    **dict.fromkeys(("temperature", "temperature.beam", "temperature.left.arm"), ("°C", "°C")),
     "time": ("s", "s"),
     "payload": ("kg", "kg"),
     "velocity.lift": ("rad/s", "deg/s"),
@@ -80,7 +69,7 @@ UNIT = {
     "torque.slide": ("N", "N"),
     **dict.fromkeys(("qw", "sim.qw", "order", "speed", "approach.lift", "approach.slide"), ("", "")),
     # not defined by the format: nobody knows
-    **dict.fromkeys(("humidity", "velocity", "velocity.grip", "grip", "time.start"), ("", "")),
+    **dict.fromkeys(("humidity", "velocity", "velocity.grip", "torque.", "grip", "time.start"), ("", "")),
     **dict.fromkeys(("tilt.beam", "tilt.beam.z"), ("", "")),
 }
 """Units of columns, in SI and in a file of degrees and millimetres."""
@@ -91,26 +80,6 @@ def test_every_column_has_its_unit(robot: Robot, column: str) -> None:
     assert (unit_of(column, robot), unit_of(column, robot, Units("deg", "mm"))) == UNIT[column]
 
 
-FACTORS = {"deg": math.pi / 180, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
-
-
-@pytest.mark.parametrize(
-    "units", [Units("deg", "mm"), Units("rad", "um"), Units("deg", "inch"), Units("rad", "ft"), Units()]
-)
-def test_the_scale_is_the_ratio_of_the_two_units(robot: Robot, units: Units) -> None:
-    for column in full().covariates:
-        word = unit_of(column, robot, units).partition("/")[0]
-        assert scale_of(column, robot, units) == pytest.approx(FACTORS.get(word, 1.0), rel=1e-15)
-
-
-def test_a_joints_scale_is_that_of_its_kind() -> None:
-    units = Units("deg", "um")
-    assert np.rad2deg(units.joint_scale("revolute")) == pytest.approx(1.0)
-    assert units.joint_scale("continuous") == units.joint_scale("revolute") == units.angle_scale
-    assert units.joint_scale("prismatic") == units.length_scale == 1e-6
-    assert [units.joint_unit(kind) for kind in ("revolute", "continuous", "prismatic")] == ["deg", "deg", "um"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "column", "found"),
     [(("grad", "m"), "angle_unit", "'grad'"), (("rad", "yard"), "length_unit", "'yard'")],
@@ -119,21 +88,6 @@ def test_other_words_are_refused(arguments: tuple[str, str], column: str, found:
     with pytest.raises(CampaignError, match="unknown unit") as caught:
         Units(*arguments)
     assert (caught.value.column, caught.value.found) == (column, found)
-
-
-@pytest.mark.parametrize(
-    ("column", "parts"),
-    [
-        ("approach.elbow_joint", ("approach", "elbow_joint")),
-        ("temperature.left.arm", ("temperature", "left.arm")),
-        ("time", ("time", "")),
-        ("torque.", ("torque", "")),
-    ],
-)
-def test_a_name_is_a_quantity_and_a_place(column: str, parts: tuple[str, str]) -> None:
-    assert split_name(column) == parts
-    assert len(set(names.RESERVED)) == len(names.RESERVED)
-    assert {*"xyz", "qw", "sim.x", "sim.qz", "session", "pose", "path", "time", "speed"} <= set(names.RESERVED)
 
 
 def test_the_nearest_come_first_whatever_their_case_and_only_where_there_are_any() -> None:

@@ -10,20 +10,38 @@ from helpers import commanded
 from thermal_robot.campaign.turning import SLIPS, arrivals, moves, since_turns, strained
 
 
-def along(path, **columns):
+def told(path, sessions=None, **columns):
+    """Distances from the last turn, and sides of approach: both empty where rows have no order."""
     q = np.array(path, dtype=float)[:, None]
     columns = {name: np.array(values, dtype=float) for name, values in columns.items()}
-    return since_turns(q, ("elbow",), columns or {"order": np.arange(float(len(q)))}, None)["elbow"].tolist()
+    columns = columns or {"order": np.arange(float(len(q)))}
+    return [of(q, ("elbow",), columns, sessions) for of in (since_turns, arrivals)]
 
 
-def test_distance_counts_from_the_last_turn_with_its_sign():
-    assert along([0.0, 1.0, 3.0, 2.0, 0.5, 0.75]) == [0.0, 1.0, 3.0, -1.0, -2.5, 0.25]
+def along(path, sessions=None, **columns):
+    return told(path, sessions, **columns)[0]["elbow"].tolist()
 
 
-def test_a_joint_that_rests_has_not_turned():
-    assert along([0.0, 2.0, 2.0, 3.0, 3.0, 1.0, 1.0]) == [0.0, 2.0, 2.0, 3.0, 3.0, -2.0, -2.0]
-    assert along([1.0, 1.0, 1.0]) == [0.0, 0.0, 0.0]
-    assert along([1.0, 1.0, 0.5]) == [0.0, 0.0, -0.5]
+def came(path, sessions=None, **columns):
+    return told(path, sessions, **columns)[1]["approach.elbow"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("path", "columns", "distance"),
+    [
+        ([0.0, 1.0, 3.0, 2.0, 0.5, 0.75], {}, [0.0, 1.0, 3.0, -1.0, -2.5, 0.25]),
+        # a joint that rests has not turned, and keeps the side from which it came
+        ([0.0, 2.0, 2.0, 3.0, 3.0, 1.0, 1.0], {}, [0.0, 2.0, 2.0, 3.0, 3.0, -2.0, -2.0]),
+        ([1.0, 1.0, 1.0], {}, [0.0, 0.0, 0.0]),
+        ([1.0, 1.0, 0.5], {}, [0.0, 0.0, -0.5]),
+        # backwards in the file, and forwards in time, which tells, where there is an order, too
+        ([3.0, 0.0, 2.0, 1.0], {"time": [20.0, 0.0, 30.0, 10.0]}, [3.0, 0.0, -1.0, 1.0]),
+        ([3.0, 0.0], {"time": [20.0, 0.0], "order": [0.0, 1.0]}, [3.0, 0.0]),
+    ],
+)
+def test_distance_counts_from_the_last_turn_and_its_sign_is_the_side_of_approach(path, columns, distance):
+    assert along(path, **columns) == distance
+    assert came(path, **columns) == np.sign(distance).tolist()
 
 
 def test_a_joint_that_is_held_remembers_nothing_and_came_from_nowhere():
@@ -34,16 +52,11 @@ def test_a_joint_that_is_held_remembers_nothing_and_came_from_nowhere():
     assert moves(np.zeros((0, 3))).tolist() == [False] * 3
 
 
-def test_rows_count_in_the_order_of_the_clock():
-    assert along([3.0, 0.0, 2.0, 1.0], time=[20.0, 0.0, 30.0, 10.0]) == [3.0, 0.0, -1.0, 1.0]
-    # the time tells, where there is an order, too
-    assert along([3.0, 0.0], time=[20.0, 0.0], order=[0.0, 1.0]) == [3.0, 0.0]
-
-
 def test_nothing_is_remembered_between_sessions():
-    q = np.array([[0.0], [10.0], [1.0], [9.0], [2.0], [7.0]])
-    found = since_turns(q, ("elbow",), {"order": np.arange(6.0)}, np.array(list("ababab")))
-    assert found["elbow"].tolist() == [0.0, 0.0, 1.0, -1.0, 2.0, -3.0]
+    path, sessions = [0.0, 10.0, 1.0, 9.0, 2.0, 7.0], np.array(list("ababab"))
+    assert along(path, sessions) == [0.0, 0.0, 1.0, -1.0, 2.0, -3.0]
+    assert came([0.0, 1.0, 5.0, 4.0], np.array(list("aabb"))) == [0.0, 1.0, 0.0, -1.0]
+    assert told([0.0, 1.0], time=[5.0, 5.0]) == [{}, {}]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -59,28 +72,6 @@ def test_it_is_what_a_walk_from_row_to_row_finds(seed):
     np.testing.assert_allclose(along(path), expected, atol=1e-12)
 
 
-def came(path, sessions=None, **columns):
-    q = np.array(path, dtype=float)[:, None]
-    columns = {name: np.array(values, dtype=float) for name, values in columns.items()}
-    found = arrivals(q, ("elbow",), columns or {"order": np.arange(float(len(q)))}, sessions)
-    return found["approach.elbow"].tolist() if found else None
-
-
-def test_a_joint_comes_from_where_it_was_before():
-    assert came([0.0, 1.0, 3.0, 2.0, 0.5, 0.75]) == [0.0, 1.0, 1.0, -1.0, -1.0, 1.0]
-    # backwards in the file, and forwards in time
-    assert came([3.0, 0.0, 2.0, 1.0], time=[20.0, 0.0, 30.0, 10.0]) == [1.0, 0.0, -1.0, 1.0]
-
-
-def test_a_joint_that_rests_keeps_the_side_from_which_it_came():
-    assert came([1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0]) == [0.0, 0.0, 1.0, 1.0, 1.0, -1.0, -1.0]
-
-
-def test_nobody_knows_whence_the_first_row_of_a_session_came():
-    assert came([0.0, 1.0, 5.0, 4.0], sessions=np.array(list("aabb"))) == [0.0, 1.0, 0.0, -1.0]
-    assert came([0.0, 1.0], time=[5.0, 5.0]) is None
-
-
 def test_nobody_knows_whence_a_row_came_whose_predecessor_was_struck():
     path = [0.0, 2.0, 1.0, 1.0, 3.0, 0.0]
     assert came(path, order=[1, 2, 3, 5, 6, 9]) == [0.0, 1.0, -1.0, 0.0, 1.0, 0.0]
@@ -93,8 +84,7 @@ def test_nobody_knows_whence_a_row_came_whose_predecessor_was_struck():
 
 
 def strains(path):
-    path = np.array(path, dtype=float)[:, None]
-    found = since_turns(path, ("elbow",), {"order": np.arange(float(len(path)))}, None)
+    found = told(path)[0]
     return np.column_stack([found[strained("elbow", slip)] for slip in SLIPS])
 
 

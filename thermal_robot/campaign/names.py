@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 
 POSITION = ("x", "y", "z")
@@ -80,11 +81,8 @@ def listed(names: Iterable[str], limit: int = 12) -> str:
 
 def tilted(column: str) -> str | None:
     """Link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
-    if column in TILT:
-        return ""
-    quantity, place = split_name(column)
-    link, _, axis = place.rpartition(".")
-    return link if quantity == "tilt" and link and axis in ("x", "y") else None
+    found = re.fullmatch(r"tilt\.(?:(.+)\.)?[xy]", column, re.DOTALL)
+    return None if found is None else found[1] or ""
 
 
 def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
@@ -97,9 +95,8 @@ def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
 
 def target_of(column: str) -> tuple[str, int] | None:
     """Axis and number of ``x.1``; ``None`` for other columns."""
-    axis, number = split_name(column)
-    plain = axis in POSITION and number.isascii() and number.isdigit() and not number.startswith("0")
-    return (axis, int(number)) if plain else None
+    found = re.fullmatch(r"([xyz])\.([1-9][0-9]*)", column)
+    return None if found is None else (found[1], int(found[2]))
 
 
 def axes_of(target: int) -> tuple[str, str, str]:
