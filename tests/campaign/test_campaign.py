@@ -83,6 +83,7 @@ def test_noise_of_rows_is_relative_to_their_root_mean_square() -> None:
     relative = campaign.relative_noise
     np.testing.assert_allclose(relative, [[f] * 3 + [1.0] * 3 for f in (0.2, 1.0, 1.4)])
     np.testing.assert_array_equal(campaign.take([2, 0]).relative_noise, relative[[2, 0]])
+    np.testing.assert_array_equal(replace(campaign, orientation=None).relative_noise, relative[:, :3])
     alike = replace(campaign, noise_position=None, noise_of_rows=np.full(3, 0.1 + 0.2))
     assert (alike.noise_position, alike.relative_noise) == (0.1 + 0.2, None)
 
@@ -248,37 +249,24 @@ def test_a_table_is_read_as_the_campaign_was(whole, new):
     assert (rows.covariates["approach.joint_2"] == new.covariates["approach.joint_2"]).all()
 
 
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        ({"tool_known": True}, "another tool frame"),
-        ({"noise_position": 1e-4}, "another noise of positions"),
-        ({"reference_temperature": 25.0}, "another reference temperature"),
-        ({"orientation": np.tile([1.0, 0.0, 0.0, 0.0], (40, 1))}, "another kind of measurement"),
-    ],
-)
-def test_another_kind_is_refused(whole, new, change, match):
-    with pytest.raises(CampaignError, match=match):
-        more_rows(whole, replace(new, **change), ())
+OTHERS = {
+    "another tool frame": lambda whole, new: replace(new, tool_known=True),
+    "another noise of positions": lambda whole, new: replace(new, noise_position=1e-4),
+    "another reference temperature": lambda whole, new: replace(new, reference_temperature=25.0),
+    "another kind of measurement": lambda whole, new: replace(new, orientation=np.tile([1.0, 0.0, 0.0, 0.0], (40, 1))),
+    "another robot, by its joints": lambda whole, new: tr.simulate(
+        "example-robot-data:ur5", tool_frame="tool0", rows=5, base=np.eye(4), tool=np.eye(4)
+    ),
+    "another nominal model": lambda whole, new: replace(
+        new, robot=tr.load_robot(whole.robot.urdf.replace('xyz="0 0 ', 'xyz="0.001 0 '), whole.robot.tool_frame)
+    ),
+    "lacks what the chosen effects read": lambda whole, new: new.drop_covariate("temperature"),
+    "pandas DataFrame": lambda whole, new: [1.0, 2.0],
+}
+"""Rows that cannot be added to a campaign, by what is said of them."""
 
 
-def test_another_robot_is_refused(whole):
-    other = tr.simulate("example-robot-data:ur5", tool_frame="tool0", rows=5, base=np.eye(4), tool=np.eye(4))
-    with pytest.raises(CampaignError, match="another robot, by its joints"):
-        more_rows(whole, other, ())
-
-
-def test_another_arm_with_the_same_joints_is_refused(whole, new):
-    longer = tr.load_robot(whole.robot.urdf.replace('xyz="0 0 ', 'xyz="0.001 0 '), whole.robot.tool_frame)
-    with pytest.raises(CampaignError, match="another nominal model"):
-        more_rows(whole, replace(new, robot=longer), ())
-
-
-def test_a_column_that_effects_read_is_asked_for(whole, new):
-    with pytest.raises(CampaignError, match="lacks what the chosen effects read"):
-        more_rows(whole, new.drop_covariate("temperature"), ("temperature",))
-
-
-def test_what_is_no_table_is_refused(whole):
-    with pytest.raises(CampaignError, match="pandas DataFrame"):
-        more_rows(whole, [1.0, 2.0], ())
+@pytest.mark.parametrize("said", OTHERS)
+def test_rows_that_are_not_alike_are_refused(whole, new, said):
+    with pytest.raises(CampaignError, match=said):
+        more_rows(whole, OTHERS[said](whole, new), ("temperature",))

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from campaign.files import PLAIN_TOML, put, refusal, says
+from campaign.files import PLAIN_TOML, refusal, says
 
 from thermal_robot.campaign import Settings, Units, read_campaign
 from thermal_robot.campaign.document import Declaration, Document, read_declaration, read_yaml
@@ -78,13 +78,6 @@ def test_no_campaign_is_told_with_those_beside_it(tmp_path: Path) -> None:
         assert str(caught.value).endswith(f"{problem}; campaigns there: 'warm.toml', 'cell_2', {expected}")
 
 
-def test_noise_of_zero_is_not_given(tmp_path: Path) -> None:
-    file = put(tmp_path / "c") / "campaign.toml"
-    file.write_text(file.read_text().replace("0.02", "0").replace("3e-5", "0.0"))
-    campaign = read_campaign(file)
-    assert (campaign.noise_position, campaign.noise_orientation) == (None, None)
-
-
 BARE = """[robot]
 urdf = "{urdf}"
 tool_frame = "tool"
@@ -127,12 +120,6 @@ def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres:
     assert (settings.noise_position, settings.noise_orientation) == (pytest.approx(4 * metres), 5.0)
 
 
-def test_campaign_toml_in_another_encoding(tmp_path: Path) -> None:
-    (tmp_path / "campaign.toml").write_bytes('tool = "Gerät"'.encode("latin-1"))
-    with pytest.raises(CampaignError, match=r"campaign\.toml: is not UTF-8 text"):
-        read_campaign(tmp_path)
-
-
 def document(folder: Path, text: str) -> Document:
     file = folder / "campaign.toml"
     file.write_text(text, encoding="utf-8")
@@ -150,14 +137,11 @@ def test_lines_are_found_however_a_key_is_written(tmp_path: Path) -> None:
     assert found.sections == {"noise": {"position": 0.1}, "robot": {"urdf": "a.urdf"}}
 
 
-def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
+def test_numbers_are_floats(tmp_path: Path) -> None:
     found = document(tmp_path, "[robot]\ngravity = [0, 0, -9]\nreference_temperature = 21\n[gears]\na = 100\n").sections
     assert found["robot"]["gravity"] == (0.0, 0.0, -9.0)
     assert type(found["robot"]["reference_temperature"]) is float
     assert found["gears"] == {"a": 100.0}
-    for wrong in ("true", "inf", "nan", '"21"', "-300"):
-        with pytest.raises(CampaignError, match="a number"):
-            document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n")
 
 
 @pytest.mark.parametrize(

@@ -70,12 +70,6 @@ def test_a_doubtful_column_is_told_and_ignored_or_kept(tmp_path, column, cells, 
     assert campaign.noise_of_rows is None
 
 
-def test_the_tilt_of_a_link_is_a_covariate_in_rad(tmp_path: Path) -> None:
-    campaign = read(tmp_path, table=with_column("tilt.beam.x", "1", "2", "3"))
-    scale = campaign.units.angle_scale
-    assert campaign.covariates["tilt.beam.x"].tolist() == pytest.approx([scale, 2.0 * scale, 3.0 * scale])
-
-
 def test_an_empty_column_counts_as_absent(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", add(ROWS, temperature="_ _ nan", payload="1 1 1", session="a _ b")))
     assert set(campaign.covariates) == {"payload"}

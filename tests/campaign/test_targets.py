@@ -140,20 +140,6 @@ def test_rows_are_taken_with_what_is_typical_of_all():
 SIGMAS = np.array([1e-5, 5e-5, 7e-5])
 
 
-def test_the_noise_of_all_rows_is_the_root_mean_square_and_of_equal_ones_they_themselves():
-    assert sigma_of_all(SIGMAS, None) == (pytest.approx(5e-5), None)
-    assert sigma_of_all(np.full(7, 0.1 + 0.2), None) == (0.1 + 0.2, None)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-def test_orientations_have_one_noise_in_all_rows(turned):
-    found = relative_sigmas(SIGMAS, 5e-5, None, turned)
-    np.testing.assert_allclose(found[:, :3], np.repeat(SIGMAS[:, None] / 5e-5, 3, axis=1))
-    np.testing.assert_array_equal(found[:, 3:], np.ones((3, 3 if turned else 0)))
-    assert relative_sigmas(np.full(3, 5e-5), 5e-5, None, turned) is None
-    assert relative_sigmas(None, 5e-5, None, turned) is None
-
-
 @pytest.mark.parametrize("sigmas", [None, SIGMAS], ids=["one", "each"])
 def test_several_targets_tell_the_noise_of_every_figure(sigmas):
     """That of a point times what the pose makes of it, whatever stands for all rows."""

@@ -98,29 +98,8 @@ def test_an_element_is_strained_by_what_play_of_its_width_does_not_follow(seed):
     np.testing.assert_allclose(strains(path), path[:, None] - plays, atol=1e-12)
 
 
-def test_it_does_not_matter_how_fast_or_in_how_many_steps_a_joint_goes():
-    path = np.random.default_rng(5).uniform(-2.0, 2.0, 40)
-    finer = np.interp(np.linspace(0, 39, 39 * 4 + 1), np.arange(40), path)
-    np.testing.assert_allclose(strains(finer)[::4], strains(path), atol=1e-12)
-
-
-def test_a_loop_that_is_closed_is_forgotten():
-    path = [0.0, 1.5, -0.7, 0.9, 0.3]
-    loop = [0.0, 1.5, -0.7, 0.5, 0.1, 0.4, 0.1, 0.5, 0.9, 0.3]
-    np.testing.assert_allclose(strains(loop)[-1], strains(path)[-1], atol=1e-12)
-
-
-def test_elements_slip_at_their_strain_and_start_slack():
-    found = strains([0.2, 5.2, 5.2, 5.1])
-    np.testing.assert_array_equal(found[0], 0.0)
-    np.testing.assert_allclose(found[1], SLIPS)
-    np.testing.assert_allclose(found[2], SLIPS)
-    np.testing.assert_allclose(found[3], np.maximum(np.array(SLIPS) - 0.1, -np.array(SLIPS)))
-
-
 def test_rows_in_no_order_have_no_past(rv_m2):
     assert commanded(rv_m2).since_turn == {}
-    assert commanded(rv_m2, {"time": np.zeros(10)}).since_turn == {}
 
 
 def test_rows_that_are_taken_keep_their_past(rv_m2):
