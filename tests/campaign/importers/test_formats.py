@@ -1,6 +1,7 @@
 """Files of every format become the campaign that they tell of, or are refused by file, row and column."""
 
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -133,11 +134,15 @@ SERIES += """measurement_rx;measurement_ry;measurement_rz
 {};0,5;-0,4;0,09;-0,4;23,7;800;200;520;0;30,0;0
 """
 STAMPED = SERIES.format("20200714163904", "20200714163924", "20200715163904")
+H = np.sqrt(0.75)
 LOST = SERIES.format(*["2,02011E+13"] * 3)
 JOINTS = np.array([[0.1, 0.2, 0.03, 0.4], [-0.1, 0.3, 0.06, 3.5], [0.5, -0.4, 0.09, -0.4]])
 IN_MM = JOINTS * [1.0, 1.0, 1e-3, 1.0]  # the third one slides
 LINE = ["{n} {p}", "B {n} {p}", "A B {n} {p}", "A, B, {n}, {c}", "{n},{c}", "A\tB\t{n}\t{t}", "A B {n} {p} 0.01"]
 ORDER = ["P3", "P1", "P2", "P1"]
+CENTRES = np.array([list(map(float, PLACES[name].split())) for name in ORDER])
+POINTS = 1e-3 * (CENTRES[:, None] + [(*along, 0.0) for along in SHIFTS.values()])
+POINTS[2, 1] = np.nan
 
 
 def laid_out(line):
@@ -205,7 +210,7 @@ SOUND = {
     ),
     "points, groups": (
         "points", {"p.txt": grouped(*ORDER, without={("P2", "T2")}), "c.csv": commanded()}, GROUPS + RAD_MM,
-        {"q": IN_MM[[2, 0, 1, 0]], "pose": ORDER},
+        {"q": IN_MM[[2, 0, 1, 0]], "pose": ORDER, "targets.points": POINTS},
         "4 targets of each pose, numbered so: 'T1', 'T2', 'T3', 'T4'",
     ),
     "samples": (
@@ -244,7 +249,8 @@ SOUND = {
     "stamps": (
         "ipa_ur10", {"s.csv": STAMPED}, "",
         {"q": IN_MM, "time": [0, 20, 86400], "temperature": [23.5, 23.6, 23.7],
-         "position": [[1.0005, 0, 0.5], [0.9, 0.1, 0.51], [0.8, 0.2, 0.52]]}, "",
+         "position": [[1.0005, 0, 0.5], [0.9, 0.1, 0.51], [0.8, 0.2, 0.52]],
+         "rotation": [[[0, -1, 0], [0, 0, -1], [1, 0, 0]], np.eye(3), [[H, 0, 0.5], [0, 1, 0], [-0.5, 0, H]]]}, "",
     ),
     "lost stamps": (
         "ipa_ur10", {"s.csv": LOST}, "", {"q": IN_MM, "order": [0, 1, 2]}, "the time stamps are no instants"
@@ -268,22 +274,15 @@ def test_files_become_the_campaign_that_they_tell_of(tmp_path, capsys, case):
             assert campaign.labels[name].tolist() == values
         elif name == "measures":
             assert campaign.measures == values
+        elif name == "rotation":
+            np.testing.assert_allclose(rotations(campaign), values, atol=1e-12)
         else:
-            found = campaign.covariates[name] if name in campaign.covariates else getattr(campaign, name)
+            found = campaign.covariates[name] if name in campaign.covariates else attrgetter(name)(campaign)
             np.testing.assert_allclose(found, values, atol=1e-12, err_msg=name)
     assert all(part.strip() in out for part in said.split("…"))
     assert (
         (tmp_path / "made" / "campaign.toml").read_text().startswith(f"# Imported by `thermal-robot import {format}`")
     )
-
-
-def test_targets_of_a_group_have_a_place_each(tmp_path, capsys):
-    format, files, mapping, *_ = SOUND["points, groups"]
-    campaign, _ = imported(capsys, tmp_path, format, *mapped(tmp_path, files, mapping)[0])
-    first = 1e-3 * np.array([800, 1000.25, 900, 1000.25])
-    expected = first[:, None] + 1e-3 * np.array([along for along, _ in SHIFTS.values()])
-    expected[2, 1] = np.nan
-    np.testing.assert_allclose(campaign.targets.points[..., 0], expected)
 
 
 @pytest.mark.parametrize(
@@ -295,12 +294,6 @@ def test_an_orientation_is_taken_once_the_mapping_says_what_it_is(tmp_path, caps
     np.testing.assert_allclose(turned[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
     is_vector = np.isclose(np.arccos((np.trace(turned[0]) - 1) / 2), np.linalg.norm([0.1, 0.2, 0.3]), atol=1e-9)
     assert is_vector == ("vector" in kind)
-
-
-def test_angles_of_the_published_series_turn_about_moving_axes(tmp_path, capsys):
-    """About x by 90°, then about the new z by 90°."""
-    campaign, _ = imported(capsys, tmp_path, "ipa_ur10", *mapped(tmp_path, {"s.csv": STAMPED}, "")[0])
-    np.testing.assert_allclose(rotations(campaign)[0], [[0, -1, 0], [0, 0, -1], [1, 0, 0]], atol=1e-12)
 
 
 def test_the_example_of_the_page_is_imported(tmp_path, capsys):

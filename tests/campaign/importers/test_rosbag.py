@@ -156,13 +156,6 @@ def test_samples_are_put_in_order_and_gaps_left_out():
         stream("f", np.array([1.0, 1.0]), np.zeros((2, 1)), ["x"])
 
 
-def test_between_samples_and_nearest():
-    line = Stream("f", np.array([0.0, 1.0, 3.0]), np.array([[0.0, 5], [2.0, 5], [6.0, 5]]), ("a", "b"))
-    np.testing.assert_allclose(line.between(np.array([-1.0, 0.5, 2.0, 9.0])), [[0, 5], [1, 5], [4, 5], [6, 5]])
-    np.testing.assert_array_equal(line.nearest(np.array([-4.0, 0.4, 0.6, 1.9, 2.1, 7.0])), [0, 0, 1, 1, 2, 2])
-    np.testing.assert_allclose(line.scaled(np.array([10.0, 1.0])).values[2], [60.0, 5.0])
-
-
 OFFSET = 3.21
 POSES = 12
 

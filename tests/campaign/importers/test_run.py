@@ -91,14 +91,6 @@ def test_by_name_with_repeats_and_each_with_its_decimals():
     assert table.file == "m.csv with c.csv"
 
 
-def test_in_order():
-    table, notes = joined(MEASURED.take(np.array([True, True, False])), COMMANDED)
-    np.testing.assert_array_equal(table.numbers("q"), [0.25, 0.5])
-    assert notes == ("rows of m.csv and c.csv joined in their order",)
-    with pytest.raises(CampaignError, match="found 3 and 2 rows"):
-        joined(MEASURED, COMMANDED)
-
-
 def test_a_column_in_both_tables_is_refused():
     twice = Table("c.csv", {**COMMANDED.columns, "x": ["1", "2"]}, COMMANDED.rows, 1)
     with pytest.raises(CampaignError, match=r"c\.csv, row 1, column 'x': has a column that m\.csv has, too"):

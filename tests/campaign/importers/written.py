@@ -22,13 +22,17 @@ def put(folder: Path, **files: str) -> Path:
     return folder
 
 
-def imported(capsys, folder: Path, format: str, *arguments: str, robot: bool = True) -> tuple[Campaign, str]:
-    """Import files of the folder by name; give the campaign, as it is read again, and what was printed."""
+def tried(capsys, folder: Path, format: str, arguments: tuple[str, ...], robot: bool) -> tuple[int, str, str]:
+    """Import files of the folder by name; give the exit status and what stands on both streams."""
     said = ["--robot", str(folder / "robot.urdf"), "--tool", "tool"] if robot else []
     files = [str(folder / a) if (folder / a).exists() else a for a in arguments]
-    assert cli.main(["import", format, *files, *said, "-o", str(folder / "made")]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
+    return cli.main(["import", format, *files, *said, "-o", str(folder / "made")]), *capsys.readouterr()
+
+
+def imported(capsys, folder: Path, format: str, *arguments: str, robot: bool = True) -> tuple[Campaign, str]:
+    """The campaign of files, as it is read again, and what was printed."""
+    status, out, err = tried(capsys, folder, format, arguments, robot)
+    assert (status, err) == (0, "")
     assert out.count("\n") == 1
     assert cli.main(["check", str(folder / "made")]) == 0
     capsys.readouterr()
@@ -37,12 +41,8 @@ def imported(capsys, folder: Path, format: str, *arguments: str, robot: bool = T
 
 def complaint(capsys, folder: Path, format: str, *arguments: str, robot: bool = True) -> str:
     """What the command says of files that cannot be imported: one line, and nothing is written."""
-    said = ["--robot", str(folder / "robot.urdf"), "--tool", "tool"] if robot else []
-    files = [str(folder / a) if (folder / a).exists() else a for a in arguments]
-    assert cli.main(["import", format, *files, *said, "-o", str(folder / "made")]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
+    status, out, err = tried(capsys, folder, format, arguments, robot)
+    assert (status, out, err.count("\n")) == (2, "", 1)
     assert not (folder / "made").exists()
     return err.replace(f"{folder}/", "")
 
