@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from campaign.importers.written import complaint
+from campaign.importers.written import complaint, imported
 from helpers import some
 
-from thermal_robot import cli
-from thermal_robot.campaign import read_campaign
 from thermal_robot.campaign.importers.rosbag import Stream, lag, paired, read_bag, read_streams, stream
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import exp3, tool_poses
@@ -255,12 +253,8 @@ ROBOT = ("--robot", "builtin:rv_m2", "--tool", "tool0")
 @pytest.mark.parametrize("write", [rostopic, ros2, plotjuggler, own, bag, bag1])
 def test_every_recording_gives_the_rests_of_the_robot(recording, tmp_path, capsys, write):
     joints, target, path = recording
-    files = [str(tmp_path / name) for name in write(tmp_path, joints, target)]
-    assert cli.main(["import", "rosbag", *files, *ROBOT, "-o", str(tmp_path / "made")]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
+    campaign, out = imported(capsys, tmp_path, "rosbag", *write(tmp_path, joints, target), *ROBOT, robot=False)
     assert f"{POSES} standstills taken" in out
-    campaign = read_campaign(tmp_path / "made")
     np.testing.assert_allclose(campaign.q, path.poses, atol=1.2e-5)
     shown = float(out.split("clock shows ")[1].split(" ")[0])
     assert shown == pytest.approx(OFFSET, abs=1e-3)
@@ -274,12 +268,10 @@ def test_every_recording_gives_the_rests_of_the_robot(recording, tmp_path, capsy
 def test_a_stated_offset_and_other_units_are_taken(recording, tmp_path, capsys):
     joints, target, path = recording
     scaled = joints.scaled(np.full(5, 180 / np.pi)), target.scaled(np.full(3, 1e3))
-    files = [str(tmp_path / name) for name in own(tmp_path, *scaled)]
     (tmp_path / "m.toml").write_text(f"[recording]\noffset = {OFFSET}\n")
-    given = ("--mapping", str(tmp_path / "m.toml"), "--angle-unit", "deg", "--length-unit", "mm")
-    assert cli.main(["import", "rosbag", *files, *ROBOT, *given, "-o", str(tmp_path / "made")]) == 0
-    assert "clock shows 3.21 s more than the instrument's, as stated; 12 standstills taken" in capsys.readouterr().out
-    campaign = read_campaign(tmp_path / "made")
+    said = (*own(tmp_path, *scaled), *ROBOT, "--mapping", "m.toml", "--angle-unit", "deg", "--length-unit", "mm")
+    campaign, out = imported(capsys, tmp_path, "rosbag", *said, robot=False)
+    assert "clock shows 3.21 s more than the instrument's, as stated; 12 standstills taken" in out
     np.testing.assert_allclose(campaign.q, path.poses, atol=1.2e-5)
     assert np.linalg.norm(campaign.position - target.between(path.begins + 1.6e9 + 0.7 - OFFSET), axis=1).max() < 5e-4
     assert campaign.units.length == "mm"
@@ -303,8 +295,8 @@ def test_what_is_lacking_is_told(recording, tmp_path, capsys):
     for files, said in told.items():
         assert said in complaint(capsys, tmp_path, "rosbag", *files, *ROBOT, robot=False)
     (tmp_path / "m.toml").write_text("[recording]\noffset = 0\nstandstill = 60\n")
-    mapping = ("--mapping", str(tmp_path / "m.toml"))
-    said = complaint(capsys, tmp_path, "rosbag", "joints.csv", "poses.csv", *ROBOT, *mapping, robot=False)
+    files = ("joints.csv", "poses.csv", "--mapping", "m.toml")
+    said = complaint(capsys, tmp_path, "rosbag", *files, *ROBOT, robot=False)
     assert "never stands still long enough" in said
     assert "found 12 standstills too short, 0 without a sample" in said
 
