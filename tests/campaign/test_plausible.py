@@ -33,6 +33,7 @@ DOUBTFUL = [
     (with_column("speed", "0.5", "50", "100"), {}, "'speed' is outside 0..1 in 2 rows … row 3 … 50 … fraction"),
     (with_column("temperature", "293", "294", "295"), {}, "'temperature' … 294 °C … kelvin"),
     (with_column("temperature.beam", *["151"] * 3), {}, "'temperature.beam' … kelvin"),
+    (with_column("temperature.beam", *["149"] * 3), {}, "'temperature.beam' … degrees Fahrenheit"),
     (with_column("pose", "a", "b", "a"), {}, "same pose label … different joint commands … 'a'"),
     (PLAIN.replace("1000,0", "90000000,0"), {}, 'extend over … m and the arm reaches 1.9 m … length_unit = "mm"'),
     (PLAIN, DEGREES, 'no joint leaves ±3.5 degrees: is angle_unit = "rad" meant?'),
@@ -60,11 +61,6 @@ def test_what_is_doubtful_is_told_once(tmp_path, table, other, said):
 )
 def test_what_is_within_its_bounds_is_not_told(tmp_path, table, other):
     assert read(tmp_path, table=table, **other).warnings == ()
-
-
-def test_a_hot_robot_is_not_in_kelvin(tmp_path: Path) -> None:
-    warm = read(tmp_path, table=with_column("temperature.beam", *["149"] * 3))
-    assert not any("kelvin" in warning for warning in warm.warnings)
 
 
 def test_joints_without_limits_are_told(tmp_path: Path) -> None:

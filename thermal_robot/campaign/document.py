@@ -45,11 +45,11 @@ class Document:
     """A parsed TOML file together with its text, so that an error can name the line.
 
     ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``data`` is what
-    stands there as it is, ``name`` is what such a file is usually called.
+    stands there as it is. ``name`` is what such a file is usually called, for messages.
     """
 
     def __init__(self, file: Path, kinds: Kinds = KINDS, name: str = FILE_NAME) -> None:
-        self.file, self.kinds, self.name = str(file), kinds, name
+        self.file, self.kinds = str(file), kinds
         self.text = _content(file, _LARGEST_FILE, name, "TOML")
         try:
             self.data: dict[str, Any] = tomllib.loads(self.text)

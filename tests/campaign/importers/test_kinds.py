@@ -123,18 +123,10 @@ BOARDS = {
         (x, y) for y in (0.0, 0.03) for x in (0.0, 0.03, 0.039, 0.069)
     ],
     "target_type: checkerboard\ntargetRows: 3\ntargetCols: 2\nrowSpacingMeters: 0.04\ncolSpacingMeters: 0.05": [
-        (0.0, 0.0),
-        (0.0, 0.05),
-        (0.04, 0.0),
-        (0.04, 0.05),
-        (0.08, 0.0),
-        (0.08, 0.05),
+        (x, y) for x in (0.0, 0.04, 0.08) for y in (0.0, 0.05)
     ],
     "target_type: circlegrid\ntargetRows: 2\ntargetCols: 2\nspacingMeters: 0.02\nasymmetricGrid: True": [
-        (0.0, 0.0),
-        (0.04, 0.0),
-        (0.02, 0.02),
-        (0.06, 0.02),
+        (x + y, y) for y in (0.0, 0.02) for x in (0.0, 0.04)
     ],
 }
 
