@@ -221,13 +221,6 @@ def test_a_spoilt_table_is_refused_with_its_row(tmp_path, table, row, column, fo
     assert says(error, said)
 
 
-def test_the_whole_sentence(tmp_path: Path) -> None:
-    table = PLAIN.replace(",", ";").replace(".", ",").replace("900", "12,3a")
-    place = f"{tmp_path / 'measurements.csv'}, row 3, column 'x'"
-    said = f"{place}: text where a number should be; found '12,3a', expected a number"
-    assert str(refusal(tmp_path, table=table)) == said
-
-
 def test_a_table_that_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "MOST_CELLS", 18)
     assert "has more cells than can be read" in str(refusal(tmp_path))

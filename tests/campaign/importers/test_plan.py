@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from campaign.files import URDF
 
 from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.importers.plan import (
@@ -14,7 +13,6 @@ from thermal_robot.campaign.importers.plan import (
     columns_kind,
     orientation_kind,
     planned,
-    read_mapping,
 )
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
@@ -44,29 +42,6 @@ def test_the_one_that_is_over_counts_key_by_key():
     assert Plan().over(matrix).get("orientation", "stated").kind == "matrix"
     layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout()
     assert (layout.separator, layout.skip, layout.header, layout.comment) == ("\t", 0, False, "#")
-
-
-def test_the_robot_lies_beside_the_mapping(tmp_path):
-    (tmp_path / "cell").mkdir()
-    (tmp_path / "cell" / "robot.urdf").write_text(URDF)
-    file = tmp_path / "cell" / "m.toml"
-    file.write_text('[robot]\nurdf = "robot.urdf"\ntool_frame = "tool"\n[payload]\ncom = [0.0, 0.0, 50.0]\n')
-    plan = read_mapping(file).over(planned(UNITS))
-    robot = plan.robot()
-    assert robot.joint_names == ("turn", "lift", "slide", "roll")
-    settings = plan.settings(robot)
-    assert settings.payload_com == pytest.approx((0, 0, 0.05))
-    assert (settings.noise_position, settings.base_known, settings.moves) == (None, False, "direct")
-    file.write_text('[robot]\nurdf = "builtin:rv_m2"\ntool_frame = "tool0"\n')
-    assert read_mapping(file).robot().n == 5
-
-
-def test_what_is_not_stated_is_asked_for():
-    with pytest.raises(CampaignError, match="import: no robot is named, expected --robot URDF"):
-        Plan().robot()
-    robot = planned({"robot": {"urdf": "builtin:rv_m2", "tool_frame": "tool0"}}).robot()
-    with pytest.raises(CampaignError, match="no angle_unit is stated"):
-        Plan().settings(robot)
 
 
 TABLE = Table(
@@ -108,25 +83,10 @@ def test_texts():
     assert column_kind({"count": True}, "").text(TABLE) == ["0", "1", "2"]
 
 
-def test_what_is_not_there():
-    for source in ("d", 6):
-        with pytest.raises(CampaignError, match=f"f.csv, row 1, column '{source}': there is no such column"):
-            column_kind(source, "").numbers(TABLE)
-    with pytest.raises(CampaignError, match="row 2, column 'c': text where a number should be; found 'p'"):
-        column_kind("c", "").numbers(TABLE)
-
-
 @pytest.mark.parametrize("given", [0, "", 1.5, {}, {"column": "a", "count": True}, {"colum": "a"}, {"sum": "a"}, None])
 def test_what_is_no_source(given):
     with pytest.raises(MisfitError, match=r"columns\.x"):
         columns_kind({"x": given}, "columns")
-
-
-def test_all_joints_at_once():
-    taken = columns_kind({"joints": ["a", {"column": 2, "scale": 0.5}], "x": 1}, "columns")
-    np.testing.assert_array_equal(taken["joints"][1].numbers(TABLE), [5, 10, 15])
-    with pytest.raises(MisfitError, match="columns: 3, expected columns by name"):
-        columns_kind(3, "columns")
 
 
 # a quarter turn about z, then one about the new x: the target's axes in the measurement frame are y, z, x

@@ -143,9 +143,7 @@ def column_kind(value: Any, path: str) -> Column:
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
-    """Validate the sources by column, ``joints`` being a list."""
-    if not isinstance(value, Mapping):
-        raise MisfitError(path, value, "columns by name")
+    """Validate the sources by column of a section, ``joints`` being a list."""
     joints = list_of(column_kind)
     return {name: (joints if name == JOINTS else column_kind)(v, below(path, name)) for name, v in value.items()}
 
