@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,29 +27,37 @@ URDF = """<robot name="arm">
     <limit lower="0" upper="1" effort="1" velocity="1"/></joint>
 </robot>"""
 
-TOML = """
-[robot]
+PLAIN_TOML = """[robot]
 urdf = "robot.urdf"
 tool_frame = "tool"
-reference_temperature = 22.5
+
 [measurements]
 file = "measurements.csv"
-angle_unit = "deg"
+angle_unit = "rad"
 length_unit = "mm"
+
 [frames]
 base = "unknown"
 tool = "known"
-target = [1.0, 2, 80.0]
+target = [0.0, 0.0, 80.0]
+
 [noise]
 position = 0.02
-orientation = 3e-5
-[payload]
-com = [0.0, 0.0, 50.0]
+
 [priors]
 joint_offset = 1e-3
+
 [gears]
 lift = 101
 """
+MORE = {
+    '"rad"': '"deg"',
+    '"tool"\n': '"tool"\nreference_temperature = 22.5\n',
+    "[0.0, 0.0, 80.0]": "[1.0, 2, 80.0]",
+    "0.02\n": "0.02\norientation = 3e-5\n[payload]\ncom = [0.0, 0.0, 50.0]\n",
+}
+TOML = reduce(lambda text, pair: text.replace(*pair), MORE.items(), PLAIN_TOML)
+"""The same in degrees, with every kind of declaration."""
 
 ROWS = """turn,lift,slide,roll,x,y,z
 10,20,30,40,1000,0,500
@@ -93,29 +101,6 @@ def full() -> Campaign:
         return read_campaign(put(Path(folder) / "hall_3", FULL))
 
 
-PLAIN_TOML = """[robot]
-urdf = "robot.urdf"
-tool_frame = "tool"
-
-[measurements]
-file = "measurements.csv"
-angle_unit = "rad"
-length_unit = "mm"
-
-[frames]
-base = "unknown"
-tool = "known"
-target = [0.0, 0.0, 80.0]
-
-[noise]
-position = 0.02
-
-[priors]
-joint_offset = 1e-3
-
-[gears]
-lift = 101
-"""
 PLAIN = """turn,lift,slide,roll,x,y,z,time,note
 0.1,0.2,30,0.4,1000,0,500,1,7
 -0.1,0.3,60,3.5,900,100,510,2,8
