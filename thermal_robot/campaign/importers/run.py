@@ -59,18 +59,17 @@ def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str
         raise CampaignError(str(there), "there is a campaign already", expected=expected)
 
 
-def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
+def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan) -> Imported:
     """Import files of a format and write them as a campaign.
 
     The directory is made if need be; a campaign in it is replaced where it was imported, too: what was measured may be
     in any other, and nowhere else. ``plan`` is what the user says beyond the files; it counts for more than the format.
     """
     require_imported(files, directory, (FILE_NAME, TABLE_NAME, ROBOT_NAME))
-    given = plan or Plan()
     chosen = FORMATS[format]
     files_of(files, chosen.files, chosen.least, chosen.most)
-    source = chosen.read(files, given)
-    full = given.over(source.plan)
+    source = chosen.read(files, plan)
+    full = plan.over(source.plan)
     campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
     origin = f"{IMPORTED} {format}` from {', '.join(Path(file).name for file in files)}."
     return Imported(campaign, write_campaign(campaign, directory, comments=(origin, *source.comments)), notes)
