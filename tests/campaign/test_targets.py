@@ -11,7 +11,7 @@ import pytest
 from campaign.files import PLAIN_TOML, read, refusal, says
 
 from thermal_robot.campaign import describe, read_campaign, write_campaign
-from thermal_robot.campaign.targets import of_a_point, posed, propagated_sigma, relative_sigmas, sigma_of_all, telling
+from thermal_robot.campaign.targets import of_a_point, posed, propagated_sigma, relative_sigmas, sigma_of_all
 from thermal_robot.kinematics import exp3, log3, quaternion_to_rotation
 
 PLACES = np.array([[0.1, 0.0, 0.0], [-0.05, 0.08, 0.0], [-0.05, -0.08, 0.02], [0.0, 0.0, 0.12], [0.03, 0.1, -0.1]])
@@ -103,15 +103,6 @@ def test_a_target_that_is_wrong_in_a_few_rows_keeps_its_place():
     apart = [np.linalg.norm(each.targets.places[:, None] - each.targets.places, axis=2) for each in (sound, found)]
     np.testing.assert_allclose(apart[1], apart[0], atol=5e-5)
     assert np.flatnonzero(found.deviation > 1e-3).tolist() == [0, 1, 2, 3, 4, 5]
-
-
-def test_rows_of_two_targets_or_of_a_line_tell_no_pose():
-    points = np.full((4, 4, 3), np.nan)
-    points[0, :2] = PLACES[:2]
-    points[1, :3] = np.outer([0.0, 1.0, 2.0], [0.1, 0.2, 0.3])
-    points[2, :3] = PLACES[:3]
-    points[3] = PLACES[:4]
-    assert telling(points).tolist() == [False, False, True, True]
 
 
 def test_targets_are_placed_one_beside_the_others_where_they_meet():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from datetime import date
 from typing import Any, NamedTuple, TypeAlias
 
@@ -198,8 +198,7 @@ class Settings:
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
         spare = {"turned", "kind", "facts", "about"}  # left out where nothing is said
-        own = {each.name: getattr(self, each.name) for each in fields(self)}
-        own = {name: value for name, value in own.items() if value or name not in spare}
+        own = {name: value for name, value in vars(self).items() if value or name not in spare}
         own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
 
