@@ -105,14 +105,10 @@ QUATERNION = "qw,qx,qy,qz"
 # table, row, column, found, what is said
 REFUSED = [
     (with_column(QUATERNION, "1,0,0,0", "0,0,0,0", "1,0,0,0"), 3, "qw", "(0, 0, 0, 0) of length 0", "length is not 1"),
-    (with_column(QUATERNION, "1,0,0,0", "1,0,0,0", "0,0,1.2,0"), 4, "qw", "(0, 0, 1.2, 0) of length 1.2", "length 1"),
     (with_column("approach.lift", "1", "0", "0.5"), 4, "approach.lift", "0.5", "impossible … -1, 0 or 1"),
     (with_column("payload", "0", "-2", "3"), 3, "payload", "-2", "impossible value … not negative"),
     (with_column("temperature", "20", "20", "-300"), 4, "temperature", "-300", "impossible value … °C"),
     (with_column("noise", "0.02", "0", "0.02"), 3, "noise", "'0'", "no standard deviation … one sigma above 0"),
-    (with_column("noise", "0.02", "0.02", "-1"), 4, "noise", "'-1'", "no standard deviation … one sigma above 0"),
-    (with_column("noise", "0.02", "inf", "1"), 3, "noise", "'inf'", "not a finite number"),
-    (with_column("noise", "0.02", "good", "1"), 3, "noise", "'good'", "text where a number should be"),
     (PLAIN.replace("0.5,-0.4", "2e6,-0.4"), 4, "turn", "'2e6'", "no joint goes so far … at most 1e+06 rad or m"),
 ]
 
@@ -306,18 +302,14 @@ def test_a_campaign_from_a_frame_is_that_from_files(robot: Robot) -> None:
     ("arguments", "column", "words"),
     [
         ({"angle_unit": "grad"}, "angle_unit", '"rad" or "deg"'),
-        ({"length_unit": "yard"}, "length_unit", '"m" or "mm" or "um"'),
         ({"base": "floor"}, "base", '"unknown" or "known"'),
         ({"gears": {"left": 3}}, "gears.left", "did you mean 'lift'"),
-        ({"angle_unit": ["rad"]}, "angle_unit", '"rad" or "deg"'),
         ({"base": np.array(["known", "known"])}, "base", '"unknown" or "known"'),
         ({"tool": pd.NA}, "tool", '"unknown" or "known"'),
         ({"noise_position": 1j}, "noise_position", "finite number"),
         ({"target": [0, None, 0]}, "target", "three numbers"),
-        ({"payload_com": 10**400}, "payload_com", "three numbers"),
         ({"reference_temperature": math.nan}, "reference_temperature", "found NaN, expected a number of °C"),
         ({"priors": ["drift"]}, "priors", "values by name"),
-        ({"gears": {1: 100}}, "gears", "values by name"),
         ({"name": 7}, "name", "expected text"),
         ({"measured": "yes"}, "measured", "true or false"),
     ],

@@ -167,7 +167,6 @@ def test_what_is_no_orientation(figures, keys, words):
     [
         (3, {"kind": "quaternion", "order": "wxyz"}, "a list of 4 columns for a quaternion"),
         (4, {"kind": "quaternion"}, "orientation.order: is missing"),
-        (3, {"kind": "euler", "unit": "rad"}, "orientation.sequence: is missing"),
         (3, {"kind": "euler", "sequence": "XXY", "unit": "rad"}, "orientation.sequence"),
         (9, {"kind": "matrix", "unit": "rad"}, "orientation.unit: a matrix has none"),
     ],
