@@ -116,8 +116,8 @@ def test_products_and_the_mean_are_those_of_the_dense_covariance(case, tau, chun
         smooth = KernelCovariance(own, tau)
         close(smooth.products(DesignMatrix.from_array(stack, case.measures)), expected)
         # from some columns that were carried over once
-        some = [along[:, [4, 1]] for along in own.along(stack)]
-        close(own.products(tau, some, plain[np.ix_([4, 1], [4, 1])]), expected[np.ix_([4, 1], [4, 1])])
+        some = own.along(DesignMatrix.from_array(stack, case.measures))[:, [4, 1]]
+        close(smooth.reduced(plain[np.ix_([4, 1], [4, 1])], some), expected[np.ix_([4, 1], [4, 1])])
         found = smooth.mean(left)
         assert found.shape == (len(case.across) // case.measures, case.measures)
         close(found.ravel(), mean)
@@ -139,25 +139,18 @@ def test_whitened_columns_the_determinant_and_what_is_followed_are_those_of_the_
         assert smooth.degrees == pytest.approx(followed, rel=1e-10)
 
 
-@pytest.mark.parametrize("name", SMOOTH)
-@pytest.mark.parametrize("tau", TAUS)
-def test_a_spectrum_puts_the_covariance_together(name, tau):
-    case = Case(name)
-    (spectrum,) = case.spectra
-    assert isinstance(spectrum, SmoothKernel)
-    close(spectrum.spread(tau, case.stack), case.stack.T @ case.covariance(tau) @ case.stack)
-    vectors, variance = spectrum.eigen(tau, 1e-8)
-    assert (variance > 1e-8).all()
-    np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(variance)), rtol=0, atol=1e-8)
-    inside = tau**2 * case.inside
-    np.testing.assert_allclose((vectors * variance) @ vectors.T, inside, rtol=0, atol=2e-8 * len(inside))
-    few, large = spectrum.eigen(tau, float(np.median(variance)))
-    assert few.shape[1] == len(large) < len(variance)
-    # no columns, as where both frames are known and no effect is found, have no products
-    none = case.stack[:, :0]
-    nothing = DesignMatrix.from_array(none, case.measures)
-    assert KernelCovariance(spectrum, tau).products(nothing).shape == spectrum.spread(tau, none).shape == (0, 0)
-    assert KernelCovariance(spectrum, tau).whitened(none).shape == none.shape
+def test_a_spectrum_puts_the_kernel_together(case):
+    """Its factor in the eigenvectors is orthogonal, of the eigenvalues' lengths, and its square is the kernel."""
+    for spectrum in case.spectra:
+        factor = spectrum.back(np.eye(len(spectrum.value))).reshape(len(case.inside), -1)
+        close(factor @ factor.T, case.inside, 1e-9)
+        close(factor.T @ factor, np.diag(spectrum.value), 1e-9)
+        close(spectrum.along(DesignMatrix.from_array(case.stack, case.measures)), factor.T @ case.stack)
+        # no columns, as where both frames are known and no effect is found, have no products
+        none = case.stack[:, :0]
+        nothing = DesignMatrix.from_array(none, case.measures)
+        assert KernelCovariance(spectrum, 2.0).products(nothing).shape == (0, 0)
+        assert KernelCovariance(spectrum, 2.0).whitened(none).shape == none.shape
 
 
 @pytest.mark.parametrize("name", ANEW)
@@ -192,9 +185,9 @@ def test_of_a_group_that_no_row_in_use_has_nothing_is_known():
     for group in range(4):
         assert np.ptp(mean[case.spectra[0].groups == group], axis=0).max() < 1e-12
     # where no row is in use there is nothing
-    empty = GroupKernel.of(grouped.everywhere, grouped.groups, np.zeros(12), np.ones(3))
-    assert (empty.log_det(3.0), empty.degrees(3.0)) == (0.0, 0.0)
-    assert (empty.mean(3.0, np.zeros(0)) == 0.0).all()
+    empty = KernelCovariance(GroupKernel.of(grouped.everywhere, grouped.groups, np.zeros(12), np.ones(3)), 3.0)
+    assert (empty.log_det, empty.degrees) == (0.0, 0.0)
+    assert (empty.mean(np.zeros(0)) == 0.0).all()
 
 
 @pytest.mark.parametrize("name", [*SMOOTH, *ANEW])
@@ -354,12 +347,9 @@ def test_a_form_over_the_noise_of_each_row_is_the_dense_one_over_it(rv_m2, numbe
     noise = np.repeat([2e-5, 3e-5], 3)[:measures]
 
     def dense_of(one):
-        spectrum = decomposed(one, np.ones(12), noise)
-        return spectrum.spread(1.0, np.eye(12 * measures)) if isinstance(spectrum, SmoothKernel) else grouped(spectrum)
-
-    def grouped(found):
-        inverse = found.whitened(1.0, np.eye(12 * measures))
-        return np.linalg.inv(inverse @ inverse)
+        factor = decomposed(one, np.ones(12), noise)
+        factor = factor.back(np.eye(len(factor.value))).reshape(12 * measures, -1)
+        return np.eye(12 * measures) + factor @ factor.T
 
     plain, over = (dense_of(one) - np.eye(12 * measures) for one in (kernel, kernel.over(relative)))
     expected = plain / np.outer(relative.ravel(), relative.ravel())

@@ -38,7 +38,7 @@ from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import blocks, each, neighbourhoods
-from thermal_robot.inference.kernels import Kernel, SmoothKernel
+from thermal_robot.inference.kernels import DesignMatrix, Kernel, SmoothKernel
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
@@ -104,7 +104,9 @@ def _sandwich(e: Explanation, kernel: Kernel, columns: Array, tight: Array) -> A
     variance = e.best.noise**2
     tau = min(e.discrepancy.tau, e.best.noise / e.discrepancy.noise)
     spectrum = SmoothKernel.of(kernel.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
-    alike = spectrum.spread(tau, columns * (e.discrepancy.noise / variance))
+    stack = DesignMatrix.from_array(columns * (e.discrepancy.noise / variance), spectrum.measures)
+    along = tau * spectrum.along(stack)
+    alike = stack.products() + along.T @ along
     inner = _posterior(columns.T @ columns / variance, tight)
     return _symmetric(inner @ (alike + np.diag(tight)) @ inner)
 

@@ -25,7 +25,6 @@ from thermal_robot.inference.kernels import (
     DesignMatrix,
     Kernel,
     KernelCovariance,
-    SmoothKernel,
     decomposed,
 )
 from thermal_robot.inference.problem import (
@@ -81,7 +80,7 @@ class ModelSearch:
         self._priors = {PLAIN: float(np.log1p(-share))}
         self._out: frozenset[int] = frozenset()
         self._amplitudes: dict[int, float] = {}
-        self._last: tuple[object, list[Array]] = None, []
+        self._last: tuple[object, Array] = None, np.zeros((0, 0))
         self._spectra = [decomposed(kernel.over(w.relative), w.weights, w.noise) for kernel in self.kernels]
         # products with all columns are kept, but not those of per-pose kernels, which have too many
         both = zip(self.kernels, self._spectra, strict=True)
@@ -103,13 +102,7 @@ class ModelSearch:
         return found
 
     def without_columns(self) -> ModelSearch:
-        """Copy without the rows' columns, unless a per-pose discrepancy still needs them.
-
-        Cholesky factors of smooth kernels, a large matrix for each amplitude, are freed: few are asked for again.
-        """
-        for spectrum in self._spectra:
-            if isinstance(spectrum, SmoothKernel):
-                spectrum.factors.clear()
+        """Copy without the rows' columns, unless a per-pose discrepancy still needs them."""
         if any(kernel.grouped for kernel in self.kernels):
             return self
         found = copy(self)
@@ -236,14 +229,15 @@ class ModelSearch:
         """Gram matrix of some columns, whitened with a discrepancy."""
         kept, number = np.unique(self._stack.number[picked], return_inverse=True)
         plain = self._products[np.ix_(self._first[kept], self._first[kept])]
-        found = self._spectra[hyper[0]].products(hyper[1], self._projected(hyper[0], kept), plain)
+        covariance = KernelCovariance(self._spectra[hyper[0]], hyper[1])
+        found = covariance.reduced(plain, self._projected(hyper[0], kept))
         return np.asarray(found[np.ix_(number, number)])
 
-    def _projected(self, kernel: int, kept: NDArray[np.int64]) -> list[Array]:
+    def _projected(self, kernel: int, kept: NDArray[np.int64]) -> Array:
         """Products of a kernel's factor with some of the distinct columns."""
         known = self._projections[kernel]
         if known is not None:
-            return [own[:, kept] for own in known]
+            return known[:, kept]
         key = self._spectra[kernel], kept.tobytes()
         if self._last[0] != key:  # one after another its sizes are tried
             self._last = key, self._spectra[kernel].along(self._stack.some_columns(kept))

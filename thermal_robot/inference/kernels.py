@@ -15,13 +15,13 @@ Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; lo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
 from scipy.spatial.distance import cdist
 
 from thermal_robot.arrays import Array
@@ -179,7 +179,7 @@ class GroupKernel:
 
     With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ²
     Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|. ``moves`` (n, m, c) are in units of the
-    noise with the square roots of the weights, ``everywhere`` (N, m, c) without weights; ``value`` (G, c) and
+    noise with the square roots of the weights, ``everywhere`` (N, m, c) without weights; ``values`` (G, c) and
     ``vector`` (G, c, c) are the eigensystem of every M_g.
     """
 
@@ -187,8 +187,18 @@ class GroupKernel:
     group: NDArray[np.int64]
     everywhere: Array
     groups: NDArray[np.int64]
-    value: Array = field(repr=False)
+    values: Array = field(repr=False)
     vector: Array = field(repr=False)
+
+    @property
+    def measures(self) -> int:
+        """Number m of components of a row."""
+        return int(self.moves.shape[1])
+
+    @property
+    def value(self) -> Array:
+        """Eigenvalues (G c,) of BBᵀ, group after group."""
+        return self.values.ravel()
 
     @classmethod
     def of(cls, moves: Array, groups: NDArray[np.int64], weights: Array, noise: Array) -> GroupKernel:
@@ -202,51 +212,25 @@ class GroupKernel:
         value, vector = np.linalg.eigh(inside)
         return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
 
-    def along(self, stack: Array | DesignMatrix) -> list[Array]:
+    def along(self, stack: DesignMatrix) -> Array:
         """Product BᵀS (G c, U) in the eigenvectors of every group, S the distinct columns."""
-        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, self.moves.shape[1])
-        found = np.zeros((*self.value.shape, len(stack.different)))
+        found = np.zeros((*self.values.shape, len(stack.different)))
         for groups, rows, starts in _in_chunks(self.group):
             each = self.moves[rows].transpose(0, 2, 1) @ stack.rows(rows)
             found[groups] = self.vector[groups].transpose(0, 2, 1) @ np.add.reduceat(each, starts, axis=0)
-        return [equations_of(found)]
+        return equations_of(found)
 
-    def products(self, tau: float, along: list[Array], plain: Array) -> Array:
-        """Gram matrix Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
-        weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
-        found = plain.copy()
-        for part in chunks(len(weight)):
-            found -= along[0][part].T @ (weight[part, None] * along[0][part])
-        return found
-
-    def log_det(self, tau: float) -> float:
-        """log|1 + τ²BBᵀ|."""
-        return float(np.log1p(tau**2 * self.value).sum())
-
-    def degrees(self, tau: float) -> float:
-        """Effective degrees of freedom: the trace of the smoother."""
-        return float((tau**2 * self.value / (1.0 + tau**2 * self.value)).sum())
-
-    def whitened(self, tau: float, stack: Array) -> Array:
-        """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K)."""
-        value = self.value.ravel()
-        power = np.expm1(-0.5 * np.log1p(tau**2 * value)) / np.maximum(value, settings.SMOOTH_FLOOR)
-        return np.asarray(
-            stack + self._back(self.moves, self.group, power[:, None] * self.along(stack)[0], stack.shape)
-        )
-
-    def mean(self, tau: float, left: Array) -> Array:
-        """Posterior mean (N, m) of the discrepancy, given the (E,) residual of the rows in use, in noise units."""
-        weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
-        inner = weight[:, None] * self.along(left[:, None])[0]
-        rows = len(self.groups), self.everywhere.shape[1]
-        return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
+    def back(self, inner: Array, *, everywhere: bool = False) -> Array:
+        """Product (n, m, K) of B with (G c, K) in the eigenvectors of the groups; of all rows (N, m, K)."""
+        turned = self.vector @ inner.reshape(*self.values.shape, inner.shape[1])
+        moves, group = (self.everywhere, self.groups) if everywhere else (self.moves, self.group)
+        return np.asarray(moves @ turned[group])
 
     def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
         """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
-        above = tau**2 * self.value > floor
-        unit = self.vector * np.where(above, 1.0 / np.sqrt(np.where(above, self.value, 1.0)), 0.0)[:, None, :]
-        tight = 1.0 / np.where(above, tau**2 * self.value, 1.0)
+        above = tau**2 * self.values > floor
+        unit = self.vector * np.where(above, 1.0 / np.sqrt(np.where(above, self.values, 1.0)), 0.0)[:, None, :]
+        tight = 1.0 / np.where(above, tau**2 * self.values, 1.0)
         numbers, found = np.flatnonzero(rows), np.zeros((1, 1))
         for groups, which, starts in _in_chunks(self.group[numbers]):
             own = self.moves[numbers[which]] @ unit[self.group[numbers[which]]]
@@ -256,11 +240,6 @@ class GroupKernel:
             solved = np.asarray(np.linalg.solve(inside, along), dtype=np.float64)
             found = found + np.asarray(equations_of(along).T @ equations_of(solved))
         return found
-
-    def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:
-        """Product of B with (G c, K) in the eigenvectors of the groups."""
-        turned = self.vector @ inner.reshape(*self.value.shape, inner.shape[1])
-        return np.asarray((moves @ turned[group]).reshape(shape))
 
 
 def _in_chunks(group: Labels) -> Iterator[tuple[Labels, Labels, Labels]]:
@@ -337,20 +316,39 @@ class Kernel:
 
 @dataclass(frozen=True, eq=False)
 class KernelCovariance:
-    """Covariance 1 + τ²BBᵀ of the rows in use, in units of the noise."""
+    """Covariance 1 + τ²BBᵀ of the rows in use, in units of the noise, from the eigenvalues λ of BBᵀ.
+
+    With BᵀS in the eigenvectors of BᵀB (``along``), Woodbury's identity is Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − (BᵀS)ᵀ w BᵀS with
+    the diagonal w = τ²/(1 + τ²λ), and log|1 + τ²BBᵀ| = Σ log(1 + τ²λ).
+    """
 
     spectrum: SmoothKernel | GroupKernel
     tau: float
 
+    @property
+    def weight(self) -> Array:
+        """Weights τ²/(1 + τ²λ) of the eigenvectors."""
+        return self.tau**2 / (1.0 + self.tau**2 * self.spectrum.value)
+
     def products(self, stack: DesignMatrix) -> Array:
         """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S (K, K) of the columns S."""
         distinct = stack.some_columns(np.arange(len(stack.different)))
-        found = self.spectrum.products(self.tau, self.spectrum.along(distinct), distinct.products())
+        found = self.reduced(distinct.products(), self.spectrum.along(distinct))
         return np.asarray(found[np.ix_(stack.number, stack.number)])
+
+    def reduced(self, plain: Array, along: Array) -> Array:
+        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S from SᵀS and what the kernel's spectrum takes along of S."""
+        found, weight = plain.copy(), self.weight
+        for part in chunks(len(weight)):
+            found -= along[part].T @ (weight[part, None] * along[part])
+        return found
 
     def whitened(self, stack: Array) -> Array:
         """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K); slower than :meth:`products`."""
-        return self.spectrum.whitened(self.tau, stack)
+        value = self.spectrum.value
+        power = np.expm1(-0.5 * np.log1p(self.tau**2 * value)) / np.maximum(value, settings.SMOOTH_FLOOR)
+        along = self.spectrum.along(DesignMatrix.from_array(stack, self.spectrum.measures))
+        return stack + self.spectrum.back(power[:, None] * along).reshape(stack.shape)
 
     def reduction(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
         """Reduction SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
@@ -362,38 +360,37 @@ class KernelCovariance:
     @property
     def log_det(self) -> float:
         """log|1 + τ²BBᵀ|."""
-        return self.spectrum.log_det(self.tau)
+        return float(np.log1p(self.tau**2 * self.spectrum.value).sum())
 
     @property
     def degrees(self) -> float:
-        """Degrees of freedom of the smoother: its trace."""
-        return self.spectrum.degrees(self.tau)
+        """Effective degrees of freedom of the smoother: its trace."""
+        return float((self.weight * self.spectrum.value).sum())
 
     def mean(self, left: Array) -> Array:
         """Posterior mean (N, m) of the discrepancy, in units of the noise, given the whitened residual (E,)."""
-        return self.spectrum.mean(self.tau, left)
+        along = self.spectrum.along(DesignMatrix.from_array(left[:, None], self.spectrum.measures))
+        return self.spectrum.back(self.weight[:, None] * along, everywhere=True)[:, :, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothKernel:
-    """Decomposed kernel on the rows in use for every amplitude τ: one Cholesky factor each, no (E, M) array.
+    """Spectrum of a kernel BBᵀ on the rows in use, decomposed once for every amplitude τ, without an (E, M) array.
 
-    With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity, Sᵀ(1 + τ²BBᵀ)⁻¹S =
-    SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|. The (m, m) orthonormal ``axes`` are
-    components in which the ``parts`` are apart (one part where moves differ by row); ``everywhere`` are the parts on
-    all rows, without weights.
+    The (m, m) orthonormal ``axes`` are components in which the ``parts`` are apart (one part where moves differ by
+    row); ``everywhere`` are the parts on all rows, without weights. ``values`` and ``vectors`` of each part: the
+    eigensystem of BᵀB, or of BBᵀ where B has more columns than rows.
     """
 
     axes: Array
     parts: tuple[KernelFactor, ...]
     everywhere: tuple[KernelFactor, ...]
-    own: tuple[Array, ...]
-    factors: dict[tuple[float, int], Array] = field(default_factory=dict)
-    vectors: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    values: tuple[Array, ...]
+    vectors: tuple[Array, ...]
 
     @classmethod
     def of(cls, kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel:
-        """Scale a kernel to unit mean diagonal, in units of the noise."""
+        """Scale a kernel to unit mean diagonal, in units of the noise, and decompose it."""
         used = np.flatnonzero(weights > 0)
         moves = kernel.moves / noise[:, None]
         weight = (kernel.functions**2).sum(axis=1) if moves.ndim == 3 else (kernel.functions**2).sum(axis=1).mean()
@@ -408,12 +405,22 @@ class SmoothKernel:
         parts = tuple(KernelFactor(kernel.functions, own, used, np.sqrt(weights[used])) for own in each)
         every = np.arange(len(weights))
         everywhere = tuple(KernelFactor(kernel.functions, own, every, np.ones(len(every))) for own in each)
-        return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
+        systems = [_positive_part(part.own()) for part in parts]
+        return cls(axes, parts, everywhere, tuple(v for v, _ in systems), tuple(u for _, u in systems))
 
-    def along(self, stack: Array | DesignMatrix) -> list[Array]:
-        """Product BᵀS of each part, or, where B is wide, the part's rows of S; S the distinct columns."""
-        stack = stack if isinstance(stack, DesignMatrix) else DesignMatrix.from_array(stack, len(self.axes))
-        found = [np.zeros((len(own), len(stack.different))) for own in self.own]
+    @property
+    def measures(self) -> int:
+        """Number m of components of a row."""
+        return len(self.axes)
+
+    @cached_property
+    def value(self) -> Array:
+        """Eigenvalues (R,) of BBᵀ above rounding, part after part."""
+        return np.concatenate(self.values)
+
+    def along(self, stack: DesignMatrix) -> Array:
+        """Product BᵀS (R, U) in the eigenvectors of every part, S the distinct columns."""
+        found = [np.zeros((len(own), len(stack.different))) for own in self.vectors]
         for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
                 if part.wide:
@@ -421,6 +428,27 @@ class SmoothKernel:
                     found[k][chunk.start * own.shape[1] :][: len(flat)] = flat
                 else:
                     found[k] += part.adjoint(own, chunk)
+        for k, (part, value, vector) in enumerate(zip(self.parts, self.values, self.vectors, strict=True)):
+            found[k] = vector.T @ found[k]
+            if part.wide:
+                found[k] *= np.sqrt(value)[:, None]
+        return np.concatenate(found)
+
+    def back(self, inner: Array, *, everywhere: bool = False) -> Array:
+        """Product (n, m, K) of B with (R, K) in the eigenvectors of the parts; of all rows (N, m, K)."""
+        ends = np.cumsum([len(value) for value in self.values])[:-1]
+        turned = []
+        for part, value, vector, own in zip(self.parts, self.values, self.vectors, np.split(inner, ends), strict=True):
+            if part.wide:
+                own = vector @ (own / np.sqrt(value)[:, None])
+                rows = own.reshape(len(part.used), len(own) // max(len(part.used), 1), own.shape[1])
+                turned.append(part.adjoint(rows, slice(None)))
+            else:
+                turned.append(vector @ own)
+        parts = self.everywhere if everywhere else self.parts
+        found = np.empty((len(parts[0].used), self.measures, inner.shape[1]))
+        for chunk in chunks(len(found)):
+            found[chunk] = self.joined([part.times(own, chunk) for part, own in zip(parts, turned, strict=True)])
         return found
 
     def apart(self, rows: Array) -> list[Array]:
@@ -435,105 +463,21 @@ class SmoothKernel:
             return rows[0]
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
 
-    def back(self, parts: Sequence[KernelFactor], inner: Sequence[Array]) -> Array:
-        """Product (n, m, K) of B with (c k, K) of each part."""
-        found = np.empty((len(parts[0].used), len(self.axes), inner[0].shape[1]))
-        for chunk in chunks(len(found)):
-            found[chunk] = self.joined([part.times(own, chunk) for part, own in zip(parts, inner, strict=True)])
-        return found
-
-    def factor(self, tau: float, k: int) -> Array:
-        """Cholesky factor of 1 + τ² times a part's own matrix, cached."""
-        if (tau, k) not in self.factors:
-            matrix = self.own[k] * tau**2
-            matrix.ravel()[:: len(matrix) + 1] += 1.0
-            self.factors[tau, k] = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)[0]
-        return self.factors[tau, k]
-
-    def decomposed(self, k: int) -> tuple[Array, Array]:
-        """Eigenvalues and eigenvectors of a part's own matrix, cached."""
-        if k not in self.vectors:
-            value, vector = np.linalg.eigh(self.own[k])
-            self.vectors[k] = np.maximum(value, 0.0), vector
-        return self.vectors[k]
-
-    def log_det(self, tau: float) -> float:
-        """log|1 + τ²BBᵀ|."""
-        factors = [self.factor(tau, k) for k in range(len(self.parts))]
-        return float(sum(2.0 * np.log(np.diag(factor)).sum() for factor in factors))
-
-    def products(self, tau: float, along: list[Array], plain: Array) -> Array:
-        """Gram matrix Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
-        found = plain.copy()
-        for k, (part, own) in enumerate(zip(self.parts, along, strict=True)):
-            solved, _ = dtrtrs(self.factor(tau, k), own, lower=1)
-            within = solved.T @ solved
-            found -= own.T @ own - within if part.wide else tau**2 * within
-        return found
-
-    def spread(self, tau: float, stack: Array) -> Array:
-        """Gram matrix Sᵀ(1 + τ²BBᵀ)S of (E, K) columns S."""
-        found = stack.T @ stack
-        for part, own, along in zip(self.parts, self.own, self.along(stack), strict=True):
-            found += tau**2 * (along.T @ own @ along if part.wide else along.T @ along)
-        return np.asarray(found)
-
-    def whitened(self, tau: float, stack: Array) -> Array:
-        """Whitened columns (1 + τ²BBᵀ)^(−½) S of (E, K)."""
-        found = []
-        for k, (part, along) in enumerate(zip(self.parts, self.along(stack), strict=True)):
-            value, vector = self.decomposed(k)
-            power = np.expm1(-0.5 * np.log1p(tau**2 * value))
-            over = power if part.wide else power / np.maximum(value, settings.SMOOTH_FLOOR)
-            found.append(vector @ (over[:, None] * (vector.T @ along)))
-        if self.parts[0].wide:
-            rows = [
-                own.reshape(len(self.parts[0].used), own.shape[0] // len(self.parts[0].used), own.shape[1])
-                for own in found
-            ]
-            return np.asarray(stack + self.joined(rows).reshape(stack.shape))
-        return stack + self.back(self.parts, found).reshape(stack.shape)
-
-    def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
-        """Eigendecomposition τ²BBᵀ = U diag(d) Uᵀ: U (E, r) orthonormal, d (r,) above a floor."""
-        found, variance = [], []
-        m = len(self.axes)
-        for k, part in enumerate(self.parts):
-            value, vector = self.decomposed(k)
-            above = tau**2 * value > floor
-            own = vector[:, above]
-            if not part.wide:
-                inner = own / np.sqrt(value[above])
-                rows = [part.times(inner, chunk) for chunk in chunks(len(part.used))]
-                own = np.concatenate(rows).reshape(len(part.used) * rows[0].shape[1], inner.shape[1])
-            if len(self.parts) > 1:
-                own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
-            found.append(own)
-            variance.append(tau**2 * value[above])
-        return np.concatenate(found, axis=1), np.concatenate(variance)
-
     def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
         """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
-        basis, variance = self.eigen(tau, floor)
-        columns = white(np.flatnonzero(rows))
-        own = basis[np.repeat(rows, len(self.axes))]
-        along = own.T @ equations_of(columns)
-        return np.asarray(along.T @ np.linalg.solve(np.diag(1.0 / variance) + own.T @ own, along))
+        above = tau**2 * self.value > floor
+        basis = self.back((np.eye(len(above)) / np.sqrt(self.value))[:, above])[rows]
+        basis, columns = equations_of(basis), equations_of(white(np.flatnonzero(rows)))
+        along = basis.T @ columns
+        inside = np.diag(1.0 / (tau**2 * self.value[above])) + basis.T @ basis
+        return np.asarray(along.T @ np.linalg.solve(inside, along))
 
-    def degrees(self, tau: float) -> float:
-        """Degrees of freedom of the smoother: its trace."""
-        factors = [self.factor(tau, k) for k in range(len(self.parts))]
-        return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
 
-    def mean(self, tau: float, left: Array) -> Array:
-        """Posterior mean (N, m) given the (E,) residual of the rows in use, in units of the noise."""
-        found = []
-        for k, (part, along) in enumerate(zip(self.parts, self.along(left[:, None]), strict=True)):
-            solved = dpotrs(self.factor(tau, k), along, lower=1)[0]
-            if part.wide:
-                solved = part.adjoint(solved.reshape(len(part.used), -1, 1), slice(None))
-            found.append(tau**2 * solved)
-        return self.back(self.everywhere, found)[:, :, 0]
+def _positive_part(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues (R,) above rounding and eigenvectors (M, R) of a positive semidefinite matrix (M, M)."""
+    value, vector = np.linalg.eigh(matrix)
+    kept = value > np.finfo(float).eps * len(value) * value.max(initial=0.0)
+    return value[kept], vector[:, kept]
 
 
 def decomposed(kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel | GroupKernel:
