@@ -11,7 +11,6 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.motion_page import motion_fragment, motion_html
     from thermal_robot.report.motion_plots import plot_motions
     from thermal_robot.report.motion_words import motion_advice, motion_headline
     from thermal_robot.report.page import (
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
         fleet_html,
         fragment,
         html,
+        motion_fragment,
+        motion_html,
         wear_fragment,
         wear_html,
     )
@@ -87,15 +88,15 @@ __all__ = [
     "wear_text",
 ]
 _HOMES = {
-    "motion_plots": ("plot_motions",),
-    "motion_page": ("motion_fragment", "motion_html"),
-    "text_motions": ("motion_comparison_headline", "motion_comparison_text", "motion_text"),
-    "motion_words": ("motion_advice", "motion_headline"),
-    "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_fragment", "wear_html"),
-    "plain_text": ("calibration_text", "text"),
-    "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text", "wear_headline", "wear_text"),
-    "text_crash": ("crash_headline", "crash_text"),
-    "words": ("advice", "headline"),
+    "motion_plots": "plot_motions",
+    "motion_words": "motion_advice motion_headline",
+    "page": "comparison_fragment comparison_html fleet_html fragment html motion_fragment motion_html wear_fragment "
+    "wear_html",
+    "plain_text": "calibration_text text",
+    "text_campaigns": "comparison_headline comparison_text fleet_text wear_headline wear_text",
+    "text_crash": "crash_headline crash_text",
+    "text_motions": "motion_comparison_headline motion_comparison_text motion_text",
+    "words": "advice headline",
 }
 
 
@@ -117,7 +118,7 @@ def comparison_schema() -> dict[str, Any]:
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = next((home for home, names in _HOMES.items() if name in names), "plots")
+    home = next((home for home, names in _HOMES.items() if name in names.split()), "plots")
     return getattr(import_module(f"{__name__}.{home}"), name)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from hashlib import sha256
 from html import escape
@@ -19,13 +19,14 @@ from markupsafe import Markup
 from matplotlib.transforms import Bbox
 
 from thermal_robot.arrays import Array
-from thermal_robot.report import drawing, meanings, plots, tables, text_campaigns, units, words
+from thermal_robot.report import drawing, motion_plots, motion_words, plots, tables, text_campaigns, units, words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thermal_robot.diagnosis.result import Diagnosis
     from thermal_robot.fleet.wear_result import Wear
+    from thermal_robot.motion.result import MotionDiagnosis
     from thermal_robot.shapes import Arm
 
 Plain = Mapping[str, Any]
@@ -36,9 +37,11 @@ def _environment() -> Environment:
     made = Environment(loader=PackageLoader(__package__), autoescape=True, trim_blocks=True, lstrip_blocks=True)
     made.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     made.filters["svg"] = svg
-    made.globals.update(meaning=meanings, plots=plots, tables=tables, units=units, words=words)
+    made.globals.update(campaigns=text_campaigns, plots=plots, tables=tables, units=units, words=words)
+    made.globals.update(motion_plots=motion_plots, motion_words=motion_words)
     macros = made.get_template("parts.html").module
     made.globals.update({name: macro for name, macro in vars(macros).items() if not name.startswith("_")})
+    made.globals["meaning"] = made.get_template("meanings.html").module
     return made
 
 
@@ -217,6 +220,27 @@ def fragment(diagnosis: Diagnosis) -> str:
     return render("diagnosis.html", {"d": diagnosis})
 
 
+def motion_html(
+    diagnosis: MotionDiagnosis, generated: str | None = None, files: Mapping[str, str] | None = None
+) -> str:
+    """Self-contained HTML page of a diagnosis of motion, for A4.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+    generated, files
+        As for :func:`html`.
+    """
+    title = f"Motion of {diagnosis.log.name or diagnosis.log.robot.name}"
+    return render("motion.html", {"d": diagnosis}, title=title, generated=generated, files=files)
+
+
+def motion_fragment(diagnosis: MotionDiagnosis) -> str:
+    """HTML of a diagnosis of motion for a notebook, one ``<div>``: verdict, numbers, gaps, effects."""
+    return render("motion.html", {"d": diagnosis})
+
+
 _ROWS = 150  # of a long campaign that are drawn: their postures are most of what the drawing weighs
 _WORTH = 0.005  # share of the gap from which on a place is named in the drawing
 _LONGEST = 0.12  # of the workspace's extent, for an arrow of the gap's 95th percentile: there are arrows of all rows
@@ -291,44 +315,14 @@ def comparison_html(comparison: Plain, generated: str | None = None, files: Mapp
     generated, files
         As for :func:`html`.
     """
-    shown = {
-        "kicker": "What the same robot shares between campaigns, and what changed",
-        "headline": text_campaigns.comparison_headline(comparison),
-        "campaigns": map(text_campaigns.campaign_in_words, comparison["campaigns"]),
-        "sections": _of_comparison(comparison),
-        "meanings_of": meanings.of_comparison(comparison),
-    }
-    return render("campaigns.html", shown, title="Comparison of campaigns", generated=generated, files=files)
+    shown = {"comparison": comparison, "headline": text_campaigns.comparison_headline(comparison)}
+    return render("comparison.html", shown, title="Comparison of campaigns", generated=generated, files=files)
 
 
 def comparison_fragment(comparison: Plain) -> str:
     """HTML of a comparison for a notebook: one ``<div>`` with its own style."""
     headline = text_campaigns.comparison_headline(comparison)
-    return render("campaigns.html", {"headline": headline, "sections": _of_comparison(comparison)})
-
-
-def _of_comparison(comparison: Plain) -> Iterator[dict[str, Any]]:
-    changes = text_campaigns.changes(comparison)
-    yield {"heading": "What changed", "lines": changes, "said": "" if changes else "Nothing."}
-    told = text_campaigns.comparison_tables(comparison)
-    if told["effects"][1:]:
-        said = "χ² of equal parameters in all campaigns, all other effects free."
-        yield _section("Effects", told["effects"], 2, said=said)
-    if each := list(text_campaigns.comparison_parameters(comparison)):
-        drawn = plots.plot_differences(comparison), "Differences of parameters in standard deviations"
-        said = "Each by its own campaign, ± one standard deviation."
-        heads = ("effect", "parameter", "difference", "between", "by chance")
-        yield {"heading": "Parameters", "said": said, "drawn": drawn, "each": (heads, each)}
-    said = "Where both campaigns measured, unknown frames aligned."
-    predictions = [(both, verdict, *figures) for both, *figures, verdict in told["predictions"]]
-    yield _section("Predictions", predictions, 2, said=said)
-    if comparison["not_told"]:
-        said = "Frames or other parameters take this up:"
-        yield {"heading": "Not compared", "said": said, "lines": comparison["not_told"]}
-
-
-def _section(heading: str, table: Sequence[Sequence[str]], words: int, **more: Any) -> dict[str, Any]:
-    return {"heading": heading, "heads": table[0], "rows": table[1:], "words": words, **more}
+    return render("comparison.html", {"comparison": comparison, "headline": headline})
 
 
 def fleet_html(summary: Plain, generated: str | None = None) -> str:
@@ -341,22 +335,8 @@ def fleet_html(summary: Plain, generated: str | None = None) -> str:
     generated
         When it was made, for the footer; nothing is said where absent.
     """
-    shown = {
-        "kicker": "What is wrong with which robot, and what several share",
-        "headline": text_campaigns.fleet_headline(summary),
-        "sections": _of_fleet(summary),
-        "meanings_of": meanings.of_fleet(summary),
-    }
-    return render("campaigns.html", shown, title="Fleet", generated=generated)
-
-
-def _of_fleet(summary: Plain) -> Iterator[dict[str, Any]]:
-    if any(effect["found"] for effect in summary["effects"]):
-        yield {"drawn": (plots.plot_fleet(summary), "How many robots each effect was found in")}
-    for heading, table in text_campaigns.fleet_tables(summary).items():
-        yield _section(heading, table, len(table[0]))
-    if reasons := text_campaigns.failures(summary):
-        yield {"heading": "Without a diagnosis", "lines": reasons}
+    shown = {"summary": summary, "headline": text_campaigns.fleet_headline(summary)}
+    return render("fleet.html", shown, title="Fleet", generated=generated)
 
 
 def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
@@ -369,33 +349,16 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     generated, files
         As for :func:`html`.
     """
-    said = f"Campaigns scatter {wear.scatter:.2f} times as much as their deviations say."
-    kicker = "What moves, at once or steadily, and when it crosses a limit"
-    shown = {"kicker": kicker, "headline": _firm(wear.summary), "said": said, "sections": _of_wear(wear)}
-    shown["meanings_of"] = meanings.of_wear(wear, plots.CONTROL)
-    return render("campaigns.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
+    shown = {"wear": wear, "headline": _firm(wear.summary)}
+    return render("wear.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
 
 
 def wear_fragment(wear: Wear) -> str:
     """HTML of a robot over time for a notebook: one ``<div>`` with its own style."""
-    return render("campaigns.html", {"headline": wear.summary, "sections": _of_wear(wear)})
+    return render("wear.html", {"wear": wear, "headline": wear.summary})
 
 
 def _firm(sentence: str) -> str:
     """Keep values with their deviations and units, and dates, on one line."""
     whole = re.sub(r" ± ", f"{words.NO_BREAK}±{words.NO_BREAK}", words.bound(sentence))
     return re.sub(r"(?<=\d)-(?=\d)", "-\u2060", whole)
-
-
-def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:
-    label = "Control charts: each parameter in each campaign, with its limits, and how it moves"
-    yield {"heading": "Over time", "drawn": (plots.plot_wear(wear), label)}
-    label = "Every parameter: how it moves, how far, how sure that is"
-    yield _section("Parameters", text_campaigns.wear_table(wear), 3, label=label)
-    visits = [["campaign", "date", "about", "rows used"]]
-    visits += [[v.name, v.date, words.about_in_line(v.about), str(v.rows)] for v in wear.campaigns]
-    if not any(v.about for v in wear.campaigns):
-        visits = [[name, date, rows] for name, date, _, rows in visits]
-    yield _section("Campaigns", visits, len(visits[0]) - 1, label="Campaigns in the order of time")
-    if wear.notes:
-        yield {"heading": "To know", "lines": wear.notes}

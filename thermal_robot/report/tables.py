@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.report import units, words
+from thermal_robot.report import motion_words, units, words
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.diagnosis.values import Finding
+    from thermal_robot.diagnosis.values import Finding, HeldOut
+    from thermal_robot.motion.result import MotionDiagnosis
 
 Table = dict[str, Any]
 """``label``, ``heads``, ``rows`` of cells, and how many of the first columns hold ``words``, not numbers."""
+
+Number = tuple[str, str, str, list[str]]
+"""Kind of a figure in large letters, its heading, its value, and what stands below it."""
 
 _MOST_ROWS = 0.95  # quantile of the gap that a table tells beside rms and largest
 _MOST_OUTLIERS = 40
@@ -23,21 +27,36 @@ _MOST_CORRELATIONS = 10
 _FRAMES = {"base": "root frame of the robot, as the instrument sees it", "tool": "target, in the tool frame"}
 
 
-def numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str, list[str]]]:
+def numbers(diagnosis: Diagnosis) -> list[Number]:
     """Rms gap before and after and held-out shrinkage: kind, heading, value and remark."""
-    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    gap = diagnosis.gap
     before, after, floor = units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")
     turned = ["", ""]
     if gap.orientation_before is not None:
         pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
         turned = [f"orientation {value}" for value in pair]
-    pair = units.together((held.rms_before, held.rms_after), "m")
-    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %".replace(" %", "\N{NO-BREAK SPACE}%")
     return [
         ("before", "Gap before, rms", before, [turned[0]]),
         ("after", "Gap after, rms", after, [turned[1], f"noise floor {floor}"]),
-        ("held", "Shrinkage on rows held out", units.percent(held.shrinkage), [bounds, " → ".join(pair)]),
+        _shrinkage("rows", gap.held_out, "m"),
     ]
+
+
+def motion_numbers(diagnosis: MotionDiagnosis) -> list[Number]:
+    """Rms gap of all joints before and after and held-out shrinkage: kind, heading, value and remark."""
+    noise = max((one.noise for one in diagnosis.joints.values()), default=0.0)
+    before, after, floor = units.together((diagnosis.rms_before, diagnosis.rms_after, noise), diagnosis.unit)
+    return [
+        ("before", "Gap before, rms of all joints", before, []),
+        ("after", "Gap after", after, [f"noise of a reading at most {floor}"]),
+        _shrinkage("motions", diagnosis.held_out, diagnosis.unit),
+    ]
+
+
+def _shrinkage(of: str, held: HeldOut, unit: str) -> Number:
+    pair = units.together((held.rms_before, held.rms_after), unit)
+    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %".replace(" %", "\N{NO-BREAK SPACE}%")
+    return "held", f"Shrinkage on {of} held out", units.percent(held.shrinkage), [bounds, " → ".join(pair)]
 
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
@@ -61,6 +80,37 @@ def _effect(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
         "known": known,
         "after": [line for line, _ in after],
     }
+
+
+def motion_effects(diagnosis: MotionDiagnosis) -> list[dict[str, Any]]:
+    """Every effect with its status, probability, share, and what it means, found ones first."""
+    return [_motion_effect(diagnosis, finding) for finding in motion_words.effects(diagnosis)]
+
+
+def _motion_effect(diagnosis: MotionDiagnosis, finding: Finding) -> dict[str, Any]:
+    told = finding.status in motion_words.TOLD
+    means = motion_words.MEANS.get(finding.name, "")
+    moves = motion_words.places(diagnosis, finding.name) if told else ""
+    rivals = f"These data cannot tell it from {', '.join(finding.confounded_with)}." if finding.confounded_with else ""
+    known = motion_words.parameters(diagnosis, finding.name) if told else []
+    return {
+        "name": finding.name,
+        "quiet": not told,
+        "open": told and bool(known or means),
+        "needs": motion_words.needed(diagnosis, finding) if finding.status == "not_testable" else None,
+        "status": words.STATUS[words.displayed_status(finding)],
+        "probability": units.probability(finding.probability),
+        "share": units.percent(finding.shrinkage) if told else "",
+        "before": list(filter(None, (means, rivals))),
+        "known": known,
+        "after": [f"moves {moves}"] if moves else [],
+    }
+
+
+def motion_gaps(diagnosis: MotionDiagnosis) -> Table:
+    """Rms gap of each joint before, after and held out, and its noise."""
+    heads, rows = motion_words.gaps(diagnosis)
+    return {"label": "Rms gap of each joint", "heads": heads, "rows": rows}
 
 
 def extremes(diagnosis: Diagnosis) -> Table:

@@ -46,11 +46,12 @@ def comparison_headline(comparison: Plain) -> str:
     return " ".join(told)
 
 
-def campaign_in_words(campaign: Plain) -> str:
-    """Campaign with its diagnosis, or a model file, in words."""
-    samples = f"{campaign['samples']} samples. " if campaign["samples"] else ""
-    about = f" ({about_in_line(campaign['about'])})" if campaign.get("about") else ""
-    return f"{campaign['name']}{about}: {samples}{campaign['diagnosis']}"
+def campaigns_in_words(comparison: Plain) -> Iterator[str]:
+    """Yield each campaign with its diagnosis, or a model file, in words."""
+    for campaign in comparison["campaigns"]:
+        samples = f"{campaign['samples']} samples. " if campaign["samples"] else ""
+        about = f" ({about_in_line(campaign['about'])})" if campaign.get("about") else ""
+        yield f"{campaign['name']}{about}: {samples}{campaign['diagnosis']}"
 
 
 def changes(comparison: Plain) -> list[str]:
@@ -96,7 +97,7 @@ def comparison_tables(comparison: Plain) -> dict[str, list[Line]]:
     return {
         "effects": [("effect", "in the joint fit", "χ²", "by chance"), *_effects(comparison)],
         "parameters": [("effect", "parameter", *names, "difference", "by chance"), *_parameters(comparison)],
-        "predictions": [("campaigns", "differ, rms", "stated", "beyond twice", "verdict"), *_predictions(comparison)],
+        "predictions": [("campaigns", "verdict", "differ, rms", "stated", "beyond twice"), *_predictions(comparison)],
     }
 
 
@@ -145,11 +146,11 @@ def _predictions(comparison: Plain) -> Iterator[Line]:
     for p in comparison["predicted"]:
         both = " and ".join(p["campaigns"])
         if p["note"]:
-            yield both, units.MISSING, units.MISSING, units.MISSING, p["note"]
+            yield both, p["note"], units.MISSING, units.MISSING, units.MISSING
             continue
         difference, stated = units.together((p["rms"], p["stated"]), "m")
         verdict = "agree" if p["agrees"] else "differ by more than noise: a model is wrong, or the robot changed"
-        yield both, difference, stated, f"{units.percent(p['beyond'], 0)} of {p['poses']}", verdict
+        yield both, verdict, difference, stated, f"{units.percent(p['beyond'], 0)} of {p['poses']}"
 
 
 _MOST_PARAMETERS = 40
@@ -175,8 +176,8 @@ def comparison_text(comparison: Plain) -> str:
 def _comparison_lines(comparison: Plain) -> Iterator[str]:
     yield fill(comparison_headline(comparison), WIDTH)
     yield ""
-    for c in comparison["campaigns"]:
-        yield fill(campaign_in_words(c), WIDTH, subsequent_indent="  ")
+    for said in campaigns_in_words(comparison):
+        yield fill(said, WIDTH, subsequent_indent="  ")
     yield from ("", "CHANGED")
     for line in changes(comparison) or ["nothing"]:
         yield fill(line, WIDTH, initial_indent="  ", subsequent_indent="    ")
@@ -185,8 +186,9 @@ def _comparison_lines(comparison: Plain) -> Iterator[str]:
     if told["parameters"][1:]:
         yield from ("", "PARAMETERS, each by its own campaign, ± one standard deviation")
         yield from _table(told["parameters"], _MOST_PARAMETERS, ", in the JSON")
-    (*heads, _), *rows = told["predictions"]
-    yield from ("", "PREDICTIONS where both measured, frames aligned", *_table([(*heads, ""), *rows]))
+    (both, _, *heads), *rows = told["predictions"]
+    verdict_last = [(both, *heads, ""), *((both, *figures, verdict) for both, verdict, *figures in rows)]
+    yield from ("", "PREDICTIONS where both measured, frames aligned", *_table(verdict_last))
     if comparison["not_told"]:
         yield from ("", "NOT COMPARED, as frames or other parameters take it up")
         yield fill(", ".join(comparison["not_told"]), WIDTH, initial_indent="  ", subsequent_indent="  ")
@@ -338,6 +340,14 @@ def _figures(worn: Worn) -> Line:
         if limit == "expected":
             limit = f"{dates[0]} ({dates[1]} to {dates[2] or 'never'})"
     return limit, change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}"
+
+
+def wear_visits(wear: Wear) -> list[Line]:
+    """Table of the campaigns in the order of time; what is said about them only where something is."""
+    told = any(visit.about for visit in wear.campaigns)
+    lines: list[Line] = [("campaign", "date", "about", "rows used")]
+    lines += [(v.name, v.date, about_in_line(v.about), str(v.rows)) for v in wear.campaigns]
+    return lines if told else [(name, date, rows) for name, date, _, rows in lines]
 
 
 def wear_headline(wear: Wear) -> str:

@@ -85,9 +85,14 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
                 yield f"{worse}{the} gap of {size} comes from {names} ({sure(diagnosis.probability)}); {told}."
 
 
+def explanation(diagnosis: Diagnosis | MotionDiagnosis) -> list[Finding]:
+    """Return the findings of the explanation, the largest share first."""
+    return [diagnosis.finding(name) for name in diagnosis.verdict]
+
+
 def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
     """Found effects that a correction removes, else the random ones; the largest share first."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random is random]
+    return [f for f in explanation(diagnosis) if f.random is random]
 
 
 def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
@@ -502,7 +507,7 @@ def one_sigma(diagnosis: Diagnosis | MotionDiagnosis) -> str:
 
 def laws(diagnosis: Diagnosis) -> list[Finding]:
     """Discovered laws in the explanation."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.quantity is not None]
+    return [f for f in explanation(diagnosis) if f.quantity is not None]
 
 
 def sentences(diagnosis: Diagnosis) -> Iterator[str]:
@@ -581,7 +586,7 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _beside(diagnosis: Diagnosis) -> Iterator[str]:
     """Effects that are more probable alone than the set without them."""
-    joint, own = diagnosis.probability, [diagnosis.finding(name).probability or 0.0 for name in diagnosis.verdict]
+    joint, own = diagnosis.probability, [f.probability or 0.0 for f in explanation(diagnosis)]
     if not own or min(own) - joint < _SURER:
         return
     told = {f.name: f.probability for f in diagnosis.effects if f.probability and f.status == "not_found"}
