@@ -16,6 +16,7 @@ from thermal_robot.files import whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
 
 
 # Okabe and Ito's colours where they differ in brightness, too: orange is light and blue dark on a grey print.
@@ -27,6 +28,8 @@ NARROW, BROAD = 4.9, 9.2
 """Widths of a figure, inches: of one panel, whose small letters are 8 pixels high where it fills a telephone; and of
 columns beside each other, which a telephone shows below each other."""
 _DRAWN = 6000
+KEY: dict[str, Any] = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
+"""Look of a legend."""
 
 
 class Drawing(Figure):
@@ -73,9 +76,28 @@ def tidy(axes: Axes, grid: str = "y") -> None:
         label.set(size=NORMAL, color=INK)
 
 
-def title(axes: Axes, text: str) -> None:
-    """Write the heading of a panel."""
-    axes.set_title(plain(text), loc="left", fontsize=LARGE, color=INK, fontweight="bold", pad=10)
+def panels(count: int, across: int, width: float, above: float, each: float, **shared: Any) -> tuple[Drawing, Any]:
+    """Return a figure and its panels, so many beside each other; places that are left over stay empty.
+
+    ``width``, the height ``above`` the panels and that of ``each`` line of them are in inches.
+    """
+    down = max(-(-count // across), 1)
+    figure = Drawing(width, above + each * down)
+    drawn = figure.subplots(down, across, squeeze=False, **shared).ravel()
+    for empty in drawn[count:]:
+        empty.axis("off")
+    return figure, drawn
+
+
+def key_below(figure: Figure, axes: Axes, columns: int = 2, **look: Any) -> Legend:
+    """Write the legend of a panel below all panels of a figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    return figure.legend(handles, labels, loc="outside lower center", ncols=columns, **KEY, **look)
+
+
+def title(axes: Axes, text: str, size: float = LARGE, pad: float = 10.0) -> None:
+    """Write the heading of a panel, so many points high and above it."""
+    axes.set_title(plain(text), loc="left", fontsize=size, color=INK, fontweight="bold", pad=pad)
 
 
 def note(axes: Axes, text: str) -> None:

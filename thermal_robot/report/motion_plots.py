@@ -13,13 +13,16 @@ from thermal_robot.report.drawing import (
     BEFORE,
     BROAD,
     INK,
+    KEY,
     MUTED,
     NARROW,
     NORMAL,
     RASTER_ABOVE,
     SMALL,
     Drawing,
+    key_below,
     note,
+    panels,
     plain,
     thinned,
     tidy,
@@ -33,7 +36,6 @@ if TYPE_CHECKING:
 
     from thermal_robot.motion.result import MotionDiagnosis
 
-_KEY: dict[str, Any] = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
 _LEVELS = 16  # of the curve through the middle of what is drawn against a quantity
 _WINDOW = 12.0  # s of a motion that are drawn: swings of half a second can still be told apart
 _FEWEST = 5  # readings in a level, for its middle to be drawn
@@ -53,23 +55,21 @@ def plot_motions(diagnosis: MotionDiagnosis) -> Figure:
     columns = 2 if len(joints) > 1 else 1
     lines = max(-(-len(joints) // columns), 1)
     figure = Drawing(BROAD if columns > 1 else NARROW, 3.9 * lines)
-    panels = figure.subplots(2 * lines, columns, squeeze=False, height_ratios=(1.7, 1.0) * lines)
-    for k in range(columns * lines):
-        above, below = panels[2 * (k // columns) : 2 * (k // columns) + 2, k % columns]
-        if k < len(joints):
-            _draw_motion(above, below, diagnosis, joints[k])
-        else:
-            above.axis("off")
-            below.axis("off")
+    grid = figure.subplots(2 * lines, columns, squeeze=False, height_ratios=(1.7, 1.0) * lines)
+    pairs = grid.reshape(lines, 2, columns).swapaxes(1, 2).reshape(-1, 2)
+    for (above, below), joint in zip(pairs, joints, strict=False):
+        _draw_motion(above, below, diagnosis, joint)
+    for empty in pairs[len(joints) :].ravel():
+        empty.axis("off")
     if not joints:
-        note(panels[0, 0], "No joint was usable.")
+        note(grid[0, 0], "No joint was usable.")
     return figure
 
 
 def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> None:
     curves = d.curves[joint]
     square = (curves["measured"] - curves["nominal"]).pow(2).groupby(curves["motion"]).mean()
-    motion = int(square.index[int(np.argmax(square.to_numpy()))])
+    motion = int(square.index[int(square.argmax())])
     one = _window(curves[curves["motion"] == motion])
     unit, torque = d.unit_of(joint), d.unit == "N·m"
     best = units.scale(unit, float(np.abs(one["measured"] - one["nominal"]).max()))
@@ -85,15 +85,14 @@ def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> No
         below.plot(one["time"], best.factor * (one["measured"] - one[name]), color=colour, linewidth=1.1, label=said)
     for line in (*above.lines, *below.lines):
         line.set_rasterized(len(one) > RASTER_ABOVE)
-    above.set_title(plain(f"{joint}, motion {_label(d, motion)}"), loc="left", fontsize=NORMAL, color=INK,
-                    fontweight="bold", pad=30)  # fmt: skip
+    title(above, f"{joint}, motion {_label(d, motion)}", NORMAL, pad=30.0)
     above.set_ylabel(f"{'torque' if torque else 'position'} ({wide})")
     below.set_ylabel(f"gap ({best.unit})")
     below.set_xlabel("time (s)")
     for axes in (above, below):
         tidy(axes)
         axes.margins(x=0.01)
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, handlelength=1.4, labelspacing=0.2, **_KEY)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, handlelength=1.4, labelspacing=0.2, **KEY)
 
 
 def _window(one: pd.DataFrame) -> pd.DataFrame:
@@ -115,13 +114,8 @@ def _label(d: MotionDiagnosis, motion: int) -> str:
 
 def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
     """Draw the gap of each joint before and after against its velocity, its load and its position, with the middles."""
-    joints = list(diagnosis.joints)
-    figure = Drawing(BROAD, 0.8 + 2.35 * max(len(joints), 1))
-    panels = figure.subplots(max(len(joints), 1), 3, squeeze=False, sharey="row")
-    if not joints:
-        for axes in panels[0]:
-            note(axes, "No joint was usable.")
-    for line, joint in zip(panels, joints, strict=False):
+    figure, drawn = panels(3 * len(diagnosis.joints), 3, BROAD, 0.8, 2.35, sharey="row")
+    for line, joint in zip(drawn.reshape(-1, 3), diagnosis.joints, strict=True):
         curves = diagnosis.curves[joint]
         unit = diagnosis.unit_of(joint)
         position, turn = ("m", "m/s") if unit in ("m", "N") else ("rad", "rad/s")
@@ -139,8 +133,7 @@ def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
             axes.set_ylabel(f"gap ({best.unit})")
             axes.tick_params(labelleft=True)
             title(axes, joint)
-    if joints:
-        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
+    key_below(figure, drawn[0])
     return figure
 
 
@@ -159,14 +152,9 @@ def _draw_against(axes: Axes, along: Array, gaps: list[Array]) -> None:
     chosen = thinned(len(along))
     fine = np.isfinite(along).all() and float(np.ptp(along)) > 0.0
     for gap, colour, said in zip(gaps, (BEFORE, AFTER), ("before", "after"), strict=True):
-        look: dict[str, Any] = {
-            "color": colour,
-            "markersize": 1.5,
-            "alpha": 0.25,
-            "rasterized": True,
-        }
+        look: dict[str, Any] = {"color": colour, "markersize": 1.5, "alpha": 0.25, "rasterized": True}
         axes.plot(along[chosen], gap[chosen], linestyle="none", marker=".", **look)
-        middles = _middles(along, gap) if fine else (np.zeros(0), np.zeros(0))
+        middles = _middles(along, gap) if fine else [np.zeros(0)] * 2
         axes.plot(*middles, color=colour, linewidth=1.8, marker="o", markersize=2.5, label=said)
     low, high = np.quantile(np.concatenate(gaps), _RANGE)
     room = 0.15 * max(high - low, 1e-12)
@@ -179,31 +167,22 @@ def _draw_against(axes: Axes, along: Array, gaps: list[Array]) -> None:
     axes.locator_params(axis="x", nbins=5)
 
 
-def _middles(along: Array, gap: Array) -> tuple[Array, Array]:
-    """Medians of a gap in levels of a quantity that are equally wide."""
+def _middles(along: Array, gap: Array) -> list[Array]:
+    """Medians of a quantity and of a gap in levels of the quantity that are equally wide."""
     low, high = np.quantile(along, _RANGE)
     edges = np.linspace(low, high, _LEVELS + 1)
     level = np.digitize(along, edges)
     full = [k for k in range(1, _LEVELS + 1) if np.sum(level == k) >= _FEWEST]
-    return (
-        np.array([np.median(along[level == k]) for k in full]),
-        np.array([np.median(gap[level == k]) for k in full]),
-    )
+    return [np.array([np.median(of[level == k]) for k in full]) for of in (along, gap)]
 
 
 def plot_hysteresis(diagnosis: MotionDiagnosis) -> Figure:
     """Draw command minus position against the command in each joint's slowest motion: friction and play open a loop."""
-    joints = list(diagnosis.joints)
-    columns = min(3, max(len(joints), 1))
-    lines = -(-max(len(joints), 1) // columns)
-    figure = Drawing(BROAD if columns > 1 else NARROW, 0.8 + 2.9 * lines)
-    panels = figure.subplots(lines, columns, squeeze=False).ravel()
-    for axes, joint in zip(panels, joints, strict=False):
+    count = len(diagnosis.joints)
+    figure, drawn = panels(count, min(3, count), BROAD if count > 1 else NARROW, 0.8, 2.9)
+    for axes, joint in zip(drawn, diagnosis.joints, strict=False):
         _draw_loop(axes, diagnosis, joint)
-    for axes in panels[len(joints) :]:
-        axes.axis("off")
-    if joints:
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
+    key_below(figure, drawn[0])
     return figure
 
 
@@ -224,20 +203,11 @@ def _draw_loop(axes: Axes, d: MotionDiagnosis, joint: str) -> None:
     pair = [one["nominal" if torque else "command"] - one[name] for name in ("measured", "simulated")]
     best = units.scale(unit, float(np.abs(pair[0]).max()))
     for part, colour, width, said in zip(pair, (INK, AFTER), (0.9, 1.6), ("measured", "simulated after"), strict=True):
-        axes.plot(
-            one["command"],
-            best.factor * part,
-            color=colour,
-            linewidth=width,
-            alpha=0.8,
-            label=said,
-            rasterized=len(one) > RASTER_ABOVE,
-        )
+        look: dict[str, Any] = {"color": colour, "linewidth": width, "alpha": 0.8, "label": said}
+        axes.plot(one["command"], best.factor * part, rasterized=len(one) > RASTER_ABOVE, **look)
     axes.set_xlabel(f"{'position' if torque else 'command'} ({position})")
     axes.set_ylabel(f"{'model' if torque else 'command'} less reading ({best.unit})")
-    axes.set_title(
-        plain(f"{joint}, {_label(d, motion)}"), loc="left", fontsize=SMALL + 1.0, color=INK, fontweight="bold"
-    )
+    title(axes, f"{joint}, {_label(d, motion)}", SMALL + 1.0, pad=6.0)
     tidy(axes, grid="both")
     axes.locator_params(axis="x", nbins=5)
 
@@ -245,23 +215,20 @@ def _draw_loop(axes: Axes, d: MotionDiagnosis, joint: str) -> None:
 def plot_shares(diagnosis: MotionDiagnosis) -> Figure:
     """Draw the gap of each joint before, and in motions held out, as bars, with the noise of its reading."""
     joints = list(diagnosis.joints)
-    figure = Drawing(NARROW, 1.4 + 0.62 * max(len(joints), 1))
+    figure = Drawing(NARROW, 1.4 + 0.62 * len(joints))
     axes = figure.subplots()
-    if not joints:
-        note(axes, "No joint was usable.")
-        return figure
     scales = [units.scale(diagnosis.unit_of(j), max(one.before for one in diagnosis.joints.values())) for j in joints]
-    look = (("before", BEFORE), ("held_out", AFTER))
+    look = (("before", BEFORE, "before"), ("held_out", AFTER, "after, motions held out"))
     for k, (joint, best) in enumerate(zip(joints, scales, strict=True)):
         one = diagnosis.joints[joint]
-        for offset, (name, colour) in zip((-0.18, 0.18), look, strict=True):
-            said = {"before": "before", "held_out": "after, motions held out"}[name] if not k else None
-            axes.barh(k + offset, best.factor * getattr(one, name), height=0.32, color=colour, label=said)
+        for offset, (name, colour, said) in zip((-0.18, 0.18), look, strict=True):
+            label = None if k else said
+            axes.barh(k + offset, best.factor * getattr(one, name), height=0.32, color=colour, label=label)
         axes.plot([best.factor * one.noise] * 2, [k - 0.36, k + 0.36], color=INK, linewidth=1.2, linestyle=":",
                   label=None if k else "noise of the reading")  # fmt: skip
     axes.set_yticks(range(len(joints)), [plain(joint) for joint in joints])
     axes.set_ylim(len(joints) - 0.4, -0.6)
     axes.set_xlabel(f"rms gap ({', '.join(dict.fromkeys(best.unit for best in scales))})")
-    figure.legend(loc="outside upper left", ncols=2, **_KEY)
+    figure.legend(loc="outside upper left", ncols=2, **KEY)
     tidy(axes, grid="x")
     return figure

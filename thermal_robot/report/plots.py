@@ -6,7 +6,6 @@ Colours, axes and the Matplotlib figure behind them stand in :mod:`thermal_robot
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +22,7 @@ from thermal_robot.report.drawing import (
     BROAD,
     FAINT,
     INK,
+    KEY,
     LARGE,
     MUTED,
     NARROW,
@@ -32,8 +32,10 @@ from thermal_robot.report.drawing import (
     SMALL,
     THIRD,
     Drawing,
+    key_below,
     log_axis,
     note,
+    panels,
     plain,
     thinned,
     tidy,
@@ -52,7 +54,6 @@ if TYPE_CHECKING:
 Look = dict[str, Any]
 """Options of Matplotlib."""
 _SAID: Look = {"fontsize": SMALL, "color": INK, "va": "center"}
-_KEY: Look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
 _BELOW_KEY = 0.68  # of a panel's height for the bars; the key stands above
 _ROOM = 1.08  # beside the outermost bins, as a factor
 
@@ -68,8 +69,8 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
     """
     pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
     figure = Drawing(NARROW, 6.6 if pose else 3.6)
-    panels = figure.subplots(2 if pose else 1, 1, squeeze=False)[:, 0]
-    for axes, turned, what in zip(panels, (False, True), ("Position", "Orientation"), strict=False):
+    drawn = figure.subplots(2 if pose else 1, 1, squeeze=False)[:, 0]
+    for axes, turned, what in zip(drawn, (False, True), ("Position", "Orientation"), strict=False):
         _draw_how_far(axes, diagnosis, turned)
         title(axes, f"{what}: measured against predicted")
     return figure
@@ -116,7 +117,7 @@ def _draw_distances(axes: Axes, before: Array, after: Array, held_out: Array, sa
     axes.set_ylim(0.0, axes.get_ylim()[1] / _BELOW_KEY)
     axes.locator_params(axis="y", integer=True, nbins=5)
     box: Look = {"frameon": True, "facecolor": PAPER, "edgecolor": "none", "framealpha": 0.9}
-    axes.legend(loc="upper left", handlelength=1.6, labelspacing=0.25, **_KEY | box)
+    axes.legend(loc="upper left", handlelength=1.6, labelspacing=0.25, **KEY | box)
     tidy(axes)
 
 
@@ -206,17 +207,17 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
     # panels as high as their bars, so that a bar is equally thick everywhere; below each other where names are long
     if max(names, default=0) > _LONG_NAME:
         figure = Drawing(NARROW, 1.9 + 0.24 * (left + right))
-        panels = figure.subplots(2, 1, height_ratios=(left, right))
+        drawn = figure.subplots(2, 1, height_ratios=(left, right))
     else:
         lines, rest = max(left, right), max(abs(left - right), 0.01)
         figure = Drawing(BROAD, 1.2 + 0.24 * lines)
         grid = figure.add_gridspec(2, 2, height_ratios=(lines - rest, rest))
         places = [grid[:, k] if n == lines else grid[0, k] for k, n in enumerate((left, right))]
-        panels = np.array([figure.add_subplot(place) for place in places])
-    _draw_where(panels[0], diagnosis)
-    title(panels[0], "Where along the chain")
-    _draw_groups(panels[1], other)
-    title(panels[1], "By axis and by quantity")
+        drawn = np.array([figure.add_subplot(place) for place in places])
+    _draw_where(drawn[0], diagnosis)
+    title(drawn[0], "Where along the chain")
+    _draw_groups(drawn[1], other)
+    title(drawn[1], "By axis and by quantity")
     return figure
 
 
@@ -348,17 +349,10 @@ def _draw_map(axes: Axes, diagnosis: Diagnosis, plane: tuple[int, int]) -> None:
     axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(axis="both", nbins=6)
-    true: Look = {
-        "units": "inches",
-        "width": 0.018,
-        "minlength": 1.5,
-        "angles": "xy",
-        "scale_units": "xy",
-        "scale": 1.0,
-    }
+    true: Look = {"units": "inches", "angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.018}
     for arrows, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
-        axes.quiver(*start.T, *arrows.T, color=colour, label=label, **true)
-    axes.legend(loc="upper left", ncols=2, borderaxespad=0.2, **_KEY)
+        axes.quiver(*start.T, *arrows.T, color=colour, label=label, minlength=1.5, **true)
+    axes.legend(loc="upper left", ncols=2, borderaxespad=0.2, **KEY)
     _draw_scale(axes, units.round_down(_typical(diagnosis, mapped(diagnosis))), factor)
     axes.set_xlabel(f"{'xyz'[plane[0]]} of the root frame (m)")
     axes.set_ylabel(f"{'xyz'[plane[1]]} of the root frame (m)")
@@ -422,12 +416,12 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
     rows, noise = diagnosis.rows, diagnosis.gap.noise_floor / np.sqrt(3.0)
     columns = [("row in the file", rows.rows.astype(float)), *_followed(diagnosis)]
     figure = Drawing(NARROW if len(columns) == 1 else BROAD, 4.6)
-    panels = figure.subplots(3, len(columns), squeeze=False, sharey=True, sharex="col")
+    grid = figure.subplots(3, len(columns), squeeze=False, sharey=True, sharex="col")
     # rows that were set aside do not decide how far the axes go
     largest = max(np.abs(rows.remainder[~rows.outliers, :3]).max(initial=0.0), 2.4 * noise, 1e-12)
     best = units.scale("m", largest)
     for k, axis in enumerate("xyz"):
-        for (_, along), axes in zip(columns, panels[k], strict=True):
+        for (_, along), axes in zip(columns, grid[k], strict=True):
             values = rows.remainder[:, k] * best.factor
             _draw_remainder(axes, along, values, rows.outliers, 1.15 * largest * best.factor)
             band = 2.0 * noise * best.factor
@@ -435,12 +429,12 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
             tidy(axes, grid="")
             axes.set_ylabel(f"{axis} ({best.unit})")
             axes.tick_params(labelleft=True)
-    for (name, _), axes in zip(columns, panels[2], strict=True):
+    for (name, _), axes in zip(columns, grid[2], strict=True):
         axes.set_xlabel(plain(name))
-    title(panels[0][0], "Remainder, row by row")
-    for axes in panels[0][1:]:
+    title(grid[0][0], "Remainder, row by row")
+    for axes in grid[0][1:]:
         title(axes, f"Against {diagnosis.unexplained.depends_on[0].covariate}")
-    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=2, **_KEY)
+    key_below(figure, grid[0][0])
     return figure
 
 
@@ -511,29 +505,22 @@ def explain_figure(explained: Explained) -> Figure:
         frames take up as well says nothing.
     """
     places = explained.places
-    count = max(len(places), 1)
-    across = count if count <= _ACROSS else (2 if count == 4 else _ACROSS)
-    down = -(-count // across)
-    figure = Drawing((NARROW, 7.6, 9.6)[across - 1], 0.95 + 2.55 * down)
-    panels = figure.subplots(down, across, squeeze=False).ravel()
-    for axes in panels[len(places) :]:
-        axes.axis("off")
+    across = 2 if len(places) == 4 else min(max(len(places), 1), _ACROSS)
+    figure, drawn = panels(len(places), across, (NARROW, 7.6, 9.6)[across - 1], 0.95, 2.55)
     error = "error less its mean" if any(place.centred for place in places) else "error"
-    for place, axes in zip(places, panels, strict=False):
+    for place, axes in zip(places, drawn, strict=False):
         low, high = _limits(places, place.unit)
         unit = place.unit.split(" ")[0]
         scale = units.scale(unit, max(abs(low), abs(high)))
         _draw_place(axes, place, scale.factor)
         axes.set_ylim(low * scale.factor, high * scale.factor)
-        heading = plain(f"{place.words}: {units.percent(place.share, 0)}")
-        axes.set_title(heading, loc="left", fontsize=NORMAL, color=INK, fontweight="bold", pad=6)
+        title(axes, f"{place.words}: {units.percent(place.share, 0)}", NORMAL, pad=6.0)
         axes.set_ylabel(f"{error} ({scale.unit}{place.unit.removeprefix(unit)})")
     more = f"; {explained.left_out} smaller places are not shown" if explained.left_out else ""
     figure.suptitle(plain(f"What {explained.effect} explains{more}"), x=0.01, ha="left", fontsize=11.0, color=INK)
     if places:
-        handles, labels = panels[0].get_legend_handles_labels()
-        large: Look = {"markerscale": 5.0 / handles[0].get_markersize()}
-        shown = figure.legend(handles, labels, loc="outside lower center", ncols=3, **_KEY, **large)
+        points = drawn[0].get_lines()[0].get_markersize()
+        shown = key_below(figure, drawn[0], 3, markerscale=5.0 / points)
         for handle in filter(None, shown.legend_handles):
             handle.set_alpha(1.0)
     return figure
@@ -665,18 +652,14 @@ def plot_wear(wear: Wear) -> Figure:
         kind has it, orange where it rings; an upright band where a jump lies with 95 %; given limits dashed.
     """
     shown = [worn for worn in wear.parameters if worn.comparable][:_MOST]
-    lines = max(ceil(len(shown) / _COLUMNS), 1)
-    figure = Drawing(BROAD, 0.6 + 2.2 * lines)
-    panels = figure.subplots(lines, _COLUMNS, squeeze=False, sharex=True).ravel()
-    for axes, worn in zip(panels, shown, strict=False):
+    figure, drawn = panels(len(shown), _COLUMNS, BROAD, 0.6, 2.2, sharex=True)
+    for axes, worn in zip(drawn, shown, strict=False):
         _draw_worn(axes, wear, worn)
-    for axes in panels[len(shown) :]:
-        axes.axis("off")
-    for axes in panels[max(len(shown) - _COLUMNS, 0) : len(shown)]:
+    for axes in drawn[max(len(shown) - _COLUMNS, 0) : len(shown)]:
         axes.set_xlabel(f"days since {wear.campaigns[0].date}" if wear.dated else "campaign")
         axes.tick_params(labelbottom=True)
     if not shown:
-        note(panels[0], "No parameter can be compared.")
+        note(drawn[0], "No parameter can be compared.")
     return figure
 
 
