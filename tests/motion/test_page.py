@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from motion.found import COUNT, JOINTS, found, nothing
 
 from thermal_robot.report import motion_html, motion_schema, schema
-from thermal_robot.report.motion_plots import plot_gap_against, plot_hysteresis, slowest, velocity
+from thermal_robot.report.plots import plot_gap_against, plot_hysteresis, slowest, velocity
 
 
 @pytest.fixture(scope="module")

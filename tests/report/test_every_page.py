@@ -16,7 +16,7 @@ from report.looking import texts
 from wear_cases import by_hand
 
 from thermal_robot import report
-from thermal_robot.report import html, motion_plots, plots
+from thermal_robot.report import html, plots
 from thermal_robot.report.page import svg
 from thermal_robot.report.pdf import write_page
 
@@ -107,7 +107,7 @@ def test_a_telephone_sees_every_text_of_a_figure_in_columns():
         plots.plot_where(d),
         plots.plot_map(d),
         plots.plot_wear(by_hand()),
-        motion_plots.plot_motions(found()),
+        plots.plot_motions(found()),
     ):
         views, high = views_of(figure), figure.get_figheight()
         assert len(views) > 1

@@ -11,8 +11,13 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.motion_plots import plot_motions
-    from thermal_robot.report.motion_words import motion_advice, motion_headline
+    from thermal_robot.report.motion_words import (
+        motion_advice,
+        motion_comparison_headline,
+        motion_comparison_text,
+        motion_headline,
+        motion_text,
+    )
     from thermal_robot.report.page import (
         comparison_fragment,
         comparison_html,
@@ -24,13 +29,14 @@ if TYPE_CHECKING:
         wear_fragment,
         wear_html,
     )
-    from thermal_robot.report.plain_text import calibration_text, text
+    from thermal_robot.report.plain_text import calibration_text, crash_headline, crash_text, text
     from thermal_robot.report.plots import (
         explain_figure,
         overview,
         plot_differences,
         plot_how_far,
         plot_map,
+        plot_motions,
         plot_remainder,
         plot_wear,
         plot_where,
@@ -43,8 +49,6 @@ if TYPE_CHECKING:
         wear_headline,
         wear_text,
     )
-    from thermal_robot.report.text_crash import crash_headline, crash_text
-    from thermal_robot.report.text_motions import motion_comparison_headline, motion_comparison_text, motion_text
     from thermal_robot.report.words import advice, headline
 
 __all__ = [
@@ -88,14 +92,11 @@ __all__ = [
     "wear_text",
 ]
 _HOMES = {
-    "motion_plots": "plot_motions",
-    "motion_words": "motion_advice motion_headline",
+    "motion_words": "motion_advice motion_comparison_headline motion_comparison_text motion_headline motion_text",
     "page": "comparison_fragment comparison_html fleet_html fragment html motion_fragment motion_html wear_fragment "
     "wear_html",
-    "plain_text": "calibration_text text",
+    "plain_text": "calibration_text crash_headline crash_text text",
     "text_campaigns": "comparison_headline comparison_text fleet_text wear_headline wear_text",
-    "text_crash": "crash_headline crash_text",
-    "text_motions": "motion_comparison_headline motion_comparison_text motion_text",
     "words": "advice headline",
 }
 

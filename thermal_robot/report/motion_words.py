@@ -1,18 +1,20 @@
-"""The sentences of a diagnosis of motion, which text and page share."""
+"""The sentences of a diagnosis of motion, which text and page share, and its text for the command line."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.report import units
-from thermal_robot.report.words import by_status, capitalised, fitting, listed, needs, sure, verdict, weighty
+from thermal_robot.report import units, words
+from thermal_robot.report.plain_text import bar, bullets, by_heading, sheet, wrap
+from thermal_robot.tables import aligned
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
+    from thermal_robot.motion.compare import Compared, MotionComparison
     from thermal_robot.motion.result import MotionDiagnosis
 
 TOLD = ("found", "confounded")
@@ -29,7 +31,7 @@ def motion_headline(diagnosis: MotionDiagnosis) -> str:
     It names the fewest causes that hold 95 % of what is explained, at most three, with the joint where one holds most,
     and counts the others. Of what there is to say the fullest wording is taken that fits.
     """
-    return fitting(_wordings(diagnosis))
+    return words.fitting(_wordings(diagnosis))
 
 
 def _wordings(d: MotionDiagnosis) -> Iterator[str]:
@@ -44,9 +46,9 @@ def _wordings(d: MotionDiagnosis) -> Iterator[str]:
         yield f"No effect of a servo is seen in the gap of {size} between joints and {_model(d)}."
     else:
         for most, places, rivals in product((_MOST, 2, 1), (True, False), (True, False)):
-            causes = _causes(d, found, most, places, rivals)
+            causes = _causes(d, words.weighty(found, most), places, rivals, len(found))
             for far in _how_far(d):
-                yield f"The joints miss the {_model(d)} by {size}: {causes} ({sure(d.probability)}); {far}."
+                yield f"The joints miss the {_model(d)} by {size}: {causes} ({words.sure(d.probability)}); {far}."
 
 
 def _model(d: MotionDiagnosis) -> str:
@@ -56,16 +58,10 @@ def _model(d: MotionDiagnosis) -> str:
     return "simulated servos" if d.stated else "command"
 
 
-def _causes(d: MotionDiagnosis, found: Sequence[Finding], most: int, places: bool, rivals: bool) -> str:
-    """Name the first few, each with its joint and what the data cannot tell it from, and count the others."""
-    named = weighty(found, most)
-    names = []
-    for one in named:
-        others = [d.title(name) for name in one.confounded_with]
-        beside = f" (or {others[0] if len(others) == 1 else 'others'})" if rivals else " (in doubt)"
-        names.append(d.title(one.name, main_joint(one) if places else "") + (beside if others else ""))
-    fewer = len(found) - len(named)
-    return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
+def _causes(d: MotionDiagnosis, named: Sequence[Finding], places: bool, rivals: bool, count: int) -> str:
+    """Name some of so many causes, each with its joint and what the data cannot tell it from, and count the others."""
+    told = [(d.title(f.name, main_joint(f) if places else ""), [*map(d.title, f.confounded_with)]) for f in named]
+    return words.causes_in_words(told, rivals, count - len(named))
 
 
 def main_joint(finding: Finding) -> str:
@@ -102,11 +98,11 @@ def details(d: MotionDiagnosis) -> Iterator[str]:
     text = d.summary or motion_headline(d)
     unsaid = [one for one in d.shown if d.title(one.name) not in text and f"{d.title(one.name, 'x')[:-2]} " not in text]
     if unsaid:
-        names = listed([d.title(one.name, main_joint(one)) for one in unsaid])
-        yield f"{'The smaller one is' if len(unsaid) == 1 else 'The smaller ones are'} {names}."
+        yield words.smaller_ones([d.title(one.name, main_joint(one)) for one in unsaid])
     hidden = [d.title(name) for name in d.verdict if not d.visible(name)]
     if hidden:
-        yield f"Told, but not shown, since no joint moves by twice its noise or the stated tolerance: {listed(hidden)}."
+        why = "since no joint moves by twice its noise or the stated tolerance"
+        yield f"Told, but not shown, {why}: {words.listed(hidden)}."
     if d.few and d.shown:
         count = len(d.log.motions)
         here = "There is 1 motion" if count == 1 else f"There are {count} motions"
@@ -127,7 +123,7 @@ def always(d: MotionDiagnosis) -> Iterator[str]:
         yield "A weak supply and a wrong motor constant saturate alike, without columns of volts and current."
     one_sign = [name for name in d.joints if "dead_zone" in named and _one_sign(d, name)]
     if one_sign:
-        yield f"Under a load of one sign play looks like a zero: so it is in {listed(one_sign)}."
+        yield f"Under a load of one sign play looks like a zero: so it is in {words.listed(one_sign)}."
     if named & {"coulomb", "stribeck", "armature"} and not d.stated and d.unit == "rad":
         yield "The servos' stiffness is not stated: friction and inertia are told over it, in rad and s²."
 
@@ -149,9 +145,9 @@ def sentences(d: MotionDiagnosis) -> Iterator[str]:
         yield "What remains follows neither position, velocity, load nor time in motions held out."
         return
     yield f"The effects leave {units.quantity(left.rms, d.unit)} rms with a pattern that holds in motions held out."
-    yield from (f"{capitalised(reason).rstrip('.')}." for reason in left.reasons)
+    yield from (f"{words.capitalised(reason).rstrip('.')}." for reason in left.reasons)
     if left.depends_on:
-        yield f"It follows {listed([one.covariate for one in left.depends_on])}."
+        yield f"It follows {words.listed([one.covariate for one in left.depends_on])}."
 
 
 _TELLS: tuple[tuple[frozenset[str], str], ...] = (
@@ -182,9 +178,9 @@ def motion_advice(d: MotionDiagnosis) -> str:
         return "Mend what is wrong with the log, and diagnose again."
     for group in d.separates:
         what = next((told for those, told in _TELLS if len(those & set(group)) > 1), "motions of another kind")
-        return f"Record {what}: this would tell {listed([d.title(name) for name in group[:3]], 'from')}."
+        return f"Record {what}: this would tell {words.listed([d.title(name) for name in group[:3]], 'from')}."
     if d.refused:
-        kinds = listed(list(d.refused)[:_MOST_KINDS])
+        kinds = words.listed(list(d.refused)[:_MOST_KINDS])
         return f"Look at the motions without a verdict ({kinds}) for contact, a stop or a fault of the log."
     if d.unexplained.flagged and d.unexplained.depends_on:
         what = d.unexplained.depends_on[0].covariate
@@ -227,12 +223,12 @@ MEANS = {
 def effects(d: MotionDiagnosis) -> list[Finding]:
     """Return the effects in the order of display; of those that were found, the ones that are visible."""
     shown = {one.name for one in d.shown}
-    return [one for one in by_status(d) if one.name in shown or one.status not in TOLD]
+    return [one for one in words.by_status(d) if one.name in shown or one.status not in TOLD]
 
 
 def needed(d: MotionDiagnosis, finding: Finding) -> str:
     """Say which columns would make an effect testable, if any would."""
-    told = needs(finding, list(d.joints))
+    told = words.needs(finding, list(d.joints))
     return f"needs {told}" if told else "has no meaning for this log"
 
 
@@ -255,7 +251,7 @@ def facts(d: MotionDiagnosis) -> dict[str, str]:
     seconds = sum(float(m.position.time[-1] - m.position.time[0]) for m in d.log.motions)
     name = f"{d.log.name}: " if d.log.name else ""
     told = {
-        "Verdict": verdict(d, ", ".join(d.verdict)),
+        "Verdict": words.verdict(d, ", ".join(d.verdict)),
         "Motion": f"{name}robot {d.log.robot.name}, {len(d.log.motions)} motions of {len(d.joints)} joints, "
         f"{seconds:.0f} s, {readings} readings of each joint",
     }
@@ -285,3 +281,112 @@ def gaps(d: MotionDiagnosis) -> tuple[tuple[str, ...], list[list[str]]]:
             sizes = (one.before, one.after, one.held_out, one.noise)
             rows.append([joint, *(units.number(best.factor * size) for size in sizes), best.unit])
     return ("joint", "before", "after", "held out", "noise", "unit"), rows
+
+
+def motion_text(diagnosis: MotionDiagnosis) -> str:
+    """Write a diagnosis of motion for the person who recorded the log.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+
+    Returns
+    -------
+    str
+        Plain text, at most 96 columns wide unless a name is longer, without a newline at the end: the verdict, how far
+        each joint's gap shrinks, which effects cause it, what the log cannot tell, what stays unexplained, what to
+        record next.
+    """
+    d = diagnosis
+    named = {**facts(d), "About": words.about_in_line(d.log.about)}
+    sections: dict[str, Iterable[str]] = {
+        "HOW FAR": _gap_by_joint(d) if d.usable else (),
+        "WHICH": _which(d) if d.usable else (),
+        "CANNOT BE TOLD": bullets(_cannot(d)),
+        "NO VERDICT OF THESE MOTIONS": bullets(refused(d)),
+        "THE LOG": bullets((*d.faults, *d.warnings)),
+        "UNEXPLAINED": map(wrap, sentences(d) if d.usable else ()),
+        "NEXT": map(wrap, filter(None, [d.advice])),
+    }
+    return sheet(filter(None, (d.summary, *details(d))), named, sections)
+
+
+def _gap_by_joint(d: MotionDiagnosis) -> Iterator[str]:
+    heads, rows = gaps(d)
+    unit = {row[-1] for row in rows}
+    what = "torque" if d.unit == "N·m" else "gap"
+    yield f"  rms {what} of each joint{f', {unit.pop()}' if len(unit) == 1 else ''}"
+    shown = len(heads) if unit else len(heads) - 1
+    yield from (f"    {line}" for line in aligned([line[:shown] for line in (heads, *rows)]))
+    held = d.held_out
+    interval = f"95 % interval {units.interval(held.shrinkage_ci95)} %"
+    yield f"  shrinkage, held out  {units.percent(held.shrinkage)}   {interval}"
+    yield wrap(how_measured(d))
+
+
+def _which(d: MotionDiagnosis) -> Iterator[str]:
+    wide = max(len(one.name) for one in d.effects)
+    yield f"    {'':{wide}}{'probability':>13}    share   of the gap, in motions held out"
+    yield from by_heading(effects(d), lambda one, status: _effect(d, one, status, wide))
+    if told := words.one_sigma(d):
+        yield wrap(told)
+
+
+def _effect(d: MotionDiagnosis, finding: Finding, status: str, wide: int) -> Iterator[str]:
+    if status == "not_testable":
+        yield wrap(needed(d, finding), f"    {finding.name:{wide}}{'':13}   ")
+        return
+    line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}"
+    if status not in TOLD:
+        yield line
+        return
+    yield f"{line}  {units.percent(finding.shrinkage):>7}   {bar(finding.shrinkage or 0.0)}".rstrip()
+    if finding.confounded_with:
+        yield wrap(f"these data cannot tell it from {', '.join(finding.confounded_with)}", " " * 6)
+    known = parameters(d, finding.name)
+    column = max((len(name) for name, _ in known), default=0)
+    yield from (f"      {name:{column}}  {value}" for name, value in known)
+    if told := places(d, finding.name):
+        yield wrap(f"moves {told}", " " * 6, 2)
+
+
+def _cannot(d: MotionDiagnosis) -> Iterator[str]:
+    for group in d.separates:
+        yield f"In this log {', '.join(group)} do the same."
+    yield from always(d)
+
+
+_MOST_CHANGES = 3  # changes that a headline names; the others are counted
+
+
+def motion_comparison_headline(comparison: MotionComparison) -> str:
+    """Return what changed between two logs of motion in one plain sentence."""
+    first, second = comparison.logs
+    told = [_change(one) for one in comparison.changes[:_MOST_CHANGES]]
+    if not told:
+        return f"Nothing changed between {first} and {second} beyond three standard deviations."
+    fewer = len(comparison.changes) - len(told)
+    return f"From {first} to {second} {words.listed([*told, *([f'{fewer} more'] if fewer else [])])} changed."
+
+
+def _change(one: Compared) -> str:
+    pair = " → ".join(units.together(one.values, one.unit))
+    return f"{one.title} ({pair}, z = {one.z:.1f})".replace("-", "−")
+
+
+def motion_comparison_text(comparison: MotionComparison) -> str:
+    """Write a comparison of two logs of motion: every parameter in both, the difference, and how sure it is."""
+    heads = ("effect", "parameter", *comparison.logs, "difference", "z")
+    rows = [_compared(one) for one in comparison.parameters]
+    lines = aligned([heads, *rows], left=range(len(heads)))
+    weak = "Fewer than eight motions in either log: ± is weak, and so is z."
+    said = ["± is one standard deviation; z is the difference over its own.", *([weak] if comparison.weak else [])]
+    return "\n\n".join((wrap(comparison.summary, ""), "\n".join(lines if rows else ["No effect is told."]),
+                        wrap(" ".join(said), "")))  # fmt: skip
+
+
+def _compared(one: Compared) -> tuple[str, ...]:
+    pairs = [*zip(one.values, one.stds, strict=True), (one.difference, one.std)]
+    told = [units.MISSING if v is None or s is None else units.measured(v, s, one.unit) for v, s in pairs]
+    return one.effect, one.name, *told, units.MISSING if one.z is None else f"{one.z:.1f}".replace("-", "−")

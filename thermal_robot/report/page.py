@@ -19,7 +19,7 @@ from markupsafe import Markup
 from matplotlib.transforms import Bbox
 
 from thermal_robot.arrays import Array
-from thermal_robot.report import drawing, motion_plots, motion_words, plots, tables, text_campaigns, units, words
+from thermal_robot.report import drawing, motion_words, plots, tables, text_campaigns, units, words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,7 @@ def _environment() -> Environment:
     made.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     made.filters["svg"] = svg
     made.globals.update(campaigns=text_campaigns, plots=plots, tables=tables, units=units, words=words)
-    made.globals.update(motion_plots=motion_plots, motion_words=motion_words)
+    made.globals["motion_words"] = motion_words
     macros = made.get_template("parts.html").module
     made.globals.update({name: macro for name, macro in vars(macros).items() if not name.startswith("_")})
     made.globals["meaning"] = made.get_template("meanings.html").module

@@ -1,4 +1,4 @@
-"""Plain text of a diagnosis and of a calibration, for the command line."""
+"""Plain text of a diagnosis, of a calibration and of a campaign after a crash, for the command line."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from thermal_robot.report.words import needs as needed
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.calibration import Calibrated, Calibration
+    from thermal_robot.diagnosis.crash import Crash, Moved
     from thermal_robot.diagnosis.result import Diagnosis
     from thermal_robot.diagnosis.values import Finding
 
@@ -34,24 +35,33 @@ def text(diagnosis: Diagnosis) -> str:
         far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next. Of a
         table that does not fit the robot what is wrong with it, and nothing of the robot.
     """
-    facts = [wrap(said, f"{name.lower():11}") for name, said in words.facts(diagnosis).items() if name != "Rows used"]
-    if diagnosis.about:
-        facts.append(wrap(words.about_in_line(diagnosis.about), f"{'about':11}"))
-    warnings = ["WARNINGS", *(wrap(w, "  - ") for w in diagnosis.warnings)]
+    facts = {**words.facts(diagnosis), "Rows used": "", "About": words.about_in_line(diagnosis.about)}
+    sections: dict[str, Iterable[str]] = {"NEXT": [wrap(diagnosis.advice)]}
+    first = [diagnosis.summary]
     if diagnosis.usable:
         first = [*words.turned(diagnosis), diagnosis.summary, *words.details(diagnosis)]
-        blocks = [
-            ["HOW FAR", *_how_far(diagnosis)],
-            ["WHICH", *_which(diagnosis)],
-            ["WHERE", *_where(diagnosis)],
-            ["UNEXPLAINED", *map(wrap, words.sentences(diagnosis))],
-            ["ISO 9283", *_criteria(diagnosis)],
-            ["NEXT", *_next(diagnosis)],
-        ]
-    else:
-        first, blocks = [diagnosis.summary], [["NEXT", wrap(diagnosis.advice)]]
-    told = [[wrap(s, "") for s in first], facts, *(block for block in (*blocks, warnings) if len(block) > 1)]
+        sections = {
+            "HOW FAR": _how_far(diagnosis),
+            "WHICH": _which(diagnosis),
+            "WHERE": _where(diagnosis),
+            "UNEXPLAINED": map(wrap, words.sentences(diagnosis)),
+            "ISO 9283": _criteria(diagnosis),
+            "NEXT": _next(diagnosis),
+        }
+    return sheet(first, facts, sections | {"WARNINGS": bullets(diagnosis.warnings)})
+
+
+def sheet(first: Iterable[str], facts: Mapping[str, str], sections: Mapping[str, Iterable[str]]) -> str:
+    """Join sentences, facts by their names, and lines by their headings; what is empty is left out."""
+    named = [wrap(said, f"{name.lower():11}") for name, said in facts.items() if said]
+    blocks = [[heading, *lines] for heading, lines in sections.items()]
+    told = [[wrap(said, "") for said in first], named, *(block for block in blocks if len(block) > 1)]
     return "\n\n".join("\n".join(block) for block in told)
+
+
+def bullets(sentences: Iterable[str]) -> list[str]:
+    """Break sentences into lines, each after a dash."""
+    return [wrap(said, "  - ") for said in sentences]
 
 
 def wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
@@ -77,7 +87,7 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
     if told := words.with_aside(diagnosis):
         yield wrap(told, f"  {'':{_NAME}}")
-    interval = f"95 % interval {_bounds(held.shrinkage_ci95)}"
+    interval = f"95 % interval {units.interval(held.shrinkage_ci95)} %"
     yield f"  {'shrinkage, held out':{_NAME}}{units.percent(held.shrinkage)}   {interval}"
     if told := words.hardest(diagnosis):
         yield wrap(told, f"  {'hardest hold-out':{_NAME}}")
@@ -86,10 +96,6 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         "Shrinkage is the share of the gap's mean square that the correction removes. Figures of rows held out "
         "have the noise of these rows in them."
     )
-
-
-def _bounds(bounds: tuple[float, float] | None) -> str:
-    return f"{units.interval(bounds)} %" if bounds is not None else ""
 
 
 def _which(diagnosis: Diagnosis) -> Iterator[str]:
@@ -117,7 +123,7 @@ def _effect(finding: Finding, status: str, wide: int, diagnosis: Diagnosis) -> I
         needs = needed(finding, diagnosis.joint_names)
         yield wrap(f"needs {needs}", f"    {finding.name:{wide}}{'':13}   ")
         return
-    bounds = f"  ({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
+    bounds = f"  ({units.interval(finding.shrinkage_ci95)} %)" if finding.shrinkage_ci95 else ""
     line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   "
     line += f"{units.percent(finding.shrinkage):>7}{bounds}"
     if status not in ("found", "confounded", "contained"):
@@ -189,8 +195,7 @@ def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
 def _next(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.advice:
         yield wrap(diagnosis.advice)
-    for group in diagnosis.separates:
-        yield wrap(f"to tell apart: {', '.join(group)}", "  - ")
+    yield from bullets(f"to tell apart: {', '.join(group)}" for group in diagnosis.separates)
 
 
 def calibration_text(calibration: Calibration) -> str:
@@ -246,3 +251,67 @@ def _calibrated(effect: Calibrated) -> Iterator[str]:
         if names:
             said = f"{label}: {words.in_words(names, between='; ')}"
             yield fill(said, WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+_SHOWN = 6
+"""Candidates that are listed: the named ones, and a few that were not."""
+
+
+def crash_headline(crash: Crash) -> str:
+    """One sentence: what moved."""
+    named = crash.named
+    if crash.misfit is not None:
+        return f"Not the crash: {next(iter(words.misfit_sentences(crash.misfit, crash.reach)))}"
+    if crash.verdict == "nothing":
+        return "No zero and no link stands out beside the ordinary errors of an arm."
+    zeros = [f"{one.name} by {_first(one)}" for one in named if one.kind == "joint"]
+    links = [f"what {one.name} carries by {_first(one)}" for one in named if one.kind == "link"]
+    unnamed = "which of them the rows do not tell"
+    said = []
+    if crash.verdict in ("zero", "both"):
+        said.append(f"the zero of {words.listed(zeros)}" if zeros else f"a joint's zero, {unnamed}")
+    if crash.verdict in ("link", "both"):
+        where = f"it has {words.listed(links)} elsewhere" if links else unnamed
+        said.append(f"the URDF or a bent link: {where}")
+    return f"It is {', and '.join(said)} ({units.probability(crash.probability)} sure)."
+
+
+def crash_text(crash: Crash) -> str:
+    """Plain text of the result: what moved, the probability of each candidate, what cannot be told, what to do."""
+    return "\n".join([wrap(crash_headline(crash), ""), *_of_crash(crash)])
+
+
+def _of_crash(crash: Crash) -> Iterator[str]:
+    if crash.misfit is not None:
+        return
+    before, after = units.together((crash.rms_before, crash.rms_after), "m")
+    yield ""
+    yield wrap(f"{crash.samples} rows: the gap is {before}; with what moved, and ordinary errors, {after} are left.")
+    wide = max((len(one.name) for one in crash.moved), default=0)
+    for one in crash.moved[: max(_SHOWN, len(crash.named))]:
+        kind = "zero of" if one.kind == "joint" else "carried by"
+        yield f"  {kind:<11}{one.name:<{wide}}  {units.probability(one.probability):>8}   {_first(one)}"
+    if crash.hidden:
+        yield wrap(
+            f"Not told: the zero of {words.listed(crash.hidden)}, which the unknown base or tool takes up, or which "
+            "the target does not see. Declare the frame known, or put the target off the last axis."
+        )
+    yield wrap(_ADVICE[crash.verdict])
+
+
+_ADVICE = {
+    "zero": "Next: master that joint again at its mark, or write the zero (thermal-robot diagnose --only joint_offset "
+    "--model, then correct --offsets); measure ten poses again.",
+    "link": "Next: compare the drawing of the arm with the URDF (variant, flange, riser). If it is the right one, the "
+    "link is bent: diagnose --model, then correct --urdf.",
+    "both": "Next: master the joint again, then measure again: what is left is the URDF or a link.",
+    "nothing": "Next: diagnose, for other causes: lost motion, a gear, a brake.",
+}
+
+
+def _first(one: Moved) -> str:
+    """Largest move of a candidate, with one standard deviation."""
+    known = [k for k, (value, std) in enumerate(zip(one.values, one.stds, strict=True)) if abs(value) >= 2.0 * std]
+    # of a link its shift says most; a turn where it only turned
+    k = max(known or [0], key=lambda k: (one.units[k] == "m", abs(one.values[k])))
+    return units.measured(one.values[k], one.stds[k], one.units[k])

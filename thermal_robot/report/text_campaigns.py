@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import units
 from thermal_robot.report.words import WIDTH, about_in_line, capitalised, listed
+from thermal_robot.tables import aligned
 
 if TYPE_CHECKING:
     from thermal_robot.fleet.wear_result import Crossing, Wear, Worn
@@ -197,9 +198,7 @@ def _comparison_lines(comparison: Plain) -> Iterator[str]:
 def _table(rows: Sequence[Line], most: int | None = None, elsewhere: str = "") -> Iterator[str]:
     """Align a limited number of rows below their heads, and count the others."""
     shown = rows if most is None else rows[: 1 + most]
-    widths = [max(map(len, column)) for column in zip(*shown, strict=True)]
-    for row in shown:
-        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+    yield from (f"  {line}" for line in aligned(shown, left=range(len(rows[0]))))
     if len(rows) > len(shown):
         yield f"  … and {len(rows) - len(shown)} more{elsewhere}"
 

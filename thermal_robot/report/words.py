@@ -80,7 +80,9 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
         worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
         for most, beside in product(first, rivals):
-            names = _causes(diagnosis, found, most, beside)
+            named = weighty(found, most)
+            told_of = [(_name(diagnosis, f), [*map(diagnosis.title, f.confounded_with)]) for f in named]
+            names = causes_in_words(told_of, beside, len(found) - len(named))
             for told in _how_far(diagnosis, remaining, len(found) > 1):
                 yield f"{worse}{the} gap of {size} comes from {names} ({sure(diagnosis.probability)}); {told}."
 
@@ -176,23 +178,26 @@ def sure(probability: float) -> str:
     return f"{'less than 1' if probability < 0.5 else 'more than 99'} % sure"
 
 
-def _causes(diagnosis: Diagnosis, found: Sequence[Finding], most: int, beside: bool) -> str:
-    """Name the first few causes with their confounded alternatives, and count the others."""
-    named = weighty(found, most)
-    names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
-    fewer = len(found) - len(named)
+def causes_in_words(named: Iterable[tuple[str, Sequence[str]]], beside: bool, fewer: int) -> str:
+    """Name causes, each with its confounded alternatives or, unless they stand ``beside`` it, as in doubt; count fewer.
+
+    ``fewer`` are the smaller ones that are not named.
+    """
+    names = []
+    for name, rivals in named:
+        doubt = f"or {rivals[0] if len(rivals) == 1 else 'others'}" if beside else "in doubt"
+        names.append(f"{name} ({doubt})" if rivals else name)
     return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
+
+
+def smaller_ones(names: Sequence[str]) -> str:
+    """Say which causes the headline counts without naming them."""
+    return f"{'The smaller one is' if len(names) == 1 else 'The smaller ones are'} {listed(names)}."
 
 
 def _name(diagnosis: Diagnosis, finding: Finding) -> str:
     words = diagnosis.title(finding.name).split()
     return " ".join(words) if len(words) <= _MOST_OF_A_NAME else " ".join(words[:_MOST_OF_A_NAME]).rstrip(",;") + "…"
-
-
-def _doubt(diagnosis: Diagnosis, finding: Finding, beside: bool) -> str:
-    rivals = [diagnosis.title(name) for name in finding.confounded_with]
-    told = f"or {rivals[0] if len(rivals) == 1 else 'others'}" if beside else "in doubt"
-    return f" ({told})" if rivals else ""
 
 
 def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
@@ -566,7 +571,7 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
         return
     found, chance = causes(diagnosis), causes(diagnosis, random=True)
     if slight := [diagnosis.title(f.name) for f in unnamed(diagnosis)]:
-        yield f"{'The smaller one is' if len(slight) == 1 else 'The smaller ones are'} {listed(slight)}."
+        yield smaller_ones(slight)
     for f in found:
         if f.confounded_with:
             rivals = " or ".join(map(diagnosis.title, f.confounded_with))
