@@ -91,14 +91,8 @@ __all__ = [
     "wear_html",
     "wear_text",
 ]
-_HOMES = {
-    "motion_words": "motion_advice motion_comparison_headline motion_comparison_text motion_headline motion_text",
-    "page": "comparison_fragment comparison_html fleet_html fragment html motion_fragment motion_html wear_fragment "
-    "wear_html",
-    "plain_text": "calibration_text crash_headline crash_text text",
-    "text_campaigns": "comparison_headline comparison_text fleet_text wear_headline wear_text",
-    "words": "advice headline",
-}
+_HOMES = ("words", "plain_text", "text_campaigns", "motion_words", "plots", "page")
+"""Modules of these names, the lightest first: the last two load Matplotlib, and Jinja2."""
 
 
 def schema() -> dict[str, Any]:
@@ -117,10 +111,11 @@ def comparison_schema() -> dict[str, Any]:
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = next((home for home, names in _HOMES.items() if name in names.split()), "plots")
-    return getattr(import_module(f"{__name__}.{home}"), name)
+    for home in _HOMES if name in __all__ else ():
+        found = getattr(import_module(f"{__name__}.{home}"), name, None)
+        if found is not None:
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
