@@ -103,12 +103,7 @@ def looked_at(browser, shown, tmp_path):
 def test_a_telephone_sees_every_text_of_a_figure_in_columns():
     """Each text of it stands whole in one of the views that a telephone is shown."""
     d = CASES["repeated"]()
-    for figure in (
-        plots.plot_where(d),
-        plots.plot_map(d),
-        plots.plot_wear(by_hand()),
-        plots.plot_motions(found()),
-    ):
+    for figure in (plots.plot_where(d), plots.plot_map(d), plots.plot_wear(by_hand()), plots.plot_motions(found())):
         views, high = views_of(figure), figure.get_figheight()
         assert len(views) > 1
         for text, box in texts(figure):

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 from report.cases import HARD, SCATTER, case, changed
 
-from thermal_robot.diagnosis.values import (
-    AnotherModel,
-    DataFault,
-    Dependence,
-    Location,
-    Misfit,
-    Unexplained,
-    Wanted,
-)
+from thermal_robot.diagnosis.values import AnotherModel, DataFault, Dependence, Location, Misfit, Unexplained, Wanted
 from thermal_robot.effects import library
 from thermal_robot.report import advice, headline, text
 from thermal_robot.report.words import MOST_WORDS, details, length, listed
@@ -94,14 +86,8 @@ def test_a_headline_as_a_whole(diagnosis, said):
             scattered("unexplained", **APART),
             "(98 % sure), or 452 µm with the 2 rows set aside in it, which nothing explains; no",
         ),
-        (
-            scattered("unexplained"),
-            "(98 % sure), of which 94 µm is not explained; no correction removes scatter.",
-        ),
-        (
-            case("found", gap=UNSTATED),
-            "and leaves 30.5 µm, which may or may not be noise: the campaign states none.",
-        ),
+        (scattered("unexplained"), "(98 % sure), of which 94 µm is not explained; no correction removes scatter."),
+        (case("found", gap=UNSTATED), "and leaves 30.5 µm, which may or may not be noise: the campaign states none."),
         (
             case("nothing", gap=UNSTATED),
             "No effect was found, and no pattern in the gap of 27.1 µm: whether it is noise cannot",
@@ -329,10 +315,7 @@ POSE = {"shoulder_pan_joint": -1.25, "elbow_joint": 0.5}
         (Wanted("repeats"), "Repeat a few poses in another order and on another day: this shows how much of the"),
         (Wanted("repeats", "pose", apart=PAIR), "Repeat some poses, and label them in a column pose: this"),
         (Wanted("column", "payload", apart=PAIR), "Repeat some poses with another load, and record payload: this"),
-        (
-            WARM,
-            "Record temperature: a remainder enters at base and follows time, and this would show whether warmth",
-        ),
+        (WARM, "Record temperature: a remainder enters at base and follows time, and this would show whether warmth"),
         (BY_PLAY, "Record approach.elbow_joint: a remainder enters at elbow_joint and follows its position, and"),
         (
             Wanted("column", "humidity", untested=("drift", "backlash", "geometric")),

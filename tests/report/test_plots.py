@@ -24,17 +24,7 @@ from thermal_robot.report import (
     plot_which,
     plots,
 )
-from thermal_robot.report.drawing import (
-    AFTER,
-    BEFORE,
-    MUTED,
-    THIRD,
-    Drawing,
-    log_axis,
-    note,
-    plain,
-    title,
-)
+from thermal_robot.report.drawing import AFTER, BEFORE, MUTED, THIRD, Drawing, log_axis, note, plain, title
 
 PLOTS = ("plot_how_far", "plot_which", "plot_where", "plot_remainder", "plot_map", "overview")
 LONG = tuple(f"left_arm_{part}_{k}_joint" for k, part in enumerate(("shoulder", "upper", "elbow", "wrist") * 2))[:7]
