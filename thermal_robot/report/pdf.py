@@ -12,11 +12,6 @@ _SCRIPT = re.compile(r"<script[^>]*>.*?</script>", re.DOTALL)  # paper runs none
 _ON_PAPER = ".tr-arm { display: none; }"  # what a script would draw
 
 
-def is_pdf(target: str | Path | None) -> bool:
-    """Whether a file is to be a PDF by its ending."""
-    return Path(target or "").suffix.lower() == ".pdf"
-
-
 def write_page(path: str | Path, page: str, target: str | Path | None = None) -> None:
     """Write a page that :func:`~thermal_robot.report.page.render` made, as PDF where the ``target`` is one by its name.
 
@@ -25,8 +20,7 @@ def write_page(path: str | Path, page: str, target: str | Path | None = None) ->
     ImportError, OSError
         Where WeasyPrint is missing, or Pango, which it needs of the system.
     """
-    target = path if target is None else target
-    if not is_pdf(target):
+    if Path(target or path).suffix.lower() != ".pdf":
         return write_text(path, page)
     import weasyprint
 

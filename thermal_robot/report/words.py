@@ -543,24 +543,6 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{found.name} describes part of it: {found.describes or 'a law'}."
 
 
-def deployed(diagnosis: Diagnosis) -> str:
-    """Say what a robot file alone can do for the gap; empty where there is nothing to correct."""
-    if diagnosis.fit is None or not causes(diagnosis):
-        return ""
-    if not diagnosis.files:
-        return (
-            "A file of the robot holds what is constant; nothing here is, as far as rows held out can tell. Use the "
-            "model to predict and correct."
-        )
-    before = length(diagnosis.files[0].rms_before)
-    return (
-        "A file of the robot holds what is constant, and nothing that changes with load, temperature or direction. On "
-        f"rows held out, with base and tool registered anew, the gap is {before}; the table says how much of it each "
-        f"file alone takes off, and what it leaves. The whole model leaves {length(diagnosis.gap.held_out.rms_after)}: "
-        "predict and correct with it. A file is named as the option of thermal-robot correct that writes it."
-    )
-
-
 _SURER = 0.05  # by which a single effect is surer than all together, so that a reader asks why
 _TOLD, _MOST_OTHERS = 0.01, 3  # probability from which another effect is told that may be at work, and how many are
 
