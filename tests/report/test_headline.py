@@ -11,7 +11,7 @@ from report.cases import HARD, SCATTER, case, changed
 from thermal_robot.diagnosis.values import AnotherModel, DataFault, Dependence, Location, Misfit, Unexplained, Wanted
 from thermal_robot.effects import library
 from thermal_robot.report import advice, headline, text
-from thermal_robot.report.words import MOST_WORDS, details, length, listed
+from thermal_robot.report.words import MOST_WORDS, details, length
 
 HARM = replace(HARD, name="session", held_out="one after the other", rms_after=5e-4, shrinkage=-0.49)
 LONG = "an effect of somebody's own whose title is a whole sentence, and then another one"
@@ -181,11 +181,6 @@ def test_no_headline_is_long_or_claims_what_nobody_stated_whatever_there_is_to_s
         if parts:  # no part is larger than the whole
             scale = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
             assert float(parts[3]) * scale[parts[4]] <= float(parts[1]) * scale[parts[2]]
-
-
-def test_lists_end_in_and_or_or():
-    assert [listed(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
-    assert [listed(names, "or") for names in (["a"], ["a", "b", "c"])] == ["a", "a, b or c"]
 
 
 @pytest.mark.parametrize(

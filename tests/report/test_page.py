@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 from importlib.metadata import PackageNotFoundError
 from types import SimpleNamespace
 
+import jsonschema
 import numpy as np
 import pytest
 from compared import diagnosed, moved
@@ -20,10 +21,12 @@ from report.cases import CASES, HARD, case, rows, with_first
 from report.every_page import EVERY, FILES, WHEN
 from report.every_page import page as page_of
 from report.fleets import EMPTY, SUMMARY
+from scipy.spatial.transform import Rotation
 from wear_cases import by_hand
 
 import thermal_robot as tr
 from thermal_robot import report
+from thermal_robot.correction.holding import FORMATS, expectation
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.values import (
     DataFault,
@@ -345,11 +348,8 @@ def test_frames_are_those_of_the_model_and_zero_has_no_sign(demo):
     base, tool = tables.frames(demo)["rows"]
     told = [float(cell.replace("\N{MINUS SIGN}", "-")) for cell in base[1:]]
     np.testing.assert_allclose(told[:3], 1e3 * demo.model.frames.base[:3, 3], atol=5e-4)
-    roll, pitch, yaw = np.radians(told[3:])
-    turn = [[[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]]]
-    turn += [[[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]]
-    turn += [[[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]]
-    np.testing.assert_allclose(np.array(turn[2]) @ turn[1] @ turn[0], demo.model.frames.base[:3, :3], atol=2e-6)
+    turn = Rotation.from_euler("xyz", told[3:], degrees=True).as_matrix()
+    np.testing.assert_allclose(turn, demo.model.frames.base[:3, :3], atol=2e-6)
     assert tool[4:] == ["", "", ""], "positions say nothing of how the target is turned on the tool"
     for value in (-1e-7, -0.0, 0.0):
         frames = demo.frames.copy()
@@ -514,3 +514,38 @@ def test_the_room_lists_what_it_has_and_what_is_light_stays_light():
     assert all(callable(getattr(report, name)) for name in report.__all__)
     with pytest.raises(AttributeError, match="no attribute 'plot_nothing'"):
         report.plot_nothing  # noqa: B018
+
+
+ASKED = "What may I deploy?"
+
+
+def test_the_json_has_what_is_expected_of_each_file(zeros):
+    plain = zeros.to_dict()
+    jsonschema.validate(plain, report.schema())
+    assert len(plain["files"]) == len(zeros.model.files) > 3
+    assert {name for told in plain["files"] for name in told["files"]} == set(FORMATS)
+    for told in plain["files"]:
+        shrinkage = 1.0 - (told["rms_after"] / told["rms_before"]) ** 2
+        assert told["shrinkage"] == pytest.approx(shrinkage, abs=0.02)
+        assert told["rms_after"] > zeros.gap.held_out.rms_after, "lost motion stays"
+    left = {told["holds"]: told["rms_after"] for told in plain["files"] if told["min_sigma"] is None}
+    assert left["ticks"] > left["zeros"], "an encoder's step is coarser than the zeros are known"
+
+
+@pytest.mark.slow
+def test_the_page_says_what_correct_says_of_the_file(zeros):
+    shown = html(zeros)
+    assert ASKED in headings(shown)
+    told = tables.files(zeros)
+    assert told["heads"][1] == "beyond 2 σ (as written)"
+    said = expectation(zeros.model.files, "offsets", 2.0)[0]
+    cell = next(row for row in told["rows"] if "offsets" in row[0])[1]
+    assert f"shrinkage {cell.split(' %')[0]} %" in said
+    assert cell in Reader(shown).words
+
+
+@pytest.mark.slow
+def test_what_no_file_holds_is_said_and_has_no_table(demo, written):
+    assert "files" not in demo.to_dict()
+    assert "holds what is constant; nothing here is" in Reader(html(demo)).words
+    assert ASKED not in headings(written(html, "nothing"))

@@ -351,21 +351,18 @@ def test_the_median_of_few_levels_stands_at_each_and_no_line_joins_them():
 @pytest.mark.parametrize(
     ("name", "label"),
     [
-        ("velocity.slide", "velocity.slide (m/s)"),
-        ("torque.slide", "torque.slide (N)"),
         ("temperature.hand", "temperature.hand (°C)"),
         ("approach.slide", "approach.slide (−1, 0, 1)"),
         ("speed", "speed (share of the maximum)"),
         ("order", "order (number)"),
         ("humidity", "humidity"),
         ("slide", "slide (m)"),
-        ("hand", "hand (rad)"),
     ],
 )
 def test_an_axis_bears_the_unit_of_what_was_recorded(name, label):
     joints = {"slide": "m", "hand": "rad"}
     recorded = {} if name in joints else {name: np.linspace(0.0, 1.0, 120)}
-    units = {"velocity.slide": "m/s", "temperature.hand": "°C", "torque.slide": "N", **joints}
+    units = {"temperature.hand": "°C", **joints}
     known = {"q": case("found").rows.q[:, :2], "covariates": recorded, "units": units}
     assert plot_remainder(follows(name, joint_names=tuple(joints), rows=known)).axes[5].get_xlabel() == label
 
