@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -59,19 +59,15 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def tidy(axes: Axes, grid: str = "y") -> None:
+def tidy(axes: Axes, grid: Literal["x", "y", "both", ""] = "y") -> None:
     """Apply the common style to axes; ``grid`` is ``x``, ``y``, ``both`` or empty."""
     axes.set_facecolor("none")
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(MUTED)
-        axes.spines[side].set_linewidth(0.8)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set(color=MUTED, linewidth=0.8)
     axes.tick_params(axis="both", which="both", color=MUTED, labelcolor=INK, labelsize=SMALL, width=0.8)
     axes.set_axisbelow(True)
-    for which in ("x", "y"):
-        if grid in (which, "both"):
-            axes.grid(visible=True, axis=which, color=FAINT, linewidth=0.7)
+    if grid:
+        axes.grid(visible=True, axis=grid, color=FAINT, linewidth=0.7)
     for label in (axes.xaxis.label, axes.yaxis.label):
         label.set(size=NORMAL, color=INK)
 
