@@ -214,7 +214,7 @@ class Comparison(RenderedPage):
     @property
     def summary(self) -> str:
         """Result in one plain sentence."""
-        return str(registered_renderer().comparison_headline(self._plain()))
+        return str(self.to_dict()["summary"])
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -245,18 +245,13 @@ class Comparison(RenderedPage):
 
     def to_dict(self) -> dict[str, Any]:
         """JSON object of the format ``thermal-robot/comparison/1``, SI."""
-        plain = self._plain()
-        return {**plain, "summary": registered_renderer().comparison_headline(plain)}
-
-    def _plain(self) -> dict[str, Any]:
         told = zip(self.campaigns, self.samples, self.diagnoses, strict=True)
         plain = dict(
             schema=SCHEMA,
             robot=self.robot,
             tool_frame=self.tool_frame,
             campaigns=[
-                {"name": name, "samples": count, "diagnosis": d.summary, "about": dict(d.about)}
-                for name, count, d in told
+                {"name": name, "samples": count, "diagnosis": d.summary, "about": d.about} for name, count, d in told
             ],
             verdict={"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
             effects=[asdict(effect) for effect in self.effects],
@@ -265,7 +260,8 @@ class Comparison(RenderedPage):
             not_told=self.not_told,
             looked_at=self.looked_at,
         )
-        return dict(jsonable(plain))
+        plain = jsonable(plain)
+        return {**plain, "summary": registered_renderer().comparison_headline(plain)}
 
     def _given(self) -> dict[str, Any]:
         return self.to_dict()

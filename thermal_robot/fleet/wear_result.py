@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
+from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.fleet import settings
 from thermal_robot.renderer import RenderedPage
 
@@ -214,8 +214,7 @@ class Wear(RenderedPage):
 
     def to_dict(self) -> dict[str, Any]:
         """JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
-        plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
-        return plain
+        return dict(jsonable({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
 
     def __repr__(self) -> str:
         moving = ", ".join(f"{w.parameter} ({w.kind})" for w in self.alarms)
