@@ -26,7 +26,7 @@ import time
 import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
@@ -161,7 +161,7 @@ def diagnose_many(
     chosen = [[names] if isinstance(names, str) else list(names) for names in (only or (), without)]
     if only is not None and not chosen[0]:
         raise CampaignError("diagnose_many(), only", "names no effect", expected="at least one, or left out for all")
-    choose(tuple(chosen[0]), tuple(chosen[1]), ())
+    choose(chosen[0], chosen[1])
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise CampaignError("diagnose_many(), workers", "no such number", found=repr(workers), expected="at least 1")
     if isinstance(time_limit, bool) or not isinstance(time_limit, (int, float)) or not 0.0 < time_limit < math.inf:
@@ -330,22 +330,19 @@ def opened(file: Path) -> Iterator[Done]:
     CampaignError
         If another run has it, or it is another file.
     """
-    database = sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)
-    try:
-        database.executescript(_BEGIN)
-    except sqlite3.DatabaseError as error:
-        database.close()
-        if isinstance(error, sqlite3.OperationalError):
-            raise CampaignError(
-                str(file), "cannot be used", found=str(error), expected="no other run with it"
-            ) from error
-        problem = "is not what a fleet has written"
-        raise CampaignError(str(file), problem, expected="another folder for --out") from error
-    try:
-        yield Done(database)
-    finally:
-        database.commit()
-        database.close()
+    with closing(sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)) as database:
+        try:
+            database.executescript(_BEGIN)
+        except sqlite3.OperationalError as error:
+            expected = "no other run with it"
+            raise CampaignError(str(file), "cannot be used", found=str(error), expected=expected) from error
+        except sqlite3.DatabaseError as error:
+            problem = "is not what a fleet has written"
+            raise CampaignError(str(file), problem, expected="another folder for --out") from error
+        try:
+            yield Done(database)
+        finally:
+            database.commit()
 
 
 _UNSERVED = {
@@ -404,42 +401,36 @@ def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Ite
     """
     distributed = needed("distributed")
     ended: list[Task] = []
-    try:
-        for alone in (False, True):
-            for task, reply, error in _flow(client, work, iter(ended) if alone else tasks, alone):
-                if not isinstance(error, distributed.KilledWorker):
-                    yield task[0], reply, "" if error is None else f"{type(error).__name__}: {error}"
-                elif alone:
-                    yield task[0], None, _KILLED
-                else:
-                    ended.append(task)
-    except (distributed.comm.core.CommClosedError, distributed.CancelledError, OSError) as error:
-        raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
-
-
-def _flow(
-    client: Any, work: Callable[..., Any], tasks: Iterator[Task], alone: bool
-) -> Iterator[tuple[Task, Any, BaseException | None]]:
-    """Yield each task with its answer or error; as many run at a time as there are threads, or one."""
-    distributed = needed("distributed")
+    told: list[tuple[str, Any, str]] = []
     under_way: dict[Any, Task] = {}
     finished = distributed.as_completed(with_results=True, raise_errors=False)
-    told: list[tuple[Task, Any, BaseException | None]] = []
-    asked, threads = -math.inf, 1
-    while True:
-        if not alone and time.monotonic() - asked > settings.ASKED_EVERY:  # workers come and go
-            asked, threads = time.monotonic(), max(sum(client.nthreads().values()), 1)
-        while len(under_way) < threads and (task := next(tasks, None)) is not None:
-            future = client.submit(work, *task[1], key=f"thermal-robot-{task[0]}", pure=False)
-            under_way[future.key] = task
-            finished.add(future)
-        yield from told  # once others are under way
-        if not under_way:
-            return
-        future, reply = next(finished)
-        task = under_way.pop(future.key)
-        if future.status == "cancelled":
-            raise distributed.CancelledError(task[0])
-        error = reply[1] if future.status == "error" else None
-        future.release()
-        told = [(task, None if error is not None else reply, error)]
+    asked, threads, alone = -math.inf, 1, False
+    try:
+        while True:
+            if not alone and time.monotonic() - asked > settings.ASKED_EVERY:  # workers come and go
+                asked, threads = time.monotonic(), max(sum(client.nthreads().values()), 1)
+            while len(under_way) < threads and (task := next(tasks, None)) is not None:
+                future = client.submit(work, *task[1], key=f"thermal-robot-{task[0]}", pure=False)
+                under_way[future.key] = task
+                finished.add(future)
+            yield from told  # once others are under way
+            told = []
+            if under_way:
+                future, reply = next(finished)
+                task = under_way.pop(future.key)
+                error = reply[1] if future.status == "error" else None
+                if future.status == "cancelled":
+                    raise distributed.CancelledError(task[0])
+                killed = isinstance(error, distributed.KilledWorker)
+                if killed and not alone:
+                    ended.append(task)
+                else:
+                    why = _KILLED if killed else "" if error is None else f"{type(error).__name__}: {error}"
+                    told = [(task[0], None if why else reply, why)]
+                future.release()
+            elif ended and not alone:
+                tasks, threads, alone = iter(ended), 1, True
+            else:
+                return
+    except (distributed.comm.core.CommClosedError, distributed.CancelledError, OSError) as error:
+        raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
