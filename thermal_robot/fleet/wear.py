@@ -19,7 +19,7 @@ from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.diagnosis.data_checks import usable, with_corrected_signs
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
-from thermal_robot.effects import RANDOM, choose, library
+from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.wear_moves import Move, Moves, Series, State, chances, explanations, fieller, moves_of, scatter
@@ -100,14 +100,13 @@ def wear(
         raise _wrong("is no rate of false alarms", "false_alarm", repr(false_alarm), "a probability, such as 0.01")
     members, moments = _members(campaigns, dates)
     limit = _limits(limits or {})
-    chosen = () if effects is None else ((effects,) if isinstance(effects, str) else tuple(effects))
-    choose(chosen, (), ())
+    candidates = choose(() if effects is None else effects)
     with threadpool_limits(1):
         fits = []
         for number, member in enumerate(members, 1):
             if not isinstance(member, Diagnosis):
                 progress(f"campaign {number} of {len(members)}")
-            fits.append(_fitted(member, chosen))
+            fits.append(_fitted(member, candidates))
         progress("all campaigns together")
         return of_fits(fits, moments, limits=limit, false_alarm=false_alarm)
 
@@ -179,7 +178,7 @@ def _opened(given: Any) -> Campaign | Diagnosis:
     return given  # type: ignore[no-any-return]
 
 
-def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
+def _fitted(given: Campaign | Diagnosis, candidates: Sequence[Effect]) -> Fit:
     """Fit of one campaign alone."""
     if isinstance(given, Diagnosis):
         if given.fit is None or not given.usable:
@@ -188,7 +187,7 @@ def _fitted(given: Campaign | Diagnosis, chosen: tuple[str, ...]) -> Fit:
         return given.fit
     if given.position is None or not given.samples:
         raise CampaignError(given.name, "nothing was measured", expected="a campaign with measured positions")
-    found = fit(with_corrected_signs(usable(given)[0]), choose(chosen, (), ()))
+    found = fit(with_corrected_signs(usable(given)[0]), candidates)
     if another_motion(found) is not None:
         expected = "a campaign that `thermal-robot diagnose` can use; it says what is wrong"
         raise CampaignError(given.name, "robot and table do not describe the same motion", expected=expected)
