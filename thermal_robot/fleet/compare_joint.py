@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from thermal_robot.arrays import Array
-from thermal_robot.errors import EstimationError
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.compare_sums import Candidate, Sums
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import total_probability
-from thermal_robot.inference.evidence import Combination, Gram, evidence
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import log_odds, share_of_places
 from thermal_robot.inference.search import Search, gains
 
@@ -162,12 +161,9 @@ class Problem:
 
     def _beside(self, inside: Sequence[JointBlock], base: Combination, part: JointBlock, wanted: float) -> float:
         """Log evidence of a combination with one more part; stopped early where clearly below ``wanted``."""
-        parts = [*inside, part]
-        prior, start = sum(p.log_prior for p in parts), _numbered(base, base.blocks)
-        try:
-            found = evidence(self.gram(parts), tuple(range(len(parts))), prior, start, wanted - inference.NEARLY)
-        except EstimationError:  # rounding hides what parts so nearly alike bring
-            return -np.inf
+        parts, start = [*inside, part], _numbered(base, base.blocks)
+        search = Search(self.gram(parts), [p.log_prior for p in parts])
+        found = search.evaluate(range(len(parts)), start, wanted - inference.NEARLY)
         return found.log_evidence if found.exact else -np.inf
 
 
