@@ -20,7 +20,7 @@ fitted and subtracted, in the difference and in the standard deviations.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, groupby
 from pathlib import Path
@@ -59,7 +59,7 @@ from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
-from thermal_robot.prediction import Spread, sensitivity
+from thermal_robot.prediction import Spread, by_parameters, sensitivity
 from thermal_robot.robot import Robot, joint_range
 
 CALL = "compare()"
@@ -112,13 +112,9 @@ def compare(
         raise CampaignError(
             CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more"
         )
-    found: list[Diagnosis | ModelAsFit] = []
-    for number, campaign in enumerate(campaigns, 1):
-        told_on = _after(f"campaign {number} of {len(campaigns)}: ", progress)
-        opened = _opened(campaign, effects)
-        if not isinstance(opened, (Diagnosis, ModelAsFit)):
-            opened = diagnose(opened, only=only, without=without, effects=effects, progress=told_on)
-        found.append(opened)
+    options = {"only": only, "without": without, "effects": effects}
+    stages = [f"campaign {number} of {len(campaigns)}: " for number in range(1, len(campaigns) + 1)]
+    found = [_opened(*each, progress, options) for each in zip(campaigns, stages, strict=True)]
     called = _called(found, names)
     found = [
         replace(d, campaign=name) if isinstance(d, ModelAsFit) else d for d, name in zip(found, called, strict=True)
@@ -129,15 +125,17 @@ def compare(
         return _compared(found, fits, called, progress)
 
 
-def _opened(given: Any, effects: Sequence[Effect]) -> Any:
-    """Load the path of a model file; anything else is returned unchanged."""
+def _opened(
+    given: Any, stage: str, progress: Callable[[str], None], options: Mapping[str, Any]
+) -> Diagnosis | ModelAsFit:
+    """Load or wrap a model, and diagnose what is neither model nor diagnosis."""
     if is_model(given):
-        return ModelAsFit.of(CorrectedModel.load(given, effects), Path(given).name)
-    return ModelAsFit.of(given, given.robot.name) if isinstance(given, CorrectedModel) else given
-
-
-def _after(stage: str, progress: Callable[[str], None]) -> Callable[[str], None]:
-    return lambda words: progress(stage + words)
+        return ModelAsFit.of(CorrectedModel.load(given, options["effects"]), Path(given).name)
+    if isinstance(given, CorrectedModel):
+        return ModelAsFit.of(given, given.robot.name)
+    if isinstance(given, Diagnosis):
+        return given
+    return diagnose(given, progress=lambda words: progress(stage + words), **options)
 
 
 def _called(found: Sequence[Diagnosis | ModelAsFit], names: Sequence[str]) -> tuple[str, ...]:
@@ -461,14 +459,12 @@ def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Ar
     turned = model.frames.base[:3, :3]
     moved = sensitivity(at, [effect for effect, _ in model.effects])
     moved = _left(np.einsum("ji,njk->nik", turned, moved), gauge)
-    compared = ((moved @ spread.covariance) * moved).sum(axis=2)
-    return np.asarray(np.maximum(compared, 0.0) + (turned.T**2) @ spread.beyond**2)
+    return by_parameters(moved, spread.covariance) + (turned.T**2) @ spread.beyond**2
 
 
 def _require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
     """Refuse to compare campaigns whose joints differ, or whose same joints put the tool frame elsewhere."""
-    first, (low, high) = robots[0], joint_range(robots[0])
-    low, high = np.where(np.isfinite(low), low, -1.0), np.where(np.isfinite(high), high, 1.0)
+    first, (low, high) = robots[0], np.nan_to_num(joint_range(robots[0]), neginf=-1.0, posinf=1.0)
     q = np.random.default_rng(0).uniform(low, high, (settings.TRIED, first.n))
     for robot, name in zip(robots[1:], names[1:], strict=True):
         if robot.joint_names != first.joint_names:

@@ -21,7 +21,7 @@ with the frames. A model carries no information on effects outside it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -57,14 +57,13 @@ class ModelAsFit:
     """Model file in place of a diagnosis and its fit, named ``campaign``.
 
     ``corrected`` are observations of the corrected model at poses within the ranges that were measured, for the rows
-    are gone. There are neither samples nor variants: which other effects were compared the file does not say.
+    are gone. There are no samples, and which other effects were compared the file does not say.
     """
 
     campaign: str
     model: CorrectedModel
     spread: Spread
     corrected: Observations
-    variants: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
     samples: int = 0
 
     @classmethod
@@ -109,10 +108,6 @@ class ModelAsFit:
     def odds(self, name: str) -> float:
         """Even odds of any effect, since a file has no odds."""
         return 1.0
-
-    def probability(self, name: str) -> float:
-        """Probability 0 or 1 of an effect, by its presence."""
-        return float(name in self.verdict)
 
 
 def is_model(path: object) -> bool:
@@ -207,7 +202,7 @@ def _settings(fits: Sequence[Fit | ModelAsFit], names: Sequence[str]) -> Iterato
             sure = len(gate.reads(effect, fit.corrected)), fit.odds(effect.name)
             if not isinstance(effect, Discovered) and sure > known.get(effect.name, ((-1, 0.0), effect))[0]:
                 known[effect.name] = sure, effect
-    for fit in fits:
+    for fit in (one for one in fits if isinstance(one, Fit)):
         for name, variants in fit.variants.items():
             if name in known or not variants or isinstance(variants[0], Discovered):
                 continue
@@ -227,7 +222,7 @@ def _parameters(effect: Effect, fit: Fit | ModelAsFit) -> tuple[Parameter, ...]:
             return ()
         return gate.independent(effect, observations) or gate.checked(effect, observations)
     except EffectError:
-        if effect.name in fit.variants and not isinstance(effect, Discovered):
+        if isinstance(fit, Fit) and effect.name in fit.variants and not isinstance(effect, Discovered):
             raise
         return ()  # a law of what only another campaign recorded
 
