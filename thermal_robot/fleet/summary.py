@@ -251,50 +251,49 @@ def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
 
 
 def _findings(table: Path, campaigns: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the findings by effect and robot: testable, at work, certain; and all cases.
+    """Return the findings by effect and robot: place, known, testable, at work, certain; and all cases.
 
     A case is an effect that is at work in a campaign, or a campaign whose gap no effect explains.
     """
     import pandas as pd
 
-    number = pd.Series(np.arange(len(campaigns)), index=campaigns[CAMPAIGN])
-    robots = campaigns[ROBOT].to_numpy()
+    robot_of = campaigns.set_index(CAMPAIGN)[ROBOT]
     columns = [CAMPAIGN, "rms_before", "rms_after", "effect", "status", "probability", "shrinkage", "quantity"]
     findings, cases = [], []
     for frame in _frames(table, [*columns, "places", "confounded_with", "unexplained"]):
         part = frame[frame["effect"].notna()].copy()
-        part[ROBOT] = robots[number[part[CAMPAIGN]]]
+        part[ROBOT] = robot_of[part[CAMPAIGN]].to_numpy()
         part["known"] = part["quantity"].isna()
         part["effect"] = part["effect"].where(part["known"], "a law of " + part["quantity"].fillna(""))
-        first = [None if places is None or not len(places) else places[0]["name"] for places in part["places"]]
-        placed = np.array([name is not None for name in first], dtype=bool)
-        part["place"] = [name or "" for name in first]
+        part["place"] = [places[0]["name"] if places is not None and len(places) else "" for places in part["places"]]
         part["alone"] = part["status"] != "confounded"
         part["testable"] = part["status"] != "not_testable"
         # of two that are confounded only the one that was fitted has a place
-        part["at_work"] = part["status"].isin(_FOUND) & (part["alone"] | placed)
-        findings.append(part[["effect", ROBOT, "known", "place", "alone", "testable", "at_work"]])
+        part["at_work"] = part["status"].isin(_FOUND) & (part["alone"] | (part["place"] != ""))
+        part["certain"] = part["at_work"] & part["alone"]
+        findings.append(part[["effect", ROBOT, "place", "known", "testable", "at_work", "certain"]])
         doubtful = part["unexplained"].eq(True)
         cases.append(part.loc[part["at_work"] | doubtful].drop(columns=["unexplained", "quantity", "places", "status"]))
     every = pd.concat(cases, ignore_index=True)
     unexplained = ~every.groupby(CAMPAIGN)["at_work"].transform("any") & ~every[CAMPAIGN].duplicated()
-    return pd.concat(findings, ignore_index=True), every[every["at_work"] | unexplained]
+    # the place is that of the first campaign in which the effect is at work
+    first = pd.concat(findings, ignore_index=True).sort_values("at_work", ascending=False, kind="stable")
+    flags = dict.fromkeys(("testable", "at_work", "certain"), "any")
+    per_robot = first.groupby(["effect", ROBOT], sort=False).agg({"place": "first", "known": "all", **flags})
+    return per_robot.reset_index(), every[every["at_work"] | unexplained]
 
 
 def _counts(findings: pd.DataFrame) -> tuple[Count, ...]:
     counts = []
     for effect, rows in findings.groupby("effect", sort=False):
-        at_work = rows[rows["at_work"]]
-        found = at_work.drop_duplicates(ROBOT)
-        places = Counter(place for place in found["place"] if place)
-        beyond_doubt = at_work.loc[at_work["alone"], ROBOT].nunique()
+        found = rows[rows["at_work"]]
         counts.append(
             Count(
                 effect=str(effect),
                 found=len(found),
-                testable=rows.loc[rows["testable"] | rows["at_work"], ROBOT].nunique(),
-                confounded=len(found) - beyond_doubt,
-                places=dict(places.most_common()),
+                testable=int(rows["testable"].sum()),
+                confounded=int((~found["certain"]).sum()),
+                places=dict(Counter(place for place in found["place"] if place).most_common()),
                 parameters=bool(rows["known"].all()),
             )
         )
@@ -323,18 +322,16 @@ def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, .
 
     striking, tests = [], 0
     for label in robots.columns:
-        for effect, rows in findings.groupby("effect", sort=False):
-            tried = rows.loc[rows["testable"] | rows["at_work"], ROBOT].unique()
-            in_group = robots.loc[tried, label].value_counts()
-            found = robots.loc[rows.loc[rows["at_work"], ROBOT].unique(), label].value_counts()
-            found, (every, all_found) = found.reindex(in_group.index, fill_value=0), (len(tried), int(found.sum()))
-            asked = in_group[(in_group >= settings.FEWEST_IN_GROUP) & (in_group < every)]
-            tests += len(asked)
-            own = found[asked.index]
-            chances = hypergeom.sf(own - 1, every, all_found, asked).tolist()
-            for group, here, robots_here, p in zip(asked.index, own, asked, chances, strict=True):
-                counts = int(here), int(robots_here), all_found - int(here), every - int(robots_here)
-                striking.append(Gathered(str(effect), label, str(group), *counts, p))
+        group = findings[ROBOT].map(robots[label]).rename("group")
+        tested = findings[findings["testable"]].groupby(["effect", group])["at_work"]
+        counts = tested.agg(found="sum", robots="size")
+        every = counts.groupby("effect").transform("sum")
+        asked = (counts["robots"] >= settings.FEWEST_IN_GROUP) & (counts["robots"] < every["robots"])
+        tests += int(asked.sum())
+        here, every = counts[asked], every[asked]
+        chance = hypergeom.sf(here["found"] - 1, every["robots"], every["found"], here["robots"])
+        told = here.join((every - here).add_suffix("_elsewhere")).assign(p_value=chance).reset_index()
+        striking += [Gathered(label=label, **row) for row in told.to_dict("records")]
     fair = [replace(g, p_value=min(g.p_value * tests, 1.0)) for g in striking]
     kept = sorted((g.p_value, g.effect, g.label, g.group, g) for g in fair if g.p_value < settings.STRIKING)
     return tuple(g for *_, g in kept[: settings.MOST_LISTED])
