@@ -100,11 +100,6 @@ class ModelAsFit:
         held = ", ".join(dict.fromkeys(effect.title for effect, _ in self.effects))
         return f"A model file; it holds {held or 'no effect'}."
 
-    @property
-    def about(self) -> Mapping[str, str]:
-        """What the campaign behind it said of itself."""
-        return self.model.settings.about
-
     def odds(self, name: str) -> float:
         """Even odds of any effect, since a file has no odds."""
         return 1.0

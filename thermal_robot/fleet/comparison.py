@@ -251,7 +251,8 @@ class Comparison(RenderedPage):
             robot=self.robot,
             tool_frame=self.tool_frame,
             campaigns=[
-                {"name": name, "samples": count, "diagnosis": d.summary, "about": d.about} for name, count, d in told
+                {"name": name, "samples": count, "diagnosis": d.summary, "about": d.model.settings.about}
+                for name, count, d in told
             ],
             verdict={"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
             effects=[asdict(effect) for effect in self.effects],

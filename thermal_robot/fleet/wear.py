@@ -284,11 +284,9 @@ def results(
     for number, chance in enumerate(chances(series, next(iter(found))).tolist()):
         ways = moves_of(found, number)
         alarm = bool(series.followed[number]) and chance <= false_alarm and bool(ways)
-        kinds = dict.fromkeys(("constant", *settings.KINDS), 0.0)
-        for way, probability in ways.items():
-            kinds[way.kind] += probability
-        kinds["constant"] = max(1.0 - sum(kinds.values()), 0.0)
-        kind = max(kinds, key=lambda k: kinds[k] if not alarm or k != "constant" else -1.0)
+        moving = {kind: sum((p for way, p in ways.items() if way.kind == kind), 0.0) for kind in settings.KINDS}
+        kinds = {"constant": max(1.0 - sum(moving.values()), 0.0), **moving}
+        kind = max(moving if alarm else kinds, key=kinds.__getitem__)
         move = max((way for way in ways if way.kind == kind), key=ways.__getitem__, default=None)
         worn, line, covariance = _over_time(problem, series, number, _beside(found, number, move))
         worn = replace(worn, chance=chance, alarm=alarm, moved=1.0 - kinds["constant"], kind=kind, kinds=kinds)
@@ -310,14 +308,15 @@ def _beside(found: Mapping[Moves, float], parameter: int, move: Move | None) -> 
 
 def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> tuple[Worn, Array, Array]:
     """Parameter under some moves: (2,) last value and change, and (2, 2) their covariance, SI."""
-    bare, followed, size = problem.parameters[number], bool(series.followed[number]), problem.parameters[number].size
+    bare, followed = problem.parameters[number], bool(series.followed[number])
+    size, has = bare.size, problem.has[:, number]
     state, free = State.of(series, moves), State.of(series, moves, free=number)
     path = state.path(number)
     line, covariance = state.combinations(np.stack([path[-1], path[-1] - path[0]]))
     line, covariance = size * line, size**2 * covariance
     values, spread = free.combinations(free.path(number))
-    stds, seen = np.sqrt(np.maximum(np.diag(spread), 0.0)), problem.has[:, number] & followed
-    reason = ABSENT if problem.has[:, number].sum() < 2 else HIDDEN
+    stds, seen = np.sqrt(np.maximum(np.diag(spread), 0.0)), has & followed
+    reason = ABSENT if has.sum() < 2 else HIDDEN
     worn = Worn(
         effect=problem.keys[number][0],
         title=problem.titles[number],
