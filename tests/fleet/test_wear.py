@@ -19,7 +19,6 @@ from thermal_robot.fleet import settings
 from thermal_robot.fleet.wear import as_date, comparable, days_since, moment, results
 from thermal_robot.fleet.wear_moves import (
     Beside,
-    Grid,
     Move,
     State,
     chances,
@@ -465,7 +464,7 @@ def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_consta
     states[:, 1] += rng.normal(size=5)
     values = measured(design, states, rng)
     series = series_of(design, values, np.arange(5.0))
-    state = State.of(series, (), free=1, grid=Grid(np.ones(1), np.ones(1), np.zeros(1)))
+    state = State.of(series, (Move(1, "walk"),), free=1)
     found, covariance = state.combinations(state.path(1))
     rows = design.shape[1]
     whole = np.zeros((5 * rows, 2 + 5))

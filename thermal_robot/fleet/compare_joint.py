@@ -256,16 +256,10 @@ def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
 
     changes = tuple(replace(c, probability=probability(alike(c.part))) for c in changes)
     of_effects = ({k for k, p in enumerate(parts) if p.effect == e} for e in range(len(listed)))
-    at_work, values, start = (
-        tuple(parts[b] for b in best.blocks),
-        np.zeros((len(statistics), len(statistics[0].vector))),
-        0,
-    )
-    mode = search.gram.posterior(best)[0]
-    for part in at_work:
-        end = start + part.basis.shape[1]
-        values[np.ix_(part.where, part.parameters)] += part.basis @ mode[start:end]
-        start = end
+    at_work, values = tuple(parts[b] for b in best.blocks), np.zeros((len(statistics), len(statistics[0].vector)))
+    ends = np.cumsum([part.basis.shape[1] for part in at_work], dtype=int)
+    for part, own in zip(at_work, np.split(search.gram.posterior(best)[0], ends), strict=False):
+        values[np.ix_(part.where, part.parameters)] += part.basis @ own
     return Joint(at_work, changes, values, tuple(map(probability, of_effects)), looked_at)
 
 

@@ -268,9 +268,9 @@ class State:
     covariance: Array
 
     @classmethod
-    def of(cls, series: Series, moves: Sequence[Move], free: int | None = None, grid: Grid | None = None) -> State:
+    def of(cls, series: Series, moves: Sequence[Move], free: int | None = None) -> State:
         """Posterior at the most probable scale and overdispersion, one parameter ``free`` in each campaign."""
-        grid = grid or series.grid
+        grid = series.grid
         point = int(np.argmax(Beside.of(series, moves, grid).log_likelihood))
         inflation = float(grid.inflation[point])
         columns, share = series.made_of([move for move in moves if move.parameter != free])

@@ -106,8 +106,6 @@ def problem(fits: Sequence[Fit]) -> Problem:
         matrices, vectors = (np.array(each) for each in zip(*parts, strict=True))
         total = matrices.sum(axis=0) + np.eye(len(keys)) / settings.WIDE**2
         values = sizes * np.linalg.solve(total, vectors.sum(axis=0))
-        for visit in visits:
-            visit.step(values)
     titles = {effect.name: effect.title for effect in shared}
     has = np.array([visit.here for visit in visits])
     return Problem(keys, bare, tuple(titles[name] for name, _ in keys), matrices, vectors, has)
@@ -156,7 +154,7 @@ class _Visit:
     """One campaign, linearised about the common model.
 
     ``here`` (P,) tells which of the common parameters it can tell; ``common`` are these with their responses in its
-    rows, ``own`` its own; ``linear`` is the last linearisation, about ``frames``.
+    rows, ``own`` its own; ``linear`` is the last linearisation, about ``frames``, ``None`` before the first.
     """
 
     fit: Fit
@@ -165,21 +163,25 @@ class _Visit:
     own: tuple[Parameter, ...]
     whitening: Whitening
     frames: Frames
-    linear: Linear
+    linear: Linear | None = None
 
     @classmethod
     def of(cls, fit: Fit, keys: Sequence[Key], given: dict[Key, Parameter]) -> _Visit:
         """Responses of the common parameters in a campaign's rows; none for an effect whose columns it lacks."""
         fresh = [effect for effect, _ in fit.effects if _independent_per_campaign(effect, fit.nominal)]
         own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
-        white, linear = fit.explanation.whitening, fit.explanation.linear
+        white = fit.explanation.whitening
         white = replace(white, noise=white.noise * fit.explanation.best.noise)
         common = tuple(given[key] for key in keys if key in given)
-        return cls(fit, np.array([key in given for key in keys]), common, own, white, fit.nominal.frames, linear)
+        return cls(fit, np.array([key in given for key in keys]), common, own, white, fit.nominal.frames)
 
     def products(self, sizes: Array, values: Array) -> tuple[Array, Array]:
-        """Return the normal equations (P, P) and (P,) about values of the common parameters."""
+        """Return the normal equations (P, P) and (P,) about values of the common parameters, frames refitted."""
         here, campaign = self.here, self.fit.campaign
+        if self.linear is not None:
+            common = self.linear.blocks[0].columns[:, :, : here.sum()]
+            step = frame_step(self.linear, self.whitening, self.linear.gap - common @ values[here])
+            self.frames = moved(self.frames, step, frame_columns(self.fit.nominal)[1])
         nominal = observe(campaign, self.frames)
         change, instrument = displacement(nominal, [(_GivenParameters(given=self.common), values[here])])
         seen = observe(campaign, self.frames, displacement=change, instrument=instrument)
@@ -192,13 +194,6 @@ class _Visit:
         flat = self.linear.frames.shape[2]
         matrix[np.ix_(here, here)], vector[here] = _without_own(full, flat, scale, int(here.sum()))
         return matrix, vector
-
-    def step(self, values: Array) -> None:
-        """Refit the frames to new values of the common parameters."""
-        common = self.linear.blocks[0].columns[:, :, : self.here.sum()]
-        if self.linear.frames.shape[2]:
-            step = frame_step(self.linear, self.whitening, self.linear.gap - common @ values[self.here])
-            self.frames = moved(self.frames, step, frame_columns(self.fit.nominal)[1])
 
 
 def _reported_parameters(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:
