@@ -16,7 +16,7 @@ from wear_cases import by_hand, columns, jumping, measured, series_of
 from thermal_robot import CampaignError, EffectError, diagnose, load_robot, simulate, wear
 from thermal_robot.effects import Parameter, choose
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.wear import as_date, comparable, days_since, moment, results
+from thermal_robot.fleet.wear import as_date, comparable, moment, results
 from thermal_robot.fleet.wear_moves import (
     Beside,
     Move,
@@ -53,6 +53,7 @@ def test_the_jump_is_found(found):
     assert (rings.place, rings.kind, rings.jump.after) == ("joint_3", "jump", 1)
     assert abs(rings.jump.size - 3e-4) < 4.0 * rings.jump.std
     assert {w.place for w in found.parameters if not w.comparable} == {"joint_1", "joint_5"}
+    assert [visit.time for visit in found.campaigns] == [0.0, 30.0, 60.0, 90.0]
 
 
 @pytest.mark.slow
@@ -121,9 +122,7 @@ def test_a_date_is_a_moment_and_what_is_none_is_told_with_an_example(given, mean
         assert moment(given) == meant
 
 
-def test_days_count_from_the_first_through_a_leap_day_and_are_told_as_dates():
-    days = days_since([datetime(2028, 3, 1), datetime(2028, 2, 28), datetime(2028, 2, 28, 12)])
-    np.testing.assert_allclose(days, [2.0, 0.0, 0.5])
+def test_a_day_after_the_first_is_told_as_a_date_through_a_leap_day():
     assert as_date(datetime(2028, 2, 28), 2.0) == "2028-03-01"
     assert as_date(datetime(2028, 2, 28), 1e12) == "later than 9999"
 

@@ -30,7 +30,7 @@ class Population:
     """Posterior of one quantity over n robots in G groups.
 
     ``means`` and their ``deviations`` (G,); ``spread`` between robots of a group, one sigma, and how well it is known;
-    ``apart`` (n,) the probability that a robot is unlike its group; ``counts`` (G,) robots.
+    ``apart`` (n,) the probability that a robot is unlike its group.
     """
 
     means: Array
@@ -38,7 +38,6 @@ class Population:
     spread: float
     spread_std: float
     apart: Array
-    counts: Codes
 
     @property
     def nothing(self) -> float:
@@ -48,7 +47,7 @@ class Population:
     @property
     def p_equal_means(self) -> float:
         """P-value of equal group means: F test."""
-        groups, robots = len(self.means), int(self.counts.sum())
+        groups, robots = len(self.means), len(self.apart)
         weight = self.deviations**-2.0
         about = self.means - (weight * self.means).sum() / weight.sum()
         return float(fdtrc(groups - 1, robots - groups, (weight * about**2).sum() / (groups - 1)))
@@ -75,7 +74,6 @@ def population(values: Array, deviations: Array, groups: Codes | None = None) ->
         unit * spread,
         unit * float(np.sqrt(weight @ (tau - spread) ** 2)),
         unlike,
-        np.diff(np.append(starts, len(y))),
     )
 
 

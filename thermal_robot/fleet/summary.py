@@ -404,7 +404,7 @@ def _compared(
     if not splits:
         return found, usual, unlike
     label, by, kept, own, names = min(splits, key=lambda split: split[1].p_equal_means)
-    per_group = zip(names, by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
+    per_group = zip(names, np.bincount(own).tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
     groups_told = sorted(
         (Group(*group) for group in per_group), key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group)
     )

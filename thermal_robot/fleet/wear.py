@@ -30,8 +30,6 @@ from thermal_robot.inference.fit import Fit, fit
 One: TypeAlias = "Campaign | Diagnosis | str | Path"
 _EXPECTED = "campaigns, diagnoses or paths, or pairs (date, campaign)"
 _A_DATE = "a date such as 2026-03-01, with an hour if need be, such as 2026-03-01T14:30"
-_DAY = 86400.0
-"""Seconds."""
 HIDDEN = "unknown frames, or the poses, hide its changes"
 ABSENT = "fewer than two campaigns have the columns that it needs"
 
@@ -129,7 +127,8 @@ def of_fits(
     """
     require_alike(fits)
     whole = problem(fits)
-    times = days_since(moments) if moments else np.arange(float(len(fits)))
+    days = [(each - moments[0]) / timedelta(days=1) for each in moments]
+    times = np.array(days or range(len(fits)), dtype=float)
     series = Series(whole.matrices, whole.vectors, times, np.ones(len(whole.keys), dtype=bool))
     series = replace(series, followed=comparable(whole, series))
     found = explanations(series)
@@ -245,12 +244,6 @@ def moment(given: Any) -> datetime:
     if not isinstance(found, datetime):
         return datetime(found.year, found.month, found.day)
     return found if found.tzinfo is None else found.astimezone(timezone.utc).replace(tzinfo=None)
-
-
-def days_since(moments: Sequence[datetime]) -> NDArray[np.float64]:
-    """Days (K,) since the first of some times."""
-    first = min(moments)
-    return np.array([(each - first).total_seconds() / _DAY for each in moments])
 
 
 def as_date(first: datetime, day: float) -> str:
