@@ -19,11 +19,6 @@ STEP = 4e-4  # rad: some eight deviations of the difference
 
 
 @pytest.fixture(scope="module")
-def arm():
-    return tr.load_robot("builtin:rv_m2", "tool0")
-
-
-@pytest.fixture(scope="module")
 def before():
     return diagnosed(1)
 
@@ -118,9 +113,9 @@ def test_campaigns_and_paths_are_diagnosed_on_the_way(tmp_path):
     assert any(line.startswith("campaign 2 of 2: ") for line in statistics)
 
 
-def test_what_one_campaign_cannot_tell_is_not_compared(arm):
-    warm = tr.simulate(arm, {"thermal_elongation": 2e-5}, rows=50, noise=2e-5, seed=1)
-    cold = tr.simulate(arm, rows=50, noise=2e-5, seed=2, conditions={"temperature": None})
+def test_what_one_campaign_cannot_tell_is_not_compared(rv_m2):
+    warm = tr.simulate(rv_m2, {"thermal_elongation": 2e-5}, rows=50, noise=2e-5, seed=1)
+    cold = tr.simulate(rv_m2, rows=50, noise=2e-5, seed=2, conditions={"temperature": None})
     found = tr.compare(warm, cold, only="thermal_elongation", names=["warm", "cold"])
     own = found.effect("thermal_elongation")
     assert (own.status, own.reason) == ("not_compared", "warm alone can tell it")
@@ -147,12 +142,12 @@ def test_what_cannot_be_compared_is_refused(before):
         tr.compare(before, replace(before, fit=None))
 
 
-def test_another_robot_is_refused_in_words(arm, before):
+def test_another_robot_is_refused_in_words(rv_m2, before):
     ur5 = tr.load_robot("example-robot-data:ur5", "tool0")
-    own = re.search(r"<joint name=\"joint_3\".*?</joint>", arm.urdf, flags=re.DOTALL).group(0)
+    own = re.search(r"<joint name=\"joint_3\".*?</joint>", rv_m2.urdf, flags=re.DOTALL).group(0)
     x, *rest = re.search(r'xyz="([^"]*)"', own).group(1).split()
     moved = re.sub(r'xyz="[^"]*"', f'xyz="{float(x) + 0.001} {" ".join(rest)}"', own, count=1)
-    longer = tr.load_robot(arm.urdf.replace(own, moved), "tool0")
+    longer = tr.load_robot(rv_m2.urdf.replace(own, moved), "tool0")
     for robot, statistics in (
         (ur5, r"is of another robot than .*: their joints differ.*shoulder_pan_joint.*joint_1"),
         (longer, r"described by another nominal model than .*up to (1|0\.99\d*) mm away"),

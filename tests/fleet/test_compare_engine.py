@@ -213,10 +213,6 @@ def day_sums(days, of_days):
     return [sums(d, d.fit, of_days, k) for k, d in enumerate(days)]
 
 
-def names(of_days):
-    return [p.name for item in of_days for p in item.compared]
-
-
 def test_it_is_least_squares_with_free_frames(day_sums, of_days, days):
     """The parameters that a campaign says are those of a fit by finite differences of its own robot."""
     fit = days[0].fit
@@ -238,7 +234,8 @@ def test_it_is_least_squares_with_free_frames(day_sums, of_days, days):
         slope = [(predicted(state + d) - predicted(state - d)) / 2e-3 for d in 1e-3 * np.eye(12)]
         columns = np.stack([(s * weight).ravel() for s in slope], axis=1)
         state = state + np.linalg.lstsq(columns, (left * weight).ravel())[0]
-    where = [names(of_days).index(f"zero offset, joint_{k}") for k in (2, 3, 4)]
+    names = [p.name for item in of_days for p in item.compared]
+    where = [names.index(f"zero offset, joint_{k}") for k in (2, 3, 4)]
     alone = day_sums[0].some(where)
     values = np.linalg.solve(alone.matrix, alone.vector)
     spread = np.sqrt(np.linalg.inv(alone.matrix).diagonal())
@@ -317,9 +314,8 @@ def test_a_model_says_what_the_rows_said_without_the_prior(times):
 
 
 @pytest.mark.slow
-def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_without_effects_nothing():
-    robot = load_robot("builtin:rv_m2", "tool0")
-    one = tr.diagnose(tr.simulate(robot, {"joint_gain": {"joint_3": 3e-3}}, rows=50, noise=NOISE, seed=1))
+def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_without_effects_nothing(rv_m2):
+    one = tr.diagnose(tr.simulate(rv_m2, {"joint_gain": {"joint_3": 3e-3}}, rows=50, noise=NOISE, seed=1))
     ((effect, _),) = one.model.effects
     assert effect.places == ("joint_3",)
     _, model, keys, of_days = of_both(one, diagnosed(2))
@@ -331,7 +327,7 @@ def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_
     k = keys.index("joint_gain: gain error, joint_3")
     size = np.concatenate([item.sizes for item in of_days])[k]
     assert model.vector[k] / model.matrix[k, k] * size == pytest.approx(3e-3, rel=0.05)
-    sound = tr.diagnose(tr.simulate(robot, rows=40, noise=NOISE, seed=2), only="joint_gain")
+    sound = tr.diagnose(tr.simulate(rv_m2, rows=40, noise=NOISE, seed=2), only="joint_gain")
     assert sound.model.effects == ()
     _, model, *_ = of_both(sound, diagnosed(1))
     assert not model.matrix.any()
@@ -339,13 +335,12 @@ def test_a_model_with_an_effect_in_one_joint_says_nothing_of_the_others_and_one_
 
 
 @pytest.mark.slow
-def test_geometry_is_told_in_the_parameters_of_a_diagnosis():
-    robot = load_robot("builtin:rv_m2", "tool0")
+def test_geometry_is_told_in_the_parameters_of_a_diagnosis(rv_m2):
     names = [
         f"rotation {axis} of joint_{k}, {link}" for k, link in ((2, "shoulder"), (3, "upper_arm")) for axis in "xyz"
     ]
     bent = {"geometric": dict(zip(names, (4e-4, -6e-4, 5e-4, 3e-4, -5e-4, 6e-4), strict=True))}
-    found = tr.diagnose(tr.simulate(robot, bent, rows=80, noise=NOISE, seed=4), only=["geometric"])
+    found = tr.diagnose(tr.simulate(rv_m2, bent, rows=80, noise=NOISE, seed=4), only=["geometric"])
     assert found.verdict == ("geometric",)
     both = tr.compare(found.model, found, names=["file", "rows"])
     assert both.changes == ()
