@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from scipy.special import chdtrc
@@ -63,7 +63,6 @@ from thermal_robot.prediction import Spread, by_parameters, sensitivity
 from thermal_robot.robot import Robot, joint_range
 
 CALL = "compare()"
-_ORDER = ("shared", "changed", "contradicts", "not_needed", "not_compared", "absent")
 
 
 def compare(
@@ -172,7 +171,8 @@ def _compared(
     progress("what is shared, what differs")
     together = joint(listed, statistics)
     progress("predictions")
-    effects = sorted(_effects(listed, together, statistics, names), key=lambda e: (_ORDER.index(e.status), e.name))
+    order = get_args(Status)
+    effects = sorted(_effects(listed, together, statistics, names), key=lambda e: (order.index(e.status), e.name))
     pairs = combinations(zip(found, names, strict=True), 2)
     return Comparison(
         campaigns=names,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
+"""Of an effect, in the order in which effects are listed."""
 
 
 @dataclass(frozen=True)
