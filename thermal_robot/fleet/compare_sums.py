@@ -68,13 +68,7 @@ class ModelAsFit:
 
     @classmethod
     def of(cls, model: CorrectedModel, name: str) -> ModelAsFit:
-        """Wrap a model under a name.
-
-        Raises
-        ------
-        CampaignError
-            If it depends on a simulator, or lacks its uncertainty.
-        """
+        """Wrap a model under a name; :class:`CampaignError` if it depends on a simulator, or lacks its uncertainty."""
         if model.simulated:
             problem = "this model corrects a simulator's predictions, which it does not hold"
             raise CampaignError(name, problem, expected="its campaign")

@@ -47,12 +47,8 @@ def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
     The source is a folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels,
     whose levels ``names`` names from the top, ``level_1`` and so on where left out. Or it is a list: CSV, or TOML with
     ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on, and whose other
-    columns are labels.
-
-    Raises
-    ------
-    CampaignError
-        No such folder or file, one without campaigns, a campaign listed twice, a label that cannot be one.
+    columns are labels. Raises :class:`CampaignError` on no such folder or file, one without campaigns, a campaign
+    listed twice, a label that cannot be one.
     """
     require("diagnose_many()", source, (str, os.PathLike), "the path of a folder, or of a list of campaigns")
     path = Path(source)

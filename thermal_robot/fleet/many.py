@@ -325,10 +325,7 @@ _BEGIN = """
 def opened(file: Path) -> Iterator[Done]:
     """Open or create the store; it is flushed to disk in any case.
 
-    Raises
-    ------
-    CampaignError
-        If another run has it, or it is another file.
+    Raises :class:`CampaignError` if another run has it, or it is another file.
     """
     with closing(sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)) as database:
         try:
@@ -394,10 +391,7 @@ def _local(distributed: Any, workers: int) -> Any:
 def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Iterator[tuple[str, Any, str]]:
     """Run tasks, a few at a time: yield each key with its answer, or with its error.
 
-    Raises
-    ------
-    ThermalRobotError
-        If the scheduler is lost.
+    Raises :class:`ThermalRobotError` if the scheduler is lost.
     """
     distributed = needed("distributed")
     ended: list[Task] = []

@@ -76,13 +76,7 @@ OWN = (CAMPAIGN, *_COLUMNS)
 
 
 def needed(module: str) -> Any:
-    """Import a module of the extra ``fleet``, or say how to install it.
-
-    Raises
-    ------
-    ThermalRobotError
-        If it is not installed; says how to.
-    """
+    """Import a module of the extra ``fleet``; :class:`ThermalRobotError` says how to install it if it is missing."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -155,10 +149,7 @@ def schema(labels: Sequence[str]) -> pa.Schema:
 def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None:
     """Write the table by an atomic replace, in small memory; equal rows give equal bytes.
 
-    Raises
-    ------
-    OSError
-        As :func:`~thermal_robot.files.whole`.
+    Raises as :func:`~thermal_robot.files.whole`.
     """
     pa, columns, left = needed("pyarrow"), schema(labels), iter(rows)
     parquet = needed("pyarrow.parquet")

@@ -118,12 +118,8 @@ def of_fits(
 ) -> Wear:
     """Change-point analysis of K fitted campaigns of one robot, in the order of time.
 
-    ``moments`` are K dates, none where they are not known; limits and false alarm are as for :func:`wear`.
-
-    Raises
-    ------
-    CampaignError
-        If they are of different robots.
+    ``moments`` are K dates, none where they are not known; limits and false alarm are as for :func:`wear`. Raises
+    :class:`CampaignError` if they are of different robots.
     """
     require_alike(fits)
     whole = problem(fits)
@@ -228,10 +224,7 @@ def _limits(limits: Mapping[str, float]) -> dict[str, float]:
 def moment(given: Any) -> datetime:
     """Parse a date as a time: midnight without an hour, converted to UTC from a time zone.
 
-    Raises
-    ------
-    CampaignError
-        If it is no date.
+    Raises :class:`CampaignError` if it is no date.
     """
     found = given
     if isinstance(given, str):

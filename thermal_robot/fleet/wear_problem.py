@@ -56,13 +56,7 @@ class Problem:
 
 
 def require_alike(fits: Sequence[Fit]) -> None:
-    """Refuse campaigns of different robots.
-
-    Raises
-    ------
-    CampaignError
-        Naming the campaign that is of another robot than the first.
-    """
+    """Refuse campaigns of different robots; :class:`CampaignError` names one that is of another than the first."""
     first, robot = fits[0].campaign, fits[0].campaign.robot
     for campaign in (fit.campaign for fit in fits[1:]):
         other = campaign.robot
@@ -85,10 +79,7 @@ def require_alike(fits: Sequence[Fit]) -> None:
 def problem(fits: Sequence[Fit]) -> Problem:
     """Joint problem of fitted campaigns in the order of time, by Gauss-Newton on common values.
 
-    Raises
-    ------
-    EstimationError
-        If the unknown frames of one cannot be fitted.
+    Raises :class:`EstimationError` if the unknown frames of one cannot be fitted.
     """
     shared = _shared([effect for fit in fits for effect, _ in fit.effects], fits[0].nominal)
     reported = [
