@@ -164,16 +164,15 @@ def candidates(
     """
     listed: list[Candidate] = []
     for key, effect in _settings(fits, names):
-        law = isinstance(effect, Discovered)
-        if law:  # a diagnosis names a law only as it is
+        if isinstance(effect, Discovered):  # a diagnosis names a law only as it is
             named = tuple(any(own == effect for own, _ in fit.effects) for fit in fits)
         else:
             named = tuple(effect.name in diagnosis.verdict for diagnosis in found)
         parameters = [_parameters(effect, fit) for fit in fits]
         known = next((c for c, own in enumerate(parameters) if own), None)
-        if known is None or (law and not any(named)):
+        if known is None:
             continue
-        compared = tuple(replace(p, responses=()) for p in parameters[known])
+        compared = tuple(p.bare for p in parameters[known])
         kept = tuple(own if [p.name for p in own] == [p.name for p in compared] else () for own in parameters)
         title = f"{called(effect)} ({key.split(' of ')[1]})" if isinstance(effect, Discovered) else effect.title
         listed.append(Candidate(key, title, effect, compared, _sizes(effect, fits[known], compared), kept, named))

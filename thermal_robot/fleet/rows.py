@@ -168,8 +168,8 @@ def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
     own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}
     linear, problem = e.linear, e.problem
     known = {effect.name: effect for effect in choose()}
-    variants = (gate.variants(known[name], fit.nominal) for name in names if name in known and name not in own)
-    further = [block(fit.corrected, settings_of[0]) for settings_of in variants if settings_of]
+    asked = [known[name] for name in names if name in known and name not in own]
+    further = [block(fit.corrected, gate.variants(effect, fit.nominal)[0]) for effect in asked]
     if further:
         own |= {item.effect.name: len(linear.blocks) + k for k, item in enumerate(further)}
         linear = Linear(linear.gap, linear.frames, (*linear.blocks, *further))

@@ -89,7 +89,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
     listed: dict[Key, Parameter] = {}
     for one in reported:
         listed |= {key: parameter for key, parameter in one.items() if key not in listed}
-    keys, bare = tuple(listed), tuple(replace(parameter, responses=()) for parameter in listed.values())
+    keys, bare = tuple(listed), tuple(parameter.bare for parameter in listed.values())
     sizes, values = np.array([parameter.size for parameter in bare]), np.zeros(len(keys))
     visits = [_Visit.of(fit, keys, one) for fit, one in zip(fits, reported, strict=True)]
     for _ in range(settings.LINEARISATIONS):
