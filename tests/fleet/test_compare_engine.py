@@ -198,24 +198,21 @@ def test_a_parameter_that_repeats_another_is_told_once():
 # ---- what a campaign or its model says
 
 
-@pytest.fixture(scope="module")
-def days():
-    return [diagnosed(1), diagnosed(2, frame="there", noise=2 * NOISE)]
+def of_both(found, other):
+    """What a campaign, and the model of its diagnosis, say beside another one, by the parameters' names."""
+    fits, model = [found.fit, other.fit], ModelAsFit.of(found.model, "a")
+    of_days = candidates([found, other], fits, ["a", "b"])
+    of_model = {item.name: item for item in candidates([model, other], [model, other.fit], ["a", "b"])}
+    assert {*of_model} <= {item.name for item in of_days}
+    same = [replace(i, parameters=of_model[i.name].parameters if i.name in of_model else ((), ())) for i in of_days]
+    keys = [f"{item.name}: {p.name}" for item in of_days for p in item.compared]
+    return sums(found, found.fit, of_days, 0), sums(model, model, same, 0), keys, of_days
 
 
-@pytest.fixture(scope="module")
-def of_days(days):
-    return candidates(days, [d.fit for d in days], ["a", "b"])
-
-
-@pytest.fixture(scope="module")
-def day_sums(days, of_days):
-    return [sums(d, d.fit, of_days, k) for k, d in enumerate(days)]
-
-
-def test_it_is_least_squares_with_free_frames(day_sums, of_days, days):
+def test_it_is_least_squares_with_free_frames():
     """The parameters that a campaign says are those of a fit by finite differences of its own robot."""
-    fit = days[0].fit
+    fit = diagnosed(1).fit
+    told, _, keys, _ = of_both(diagnosed(1), diagnosed(2, frame="there", noise=2 * NOISE))
     robot, q, frames = fit.campaign.robot, fit.campaign.q, fit.corrected.frames
     kept = ~fit.explanation.outliers
 
@@ -234,9 +231,7 @@ def test_it_is_least_squares_with_free_frames(day_sums, of_days, days):
         slope = [(predicted(state + d) - predicted(state - d)) / 2e-3 for d in 1e-3 * np.eye(12)]
         columns = np.stack([(s * weight).ravel() for s in slope], axis=1)
         state = state + np.linalg.lstsq(columns, (left * weight).ravel())[0]
-    names = [p.name for item in of_days for p in item.compared]
-    where = [names.index(f"zero offset, joint_{k}") for k in (2, 3, 4)]
-    alone = day_sums[0].some(where)
+    alone = told.some([keys.index(f"joint_offset: zero offset, joint_{k}") for k in (2, 3, 4)])
     values = np.linalg.solve(alone.matrix, alone.vector)
     spread = np.sqrt(np.linalg.inv(alone.matrix).diagonal())
     assert (np.abs(values - state[:3]) < 0.02 * spread).all()
@@ -290,17 +285,6 @@ def test_a_base_that_rocks_does_not_tell_where_it_stands():
     # nothing is told to no better than some expected sizes, which rounding apart is told to none
     assert not ((compared > 1e-9) & (compared < 0.01)).any()
     assert (compared > 1.0).sum() > 10
-
-
-def of_both(found, other):
-    """What a campaign, and the model of its diagnosis, say beside another one, by the parameters' names."""
-    fits, model = [found.fit, other.fit], ModelAsFit.of(found.model, "a")
-    of_days = candidates([found, other], fits, ["a", "b"])
-    of_model = {item.name: item for item in candidates([model, other], [model, other.fit], ["a", "b"])}
-    assert {*of_model} <= {item.name for item in of_days}
-    same = [replace(i, parameters=of_model[i.name].parameters if i.name in of_model else ((), ())) for i in of_days]
-    keys = [f"{item.name}: {p.name}" for item in of_days for p in item.compared]
-    return sums(found, found.fit, of_days, 0), sums(model, model, same, 0), keys, of_days
 
 
 @pytest.mark.parametrize("times", some([5.0, 1.0], 2))
