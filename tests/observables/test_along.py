@@ -126,3 +126,14 @@ def test_the_noise_floor_is_that_of_the_components_that_a_row_sees(ur10, kind, s
     gap = tr.diagnose(campaign, only=["backlash", "joint_gain"]).gap
     assert gap.noise_floor == pytest.approx(5e-5 * np.sqrt(seen), rel=1e-9)
     assert 0.8 < gap.rms_after / gap.noise_floor < 1.3
+
+
+def test_a_series_of_distances_shows_the_zero_that_moved(ur10):
+    """A draw wire's rows alone: the elbow's zero moves by 1 mrad before the third of four campaigns."""
+    elbow, series = np.arange(ur10.n) == 2, []
+    for number in range(4):
+        rows = read_as(measured(ur10, noise=2e-5, rows=60, seed=number), ["distance"])
+        series.append(replace(rows, name=f"number {number}", q=rows.q - (number >= 2) * 1e-3 * elbow))
+    (alarm,) = tr.wear(series, effects=["joint_offset"]).alarms
+    assert (alarm.place, alarm.kind) == ("elbow_joint", "jump")
+    assert alarm.change == pytest.approx(1e-3, abs=4.0 * alarm.change_std)

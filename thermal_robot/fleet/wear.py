@@ -180,8 +180,6 @@ def _fitted(given: Campaign | Diagnosis, candidates: Sequence[Effect]) -> Fit:
             why = given.reason if given.fit is not None else "was made without its fit: give the campaign itself"
             raise CampaignError(given.campaign, f"this diagnosis cannot be compared: {why}")
         return given.fit
-    if given.position is None or not given.samples:
-        raise CampaignError(given.name, "nothing was measured", expected="a campaign with measured positions")
     found = fit(with_corrected_signs(usable(given)[0]), candidates)
     if another_motion(found) is not None:
         expected = "a campaign that `thermal-robot diagnose` can use; it says what is wrong"
