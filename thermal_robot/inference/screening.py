@@ -591,7 +591,7 @@ def _varying_responses(parameter: Parameter) -> Iterator[Response]:
     yield from (r for r in parameter.responses if r.values.ndim == (1 if r.channel == "joint" else 2))
 
 
-def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
+def interactions(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
     """Interactions of two quantities, 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
     turns = components(observations.campaign) == 6
@@ -737,7 +737,7 @@ def _candidates(cache: ScanCache, effects: Iterable[Effect] | None) -> dict[str,
         "wave": [law for law in first if law.shape == "harmonic"],
         "memory": memory(observations),
         "modulated": modulated(observations, effects),
-        "product": products(observations, ("joint", "base", "tool")),
+        "product": interactions(observations, ("joint", "base", "tool")),
     }
 
 
