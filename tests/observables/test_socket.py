@@ -12,7 +12,6 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.registration import moved, register
-from thermal_robot.observables.socket import Stand
 from thermal_robot.observations import Frames, observe
 
 
@@ -38,11 +37,24 @@ def test_a_sound_robot_spreads_about_no_socket(ur10):
     assert np.abs(seen.gap).max() < 1e-9
 
 
+def with_spacing(campaign, length, sigma, stand="place 0", pair=("0", "1")):
+    """The same rows and one more, while the robot stays: how far two sockets of a stand are apart."""
+    last, before = campaign.samples, campaign.noise_of_rows
+    before = np.full(last, campaign.noise_position or 5e-5) if before is None else before
+    more = campaign.take(np.append(np.arange(last), last - 1))
+    told = {"kind": "spacing", "stand": stand, "socket": pair[0], "other_socket": pair[1]}
+    labels = {"other_socket": np.full(last + 1, "", dtype="<U9"), **more.labels}
+    labels = {name: np.append(own[:last], told.get(name, own[last])) for name, own in labels.items()}
+    readings = {"distance": np.append(campaign.readings.get("distance", np.zeros(last)), length)}
+    noise = np.append(before, sigma)
+    return replace(more, labels=labels, readings=readings, noise_position=None, noise_of_rows=noise)
+
+
 @pytest.mark.parametrize("known", [False, True])
 def test_columns_are_derivatives_of_the_gap(ur10, known):
     campaign = sockets(ur10, offsets(ur10, [0, 2e-3, -1e-3, 2e-3, 1e-3, 0]), rows=5, tool=(0.0, 0.01, 0.05))
     if known:
-        campaign = replace(campaign, facts={"socket": {"distances": (("0", "1", 0.05),)}})
+        campaign = with_spacing(campaign, 0.0501, 1e-5)
     frames = register(campaign)
     seen = observe(campaign, frames)
     columns, names = frame_columns(seen)
@@ -56,16 +68,6 @@ def test_columns_are_derivatives_of_the_gap(ur10, known):
         assert np.allclose(slope, columns[:, :, k], atol=3.0 * np.abs(seen.gap).max())
 
 
-def test_a_stand_keeps_its_known_distance_and_the_others_move():
-    rng = np.random.default_rng(3)
-    stand = Stand(("0", "1", "2"), rng.normal(size=(3, 3)), ((0, 1, 0.05), (1, 2, 0.07))).held()
-    assert stand.width == 7
-    there = stand.moved(0.3 * rng.normal(size=7))
-    assert np.linalg.norm(there.points[0] - there.points[1]) == pytest.approx(0.05, abs=1e-12)
-    assert np.linalg.norm(there.points[1] - there.points[2]) == pytest.approx(0.07, abs=1e-12)
-    assert np.abs(there.points - stand.points).max() > 0.01
-
-
 def test_what_moves_all_stands_is_an_alias_of_them(ur10):
     campaign = sockets(ur10, offsets(ur10, [0, 3e-3, -2e-3, 1e-3, 1e-3, 0]), rows=8)
     seen = observe(campaign, register(campaign))
@@ -76,6 +78,55 @@ def test_what_moves_all_stands_is_an_alias_of_them(ur10):
         left = without(equations_of(columns), basis)
         assert np.abs(left).max() < 1e-9
     assert np.abs(without(equations_of(seen.joint_sensitivity[:, :3, 1:5]), basis)).max() > 0.01
+
+
+@pytest.mark.parametrize("spacings", [{}, {"place 0": 1e-5}, {"place 0": 1e-3}, {"place 0": 1e-3, "place 2": 1e-3}])
+def test_the_scale_is_known_as_well_as_the_lengths(ur10, spacings):
+    """Relative variance of a length: its own, and that of two sockets from 15 rows each; lengths add information."""
+    campaign = sockets(ur10, rows=15, noise=5e-5, seed=1)
+    for stand, sigma in spacings.items():
+        campaign = with_spacing(campaign, 0.05, sigma, stand)
+    seen, white = observe(campaign, register(campaign)), 1.0
+    if spacings:
+        white = 1.0 / campaign.noise_of_rows[:, None, None]
+    basis = orthonormal(equations_of(white * frame_columns(seen)[0]))
+    places = np.concatenate([seen.position, 0.0 * seen.position], axis=1)[:, :, None]
+    told = np.linalg.norm(without(equations_of(white * seen.sight.sees(places)[:, :3]), basis))
+    expected = sum(0.05**2 / (sigma**2 + 2.0 * 5e-5**2 / 15.0) for sigma in spacings.values())
+    assert told == pytest.approx(np.sqrt(expected), rel=0.02, abs=1e-9)
+
+
+def test_a_length_sets_the_size_of_the_robot_as_far_as_it_is_known(ur10):
+    """A length that is 0.4 % larger means a larger robot if it is sure, and nothing if it may be 1 mm off."""
+    campaign = sockets(ur10, rows=15, noise=1e-5, seed=1)
+
+    def size(length, sigma):
+        fit = fit_named(with_spacing(campaign, length, sigma), [library()["geometric"]])
+        return 1.0 / fit.corrected.sight.size.relative[0, 0]
+
+    for sigma, larger in ((1e-6, 1.004), (1e-3, 1.0)):
+        assert size(0.0502, sigma) / size(0.05, sigma) == pytest.approx(larger, abs=2e-4)
+
+
+def test_sockets_in_which_the_ball_never_sat_tell_nothing(ur10, tmp_path):
+    for stand, pair in (("place 0", ("0", "further")), ("place 9", ("0", "1"))):
+        campaign = with_spacing(sockets(ur10, rows=4, noise=5e-5), 0.05, 1e-5, stand, pair)
+        seen = observe(campaign, register(campaign))
+        assert not seen.gap[-1].any()
+        assert not frame_columns(seen)[0][-1].any()
+        with pytest.raises(tr.CampaignError, match="no such socket"):
+            tr.read_campaign(tr.write_campaign(campaign, tmp_path / stand))
+
+
+def test_without_a_length_it_is_said_and_a_wrong_one_of_large_noise_does_no_harm(ur10):
+    campaign = sockets(ur10, offsets(ur10, [0, 4e-3, -3e-3, 2e-3, 3e-3, 0]), rows=15, noise=5e-5, seed=1)
+    alone, soft = (tr.diagnose(own) for own in (campaign, with_spacing(campaign, 0.0502, 2e-4)))
+    assert alone.verdict == soft.verdict == ("joint_offset",)
+    said = ["scale of the robot is not observable" in " ".join(own.warnings) for own in (alone, soft)]
+    assert said == [True, False]
+    told = ([p for f in own.effects if f.name == "joint_offset" for p in f.parameters] for own in (alone, soft))
+    for one, other in list(zip(*told, strict=True))[1:5]:
+        assert abs(one.value - other.value) < 0.1 * one.std
 
 
 def test_what_was_wrong_is_found_wherever_the_stands_stand(ur10):
@@ -107,13 +158,14 @@ def test_labels_of_stands_are_names_and_no_numbers(ur10):
 
 
 def test_a_campaign_of_sockets_is_written_and_read_again(ur10, tmp_path):
-    campaign = replace(sockets(ur10, rows=4), facts={"socket": {"distances": (("0", "1", 0.05),)}})
+    campaign = with_spacing(sockets(ur10, rows=4), 0.05, 2e-4)
     again = tr.read_campaign(tr.write_campaign(campaign, tmp_path / "written"))
-    assert again.kinds == ("socket",)
+    assert again.kinds == ("socket", "spacing")
     assert again.base_known
-    assert again.facts == campaign.facts
+    assert again.readings["distance"] == pytest.approx(campaign.readings["distance"], abs=1e-12)
+    assert again.noise_of_rows == pytest.approx(campaign.noise_of_rows, abs=1e-12)
     assert np.array_equal(again.q, campaign.q)
-    for label in ("stand", "socket", "kind"):
+    for label in ("stand", "socket", "other_socket", "kind"):
         assert (again.labels[label] == campaign.labels[label]).all()
 
 

@@ -18,10 +18,12 @@ POSES = {
 }
 """Columns of each part of a pose that a campaign holds."""
 LABELS = ("session", "pose", "path")
+ENDS = ("socket", "other_socket")  # Labels of the two sockets whose distance a row says
 KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "position": (POSITION, ()),
     "pose": ((*POSITION, *ORIENTATION), ()),
     "socket": ((), ("stand", "socket")),
+    "spacing": (("distance",), ("stand", *ENDS)),
     "plane": ((), ("plane",)),
     "distance": (("distance",), ("anchor",)),
     "pixel": (("u", "v"), ("camera",)),
@@ -30,7 +32,9 @@ KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 """Columns of each kind of measurement: its figures and its labels."""
 TOUCHED = tuple(kind for kind, (figures, _) in KINDS.items() if not figures)
 """Kinds whose rows hold no figure: the robot is led to what they name."""
-BESIDE = tuple(kind for kind, (figures, _) in KINDS.items() if not {*POSITION} & {*figures})
+APART = ("spacing",)
+"""Kinds in whose rows no robot is."""
+BESIDE = tuple(kind for kind, (figures, _) in KINDS.items() if not {*POSITION} & {*figures} and kind not in APART)
 """Kinds that need no instrument for positions."""
 KIND = "kind"  # Column that says which kind each row is
 OPTIONAL = {

@@ -125,6 +125,11 @@ def readings(
         for column in texts:
             labels[column] = np.array(table.text(column), dtype=np.str_)
             table.refuse(np.asarray(here & (labels[column] == "")), missing, column, "a label")
+    for column in names.ENDS if (apart := np.isin(kind, names.APART)).any() else ():
+        of_a_stand = np.char.add(np.char.add(labels["stand"], "\n"), labels[column])
+        sat = np.char.add(np.char.add(labels["stand"], "\n"), labels["socket"])[kind == "socket"]
+        expected = "a socket in which the ball sits, in a row of the same stand"
+        table.refuse(apart & ~np.isin(of_a_stand, sat), "no such socket", column, expected)
     return figures, labels | {names.KIND: kind}
 
 

@@ -81,15 +81,6 @@ def _said(value: Any, path: str) -> str:
     return str(_TEXT(str(value) if plain else value, path))
 
 
-def _pairs(value: Any, path: str) -> Any:
-    """Take pairs of sockets with their distance."""
-    for pair in value if isinstance(value, list) else [value]:
-        fits = isinstance(pair, list) and len(pair) == 3 and isinstance(pair[2], (int, float))
-        if not fits or str(pair[0]) == str(pair[1]) or not pair[2] > 0.0:
-            raise MisfitError(path, pair, 'pairs of sockets with their distance, as [["0", "1", 50.0]]')
-    return value
-
-
 ABOUT = mapping(_said)
 
 
@@ -123,6 +114,8 @@ FIELDS = {
 """Settings by their names: read from campaign.toml, written to it, stored in a model, and given to calls, by these."""
 _CAMERA = dict.fromkeys(("fx", "fy", "cx", "cy"), number(above=0.0, expected="a number of pixels above 0"))
 _CAMERA |= {"mount": word(("hand", "room"), _WORD), "refine": boolean}
+_SHARED: dict[str, Kind] = {"camera": mapping(record(_CAMERA, may_lack=("refine",)))}
+"""Sections that state what is known of things that rows share: :attr:`Settings.facts`."""
 _OF_A_FILE: dict[str, dict[str, Kind]] = {
     "robot": {"kinematics": _named("the path of a kinematics.yaml of Universal Robots")},
     "measurements": {
@@ -130,15 +123,14 @@ _OF_A_FILE: dict[str, dict[str, Kind]] = {
         "angle_unit": ANGLE_UNIT,
         "length_unit": LENGTH_UNIT,
     },
-    "socket": {"distances": _pairs},
 }
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     **{
         section: {**_OF_A_FILE.get(section, {}), **{own.key: own.kind for own in FIELDS.values() if own[0] == section}}
-        for section in ("robot", "measurements", "frames", "noise", "payload", "socket")
+        for section in ("robot", "measurements", "frames", "noise", "payload")
     },
     **{section: FIELDS[section].kind for section in ("priors", "gears", "about")},
-    "camera": mapping(record(_CAMERA, may_lack=("refine",))),
+    **_SHARED,
 }
 """What each key of each section of campaign.toml may be; of a section whose keys are the user's own, the whole."""
 
@@ -221,7 +213,7 @@ class Settings:
             value = held.get(key) if key else held
             if name not in ends and value is not None:
                 ends[name] = scaled(value, units.length_scale) if length else value
-        return cls(**ends, units=units, facts=facts_of(sections, units.length_scale))
+        return cls(**ends, units=units, facts={key: sections[key] for key in _SHARED if sections.get(key)})
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
@@ -256,15 +248,6 @@ def settings_kind(value: Any, path: str) -> Settings:
     unsaid = {"moves": "unknown", "turned": (), "kind": "", "facts": {}, "about": {}}
     values = record(_KEYS)({**unsaid, **value} if isinstance(value, Mapping) else value, path)
     return Settings(**{**values, "units": Units(**values["units"])})
-
-
-def facts_of(sections: Mapping[str, Any], scale: float) -> dict[str, Any]:
-    """Return what the tables of kinds of measurement state, lengths times ``scale``."""
-    found = {key: sections[key] for key in ("socket", "camera") if sections.get(key)}
-    if "socket" in found:
-        pairs = found["socket"].get("distances", ())
-        found["socket"] = {"distances": tuple((str(one), str(other), scale * length) for one, other, length in pairs)}
-    return found
 
 
 def scaled(value: Any, scale: float) -> Any:

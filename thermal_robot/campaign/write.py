@@ -15,7 +15,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.recognise import Heading, headings
-from thermal_robot.campaign.settings import FIELDS, facts_of, scaled
+from thermal_robot.campaign.settings import FIELDS, scaled
 from thermal_robot.campaign.table import PARQUET, TABLES, WORKBOOKS, without_library
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
@@ -243,5 +243,5 @@ def _document(campaign: Campaign) -> dict[str, Any]:
             continue
         value = scaled(value, 1.0 / scale) if length else value
         document.setdefault(section, {}).update({key: value} if key else value)
-    document |= facts_of(settings.facts, 1.0 / scale)
+    document |= settings.facts
     return {section: content for section, content in document.items() if content}

@@ -19,11 +19,12 @@ from thermal_robot.observables.pixel import Pixel
 from thermal_robot.observables.plane import OnPlane
 from thermal_robot.observables.position import Controller, Pose, Position
 from thermal_robot.observables.socket import Socket
+from thermal_robot.observables.spacing import Spacing
 
 KINDS: dict[str, Observable] = {
-    own.kind: own for own in (Position(), Pose(), Socket(), OnPlane(), Distance(), Pixel(), Controller())
+    own.kind: own for own in (Position(), Pose(), Socket(), Spacing(), OnPlane(), Distance(), Pixel(), Controller())
 }
-"""Every kind of measurement by its name."""
+"""Every kind of measurement by its name; those that tell where an artefact is stand before those that only read it."""
 
 
 def kinds_of(campaign: Campaign) -> list[tuple[Observable, Rows | None]]:
@@ -31,7 +32,7 @@ def kinds_of(campaign: Campaign) -> list[tuple[Observable, Rows | None]]:
     if len(campaign.kinds) == 1:
         return [(KINDS[campaign.kinds[0]], None)]
     label = campaign.labels["kind"]
-    return [(KINDS[kind], np.flatnonzero(label == kind)) for kind in campaign.kinds]
+    return [(own, np.flatnonzero(label == kind)) for kind, own in KINDS.items() if kind in campaign.kinds]
 
 
 def components(campaign: Campaign) -> int:
@@ -62,23 +63,25 @@ def figures_of_a_row(campaign: Campaign) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Size:
-    """Size of the volume through which a target is led, the gauge where no row and no fact carries a length.
+    """Size of the volume through which a target is led, the gauge of rows whose gaps no length of their own measures.
 
-    All lengths of the robot together, with what stands beside it, may then be of any size: a smaller robot spreads less
-    about its sockets. So gaps are told as shares of the size (an invariant of that gauge group), in metres of the
-    robot as it is declared, and the change of size has no derivative.
+    All lengths of the robot together, with what stands beside it, may be of any size as far as these rows tell: a
+    smaller robot spreads less about its sockets. So their gaps are told as shares of the size (an invariant of that
+    gauge group), in metres of the robot as it is declared, and the change of size has no derivative. Other rows tell
+    the scale, as well as their own noise allows.
     """
 
     middle: Array  # (N, 3) places of the target about their mean, root frame, m
-    relative: float  # size as declared over size as predicted
+    free: Array  # (N, 1) 1 in rows without a length of their own, else 0
+    relative: Array  # (N, 1) size as declared over size as predicted; 1 in rows with a length of their own
 
     @classmethod
-    def of(cls, campaign: Campaign, position: Array) -> Size:
-        """Compare predicted places (N, 3) with those of the commands as declared."""
+    def of(cls, campaign: Campaign, position: Array, free: Array) -> Size:
+        """Compare predicted places (N, 3) with those of the commands as declared, for the rows ``free`` (N, 1)."""
         poses = tool_poses(campaign.robot, campaign.q)
         declared = poses[:, :3, 3] + poses[:, :3, :3] @ campaign.target
         middle, before = (places - places.mean(axis=0) for places in (position, declared))
-        return cls(middle, float(np.sqrt((before**2).sum() / (middle**2).sum())))
+        return cls(middle, free, np.sqrt((before**2).sum() / (middle**2).sum()) ** free)
 
     def grows(self, moved: Array) -> Array:
         """(K,) relative growth of the size as the target moves by (N, 3, K)."""
@@ -112,15 +115,16 @@ class Sight:
                 values if rows is None or values is None else values[rows] for values in (*pose, instrument)
             )
             parts.append((own, Seen(campaign, rows, np.asarray(position), np.asarray(rotation), base, added)))
-        known, shared = dict[str, Any](), dict[str, tuple[str, ...]]()
+        known, shared, free = dict[str, Any](), dict[str, tuple[str, ...]](), np.zeros((campaign.samples, 1))
         for own, seen in parts:
             names = own.shares(seen)
-            given = {name: artefacts[name] for name in names if name in artefacts}
+            given = {name: each for name, each in {**artefacts, **known}.items() if name in names}
             given = {name: each for name, each in given.items() if own.covers(seen, name, each)}
-            begun = {} if len(given) == len(names) else own.artefacts(seen)
+            begun = {} if len(given) == len(names) else own.artefacts(seen, known)
             known |= {name: given.get(name, begun.get(name)) for name in names}
             shared[own.kind] = names
-        size = None if any(own.has_length(seen) for own, seen in parts) else Size.of(campaign, pose[0])
+            free[slice(None) if seen.rows is None else seen.rows] = not own.has_length(seen)
+        size = Size.of(campaign, pose[0], free) if free.any() else None
         return cls(tuple(parts), known, campaign.samples, components(campaign), size, shared)
 
     @property
@@ -146,8 +150,8 @@ class Sight:
         if self.size is None:
             return found
         found = found.copy() if found is twists else found
-        found[:, : self.measures] += self._gap[:, :, None] * self.size.grows(twists[:, :3])
-        return found * self.size.relative
+        found[:, : self.measures] += (self.size.free * self._gap)[:, :, None] * self.size.grows(twists[:, :3])
+        return found * self.size.relative[:, :, None]
 
     def _sees(self, twists: Array) -> Array:
         if len(self.parts) == 1:
@@ -161,17 +165,15 @@ class Sight:
 
     def columns(self) -> tuple[Array, tuple[str, ...]]:
         """(N, m, w) derivative of the gap by all that rows share, and the artefact of each column."""
-        parts, names = [], []
+        found = dict[str, Array]()
         for own, seen in self.parts:
             for name in self.shared[own.kind]:
-                found, rows = own.column(seen, self.artefacts, name), seen.own(np.arange(self.samples))
-                whole = np.zeros((self.samples, self.measures, found.shape[2]))
-                whole[rows, :3] = found
-                parts.append(whole)
-                names += [name] * found.shape[2]
-        empty = np.zeros((self.samples, self.measures, 0))
-        whole = np.concatenate([empty, *parts], axis=2)
-        return whole if self.size is None else whole * self.size.relative, tuple(names)
+                column = own.column(seen, self.artefacts, name)
+                whole = found.setdefault(name, np.zeros((self.samples, self.measures, column.shape[2])))
+                whole[seen.own(np.arange(self.samples)), :3] = column
+        columns = np.concatenate([np.zeros((self.samples, self.measures, 0)), *found.values()], axis=2)
+        names = tuple(name for name, own in found.items() for _ in range(own.shape[2]))
+        return columns if self.size is None else columns * self.size.relative[:, :, None], names
 
 
 def of_model(campaign: Campaign) -> bool:

@@ -126,15 +126,18 @@ class Observable(ABC):
     label: ClassVar[str] = ""
 
     def has_length(self, seen: Seen) -> bool:
-        """Whether the rows carry a length, and so tell the robot's scale."""
+        """Whether a gap of these rows is told in metres that something else than the robot defines."""
         return True
 
     def shares(self, seen: Seen) -> tuple[str, ...]:
         """Return the names of what the rows share; nothing without a ``label``."""
         return tuple(seen.shared(self.label)[0]) if self.label else ()
 
-    def artefacts(self, seen: Seen) -> dict[str, Artefact]:
-        """Return by name what the rows share, where the predicted poses put it; nothing by default."""
+    def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
+        """Return by name what the rows share, where the predicted poses put it; nothing by default.
+
+        ``known`` are artefacts that rows of other kinds have told.
+        """
         return {}
 
     def covers(self, seen: Seen, name: str, artefact: Any) -> bool:
@@ -162,7 +165,7 @@ class Along(Observable):
 
     places: ClassVar[int] = 1
 
-    def artefacts(self, seen: Seen) -> dict[str, Artefact]:
+    def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
         """Return what the rows share, where the predicted poses put it."""
         names, number = seen.shared(self.label)
         return {name: self.start(seen, number == k, name) for k, name in enumerate(names)}

@@ -74,7 +74,7 @@ class Pixel(Observable):
             return np.zeros_like(seen.position)
         return seen.readings(*BOARD)
 
-    def artefacts(self, seen: Seen) -> dict[str, Artefact]:
+    def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
         """Return the cameras, or what they see, by linear resection."""
         names, number = seen.shared("camera")
         found = dict[str, Artefact]()

@@ -1,7 +1,5 @@
 """Chosen numbers of the measurement models, with unit and reason."""
 
-HELD_ROUNDS = 8
-"""Newton steps that bring sockets back to their known distances: each squares what is left, a hundredth at most."""
 FLAT = 1e-9
 """m by which points of a board leave its plane through rounding: a flat board tells two of its axes."""
 LEAST_VOLUME = 1e-12

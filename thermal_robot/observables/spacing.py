@@ -1,0 +1,62 @@
+"""Distance of two sockets of a stand, measured beside the robot: a length standard with a noise of its own.
+
+Points that nothing but the arm has told may be of any size together. A known length is one more equation of two of
+them, so it is a row like any other, in which no robot is: how well it tells the scale follows from its noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.names import ENDS
+from thermal_robot.observables.observable import Artefact, Seen
+from thermal_robot.observables.socket import Socket, Stand
+
+
+class Spacing(Socket):
+    """Distance of two sockets of a stand, m, as a caliper, a measuring machine or a drawing has it."""
+
+    kind: ClassVar[str] = "spacing"
+    says: ClassVar[str] = "distance of two sockets"
+    places: ClassVar[int] = 1
+
+    def has_length(self, seen: Seen) -> bool:
+        """Yes: it is nothing else."""
+        return True
+
+    def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
+        """Return the stands that the ball tells; one in which it never sat has no sockets."""
+        return {name: known.get(name, Stand((), np.zeros((0, 3)))) for name in self.shares(seen)}
+
+    def covers(self, seen: Seen, name: str, artefact: Stand) -> bool:
+        """Yes: a socket in which the ball never sat has no place, and its rows are no equations."""
+        return True
+
+    def _lines(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
+        """(n,) distance of the two sockets, m, and (n, 3) the unit vector to the one from the other, root frame.
+
+        Zero where one of them has no place.
+        """
+        one, other = (self.points(seen, artefacts, end) for end in ENDS)
+        apart = np.nan_to_num(one - other)
+        far = np.linalg.norm(apart, axis=1)
+        return far, seen.in_root(apart / np.where(far > 0.0, far, 1.0)[:, None])
+
+    def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
+        """(n, 3) read − fitted distance along the line of the two, m."""
+        far, along = self._lines(seen, artefacts)
+        return np.asarray((seen.readings("distance")[:, 0] - far)[:, None] * along)
+
+    def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
+        """(n, 6, K) nothing: the robot is not there."""
+        return np.zeros_like(twists)
+
+    def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
+        """(n, 3, w) what the points of the stand do to fitted − read."""
+        along = self._lines(seen, artefacts)[1]
+        one, other = (self.at_socket(seen, artefacts, name, end) for end in ENDS)
+        return np.asarray(along[:, :, None] * np.einsum("ni,niw->nw", along, one - other)[:, None])
