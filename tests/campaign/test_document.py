@@ -89,7 +89,7 @@ def declared(folder: Path, text: str) -> Declaration:
 
 def test_defaults_of_a_bare_declaration(tmp_path: Path) -> None:
     settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm")).settings
-    assert settings == Settings("r.urdf", "tool", units=Units("deg", "mm"))
+    assert settings == Settings("r.urdf", "tool", units=Units("deg", "mm"), moves="")
     assert (settings.base_known, settings.tool_known, settings.reference_temperature) == (False, False, 20.0)
 
 

@@ -173,3 +173,14 @@ def test_frames_hold_what_is_shared(ur10):
     campaign = sockets(ur10, rows=4)
     seen = observe(campaign, Frames.declared(campaign))
     assert sorted(seen.frames.artefacts) == ["stand place 0", "stand place 1", "stand place 2"]
+
+
+@pytest.mark.parametrize(("kind", "moves"), [("socket", "unknown"), ("plane", "unknown"), ("distance", "direct")])
+def test_a_hand_brings_joints_from_whatever_side(ur10, kind, moves):
+    """Lost motion is not testable where a hand led the arm, though the order of the rows is known."""
+    made = tr.simulate(ur10, rows=60, measures=kind, noise=5e-5, tool=[0.0, 0.0, 0.1])
+    table = replace(made, covariates={"order": np.arange(60.0)}).to_frame()
+    campaign = tr.campaign_from_table(ur10, table)
+    assert campaign.moves == moves
+    assert bool(library()["backlash"].missing(observe(campaign))) == (moves == "unknown")
+    assert tr.campaign_from_table(ur10, table, moves="direct").derived

@@ -94,7 +94,9 @@ def arrived(campaign: Campaign) -> Campaign:
 
 
 def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
-    """Return what is declared of the frames where it follows from what was measured, and the columns that are read."""
+    """Return what is declared where it follows from what was measured, and the columns that are read."""
+    led = {*columns.kinds, settings.kind} & {*names.TOUCHED}  # by hand, from whatever side
+    settings = replace(settings, moves=settings.moves or MOVES[bool(led)])
     if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
         groups = (names.POSITION, names.ORIENTATION, *columns.groups)
         return replace(settings, base_known=True, tool_known=True), replace(columns, groups=groups)
@@ -436,7 +438,7 @@ def campaign_from_table(
     noise_orientation: float | None = None,
     payload_com: Sequence[float] = (0.0, 0.0, 0.0),
     reference_temperature: float = STANDARD_TEMPERATURE,
-    moves: str = MOVES[0],
+    moves: str | None = None,
     priors: Mapping[str, float] | None = None,
     gears: Mapping[str, float] | None = None,
     about: Mapping[str, str] | None = None,
@@ -466,7 +468,8 @@ def campaign_from_table(
         °C at which the URDF's lengths hold.
     moves
         ``"direct"`` where the robot goes straight from pose to pose in the order of the rows, which tells directions of
-        approach where no column does; else ``"unknown"``.
+        approach where no column does; else ``"unknown"``, which ``None`` means for rows that name what the robot was
+        led to, such as a socket.
     priors, gears
         Expected size by effect; transmission ratio by joint.
     about
@@ -499,7 +502,7 @@ def campaign_from_table(
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
     said: dict[tuple[str, str], Any] = {
-        ("robot", "moves"): moves,
+        **({} if moves is None else {("robot", "moves"): moves}),
         ("robot", "reference_temperature"): reference_temperature,
         ("measurements", "angle_unit"): angle_unit,
         ("measurements", "length_unit"): length_unit,

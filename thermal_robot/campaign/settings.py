@@ -158,7 +158,8 @@ class Settings:
     gravity
         m/s², in the root frame; ``None`` for the robot's default.
     moves, reference_temperature, base_known, tool_known, target, payload_com, priors, gears, turned, facts, about
-        As in a :class:`~thermal_robot.Campaign`.
+        As in a :class:`~thermal_robot.Campaign`; ``moves`` is empty where a file does not state it, and then follows
+        from what the rows measure.
     kind
         What all rows measure, where the table has no column ``kind``; empty for position or pose.
     units
@@ -213,7 +214,8 @@ class Settings:
             value = held.get(key) if key else held
             if name not in ends and value is not None:
                 ends[name] = scaled(value, units.length_scale) if length else value
-        return cls(**ends, units=units, facts={key: sections[key] for key in _SHARED if sections.get(key)})
+        facts = {key: sections[key] for key in _SHARED if sections.get(key)}
+        return cls(**{"moves": "", **ends}, units=units, facts=facts)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
