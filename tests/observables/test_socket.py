@@ -122,8 +122,12 @@ def test_without_a_length_it_is_said_and_a_wrong_one_of_large_noise_does_no_harm
     campaign = sockets(ur10, offsets(ur10, [0, 4e-3, -3e-3, 2e-3, 3e-3, 0]), rows=15, noise=5e-5, seed=1)
     alone, soft = (tr.diagnose(own) for own in (campaign, with_spacing(campaign, 0.0502, 2e-4)))
     assert alone.verdict == soft.verdict == ("joint_offset",)
-    said = ["scale of the robot is not observable" in " ".join(own.warnings) for own in (alone, soft)]
-    assert said == [True, False]
+    for own, length in ((alone, False), (soft, True)):
+        told, (base,) = " ".join(own.warnings), [f for f in own.effects if f.name == "base_frame"]
+        assert ("scale of the robot is not observable" in told) != length
+        assert "direction of the base are not observable" in told
+        assert "the zero of 'shoulder_pan_joint' is not observable" in told
+        assert base.status == "not_testable"  # and no effect that data could tell from others
     told = ([p for f in own.effects if f.name == "joint_offset" for p in f.parameters] for own in (alone, soft))
     for one, other in list(zip(*told, strict=True))[1:5]:
         assert abs(one.value - other.value) < 0.1 * one.std

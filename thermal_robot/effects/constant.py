@@ -23,7 +23,7 @@ from thermal_robot.effects.effect import (
 )
 from thermal_robot.effects.quantities import position_of, unit
 from thermal_robot.effects.settings import IN_MODEL
-from thermal_robot.observables import components, instrument_rows
+from thermal_robot.observables import components, instrument_rows, of_model
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -33,6 +33,7 @@ _PARALLEL = 0.1
 """Sine of the angle of two successive axes below which a turn across both stands for a shift along one, whose effect
 then is that of a neighbour's (Hayati and Mirmirani, *Journal of Robotic Systems* 2, 1985)."""
 _ALONE = 0.1 / len(TWIST)  # of the weight of all components together: one frame in ten is off in one component alone
+_LOCATED = "rows of kind position or pose"
 _OFFSET = {"rad": 1e-3, "m": 5e-4}  # see JointOffset
 
 
@@ -154,9 +155,10 @@ class JointOffset(Effect):
 class BaseFrame(Effect):
     """Registration error of the base: its declared pose is off by a constant twist in the root frame.
 
-    Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted before
-    any effect is asked for. It is a twist of the first joint's placement, too (:class:`Geometric`), and about that
-    joint's axis its zero offset. ``alone`` names the one component that is off.
+    Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"`` and a reading says where it is:
+    an unknown base is fitted before any effect is asked for, and one that nothing but the arm tells is not observable.
+    It is a twist of the first joint's placement, too (:class:`Geometric`), and about that joint's axis its zero offset.
+    ``alone`` names the one component that is off.
     """
 
     alone: str = ""
@@ -178,8 +180,11 @@ class BaseFrame(Effect):
         return (self, *(replace(self, alone=component) for component, _ in TWIST))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the declaration without which the base is fitted and no effect."""
-        return () if observations.campaign.base_known else ('frames.base = "known"',)
+        """Return the declaration without which the base is fitted and no effect, or rows that say where it is."""
+        campaign = observations.campaign
+        if not instrument_rows(campaign).any() and not of_model(campaign):
+            return (_LOCATED,)
+        return () if campaign.base_known else ('frames.base = "known"',)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Twist of the base in the root frame: m and rad."""
@@ -253,7 +258,7 @@ class InstrumentScale(Effect):
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would make it testable: an instrument."""
-        return () if instrument_rows(observations.campaign).any() else ("rows of kind position or pose",)
+        return () if instrument_rows(observations.campaign).any() else (_LOCATED,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
