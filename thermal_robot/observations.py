@@ -190,8 +190,8 @@ class Observations:
     @cached_property
     def sight(self) -> Sight:
         """What the rows say, each by its kind of measurement."""
-        pose, artefacts = (self.position, self.rotation), self.frames.artefacts
-        return Sight.of(self.campaign, pose, self.frames.base, self.instrument, artefacts)
+        pose, own = (self.position, self.rotation), self.frames
+        return Sight.of(self.campaign, pose, (own.base, own.tool), self.instrument, own.artefacts)
 
     def in_root_axes(self, turns: Array) -> Array:
         """Rotation vectors (N, 3) of the gap, rad, in root frame axes."""

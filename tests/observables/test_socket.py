@@ -68,6 +68,18 @@ def test_columns_are_derivatives_of_the_gap(ur10, known):
         assert np.allclose(slope, columns[:, :, k], atol=3.0 * np.abs(seen.gap).max())
 
 
+def test_where_the_tool_frame_is_declared_changes_no_gap(ur10):
+    """The same ball, declared 0.2 m beyond a link or on it: what is left of a row is the same."""
+    at = np.eye(4)
+    at[:3, 3] = (0.0, 0.05, 0.2)
+    true = offsets(ur10, [0, 2e-3, -1e-3, 2e-3, 1e-3, 0])
+    made = tr.simulate(ur10, true, rows=60, measures="socket", tool=at)
+    frames = register(made)
+    one, other = (observe(replace(made, target=own), frames).gap for own in (at[:3, 3], np.zeros(3)))
+    assert np.abs(one).max() > 1e-4
+    assert np.allclose(one, other, atol=1e-12)
+
+
 def test_what_moves_all_stands_is_an_alias_of_them(ur10):
     campaign = sockets(ur10, offsets(ur10, [0, 3e-3, -2e-3, 1e-3, 1e-3, 0]), rows=8)
     seen = observe(campaign, register(campaign))
@@ -105,7 +117,7 @@ def test_a_length_sets_the_size_of_the_robot_as_far_as_it_is_known(ur10):
         return 1.0 / fit.corrected.sight.size.relative[0, 0]
 
     for sigma, larger in ((1e-6, 1.004), (1e-3, 1.0)):
-        assert size(0.0502, sigma) / size(0.05, sigma) == pytest.approx(larger, abs=2e-4)
+        assert size(0.0502, sigma) / size(0.05, sigma) == pytest.approx(larger, abs=4e-4)
 
 
 def test_sockets_in_which_the_ball_never_sat_tell_nothing(ur10, tmp_path):

@@ -76,12 +76,16 @@ class Size:
     relative: Array  # (N, 1) size as declared over size as predicted; 1 in rows with a length of their own
 
     @classmethod
-    def of(cls, campaign: Campaign, position: Array, free: Array) -> Size:
-        """Compare predicted places (N, 3) with those of the commands as declared, for the rows ``free`` (N, 1)."""
-        poses = tool_poses(campaign.robot, campaign.q)
-        declared = poses[:, :3, 3] + poses[:, :3, :3] @ campaign.target
-        middle, before = (places - places.mean(axis=0) for places in (position, declared))
-        return cls(middle, free, np.sqrt((before**2).sum() / (middle**2).sum()) ** free)
+    def of(cls, campaign: Campaign, pose: tuple[Array, Array], tool: Array, free: Array) -> Size:
+        """Compare predicted places with those of the commands as declared, for the rows ``free`` (N, 1).
+
+        Places are those of the tool frame: how far from it the target sits is no size of the robot. ``pose`` is the
+        target's, (N, 3) m and (N, 3, 3), ``tool`` (4, 4) that of the target in the tool frame.
+        """
+        predicted = pose[0] - pose[1] @ (tool[:3, :3].T @ tool[:3, 3])
+        declared = tool_poses(campaign.robot, campaign.q)[:, :3, 3]
+        before, now, middle = (places - places.mean(axis=0) for places in (declared, predicted, pose[0]))
+        return cls(middle, free, np.sqrt((before**2).sum() / (now**2).sum()) ** free)
 
     def grows(self, moved: Array) -> Array:
         """(K,) relative growth of the size as the target moves by (N, 3, K)."""
@@ -104,17 +108,20 @@ class Sight:
         cls,
         campaign: Campaign,
         pose: tuple[Array, Array],
-        base: Array,
+        frames: tuple[Array, Array],
         instrument: Array | None,
         artefacts: Mapping[str, Any],
     ) -> Sight:
-        """Look at the rows from predicted poses; artefacts that are not given are put where these say."""
+        """Look at the rows from predicted poses of the target; artefacts that are not given are put where these say.
+
+        ``frames`` (4, 4) are the poses of the root frame in the measurement frame and of the target in the tool frame.
+        """
         parts = []
         for own, rows in kinds_of(campaign):
             position, rotation, added = (
                 values if rows is None or values is None else values[rows] for values in (*pose, instrument)
             )
-            parts.append((own, Seen(campaign, rows, np.asarray(position), np.asarray(rotation), base, added)))
+            parts.append((own, Seen(campaign, rows, np.asarray(position), np.asarray(rotation), frames[0], added)))
         known, shared, free = dict[str, Any](), dict[str, tuple[str, ...]](), np.zeros((campaign.samples, 1))
         for own, seen in parts:
             names = own.shares(seen)
@@ -124,7 +131,7 @@ class Sight:
             known |= {name: given.get(name, begun.get(name)) for name in names}
             shared[own.kind] = names
             free[slice(None) if seen.rows is None else seen.rows] = not own.has_length(seen)
-        size = Size.of(campaign, pose[0], free) if free.any() else None
+        size = Size.of(campaign, pose, frames[1], free) if free.any() else None
         return cls(tuple(parts), known, campaign.samples, components(campaign), size, shared)
 
     @property
