@@ -209,7 +209,8 @@ def _mukca(files: Sequence[Path], plan: Plan) -> Source:
     columns["order"] = np.arange(float(sum(rows)))
     table = Table(str(holes[0][0].parent.parent), columns, np.arange(2, sum(rows) + 2))
     stands = len({*columns["stand"]})
-    note = f"{len(holes)} sockets on {stands} stands; {_APART:g} mm between two of a stand are not used"
+    unread = f"{_APART:g} mm between two of a stand are not used: a row of kind 'spacing' says what was measured"
+    note = f"{len(holes)} sockets on {stands} stands; {unread}"
     return Source(table, planned({**_SOCKETS, "columns": {"joints": joints}}), (note,))
 
 
