@@ -183,7 +183,6 @@ _HOLE = re.compile(r"hole_(\d+)\.csv")
 _APART = 50.0  # mm, OFFSET_DISTANCE of the source
 _MOST = 1000  # files: no campaign has so many stands
 _SOCKETS: dict[str, dict[str, Any]] = {
-    "robot": {"moves": "unknown"},
     "measurements": {"angle_unit": "rad", "length_unit": "mm", "kind": "socket"},
 }
 
