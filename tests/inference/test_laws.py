@@ -1,4 +1,4 @@
-"""Which laws are tried: places, quantities, knots and shapes; effects that change, products, memory."""
+"""Which laws are tried: places, quantities, knots and shapes; effects that change, interactions, memory."""
 
 from dataclasses import replace
 
@@ -14,11 +14,11 @@ from thermal_robot.inference.columns import block
 from thermal_robot.inference.screening import (
     conditions,
     harmonics,
+    interactions,
     laws,
     memory,
     modulated,
     of_quantity,
-    products,
     shapes,
     smooth_columns,
 )
@@ -171,11 +171,11 @@ def test_a_session_is_a_value_each_and_no_factor(rv_m2):
     found = [law, *(law for law in modulated(here) if law.quantity == "session")]
     assert {(law.shape, law.labels) for law in found} == {("levels", ("am", "noon", "pm"))}
     assert len(found) > 1
-    assert not any("session" in (law.quantity, law.by) for law in products(here, ("joint", "base", "tool")))
+    assert not any("session" in (law.quantity, law.by) for law in interactions(here, ("joint", "base", "tool")))
 
 
 def test_a_product_holds_a_condition_or_the_joints_own_position(here):
-    found = products(here, ("joint", "base", "tool"))
+    found = interactions(here, ("joint", "base", "tool"))
     pairs = [(law.kind, law.place, frozenset((law.quantity, law.by))) for law in found]
     assert len(set(pairs)) == len(pairs)
     assert all(len(both) == 2 for *_, both in pairs)
