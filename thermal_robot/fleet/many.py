@@ -361,13 +361,17 @@ def connected(workers: int, scheduler: str | None = None) -> Iterator[Any]:
         with dask.config.set(_UNSERVED), _local(distributed, workers) as cluster, distributed.Client(cluster) as found:
             yield found
         return
+    why = ""
     try:
         found = distributed.Client(scheduler, timeout=settings.ANSWERS_WITHIN)
     except (OSError, ValueError, TypeError) as error:
+        why = str(error) or type(error).__name__
+    if why:
+        gc.collect()  # the client that failed closes: collected while another one is made, it would wait for ever
         raise ThermalRobotError(
-            f"the scheduler {scheduler} does not answer: {error}; is it running, and do its TLS files stand in Dask's "
+            f"the scheduler {scheduler} does not answer: {why}; is it running, and do its TLS files stand in Dask's "
             "configuration (distributed.comm.tls)?"
-        ) from error
+        )
     with found:
         yield found
 
