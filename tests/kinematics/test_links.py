@@ -11,7 +11,7 @@ from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
 
 STEP = 1e-3
-TOLERANCE = 1e-10  # STEP⁴ times lengths of a metre or two, by what mimic joints multiply; rounding over STEP
+TOLERANCE = 5e-10  # STEP⁴ times lengths of a metre or two, by what mimic joints multiply; rounding over STEP
 ROWS = 20
 
 
