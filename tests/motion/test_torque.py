@@ -38,9 +38,14 @@ def bristles(q):
     return state
 
 
-def log(more=0.0, coulomb=0.0, offset=0.0, hum=0.0, viscous=0.0):
-    """Eight motions; the last link's products of inertia are larger by ``more``, kg·m², unlike any drive."""
+def log(more=0.0, coulomb=0.0, offset=0.0, hum=0.0, viscous=0.0, heavier=(0.0, 0.0)):
+    """Eight motions; the last link's products of inertia are larger by ``more``, kg·m², unlike any drive.
+
+    Links are ``heavier`` by shares, of the same size and shape.
+    """
     model = pin.buildModelFromXML(ARM.urdf)
+    for k, share in enumerate(heavier, 1):
+        model.inertias[k] = pin.Inertia.FromDynamicParameters((1.0 + share) * model.inertias[k].toDynamicParameters())
     numbers = model.inertias[2].toDynamicParameters()
     numbers[4:] += more * np.array([0.0, 1.0, 0.0, 1.0, 1.0, 0.0])
     model.inertias[2] = pin.Inertia.FromDynamicParameters(numbers)
@@ -69,6 +74,13 @@ def test_friction_bias_and_second_moments_are_found_with_their_sizes(found):
     assert told.loc["coulomb"]["value"].iloc[0] == pytest.approx(COULOMB, rel=0.05)
     assert told.loc["offset"]["value"].iloc[0] == pytest.approx(OFFSET, rel=0.1)
     assert any("second moment of joint_2" in name for name in told.loc["masses"].index)
+
+
+def test_masses_of_two_links_stand_side_by_side_among_the_values():
+    both = diagnose_motion(log(heavier=(0.3, 0.5)))
+    assert both.values["masses", "mass of joint_1"] > 0.2
+    assert both.values["masses", "mass of joint_2"] == pytest.approx(0.5, rel=0.15)
+    assert sorted(both.values.values()) == sorted(both.parameters["value"])
 
 
 def test_a_joint_stands_once_among_the_places(found):

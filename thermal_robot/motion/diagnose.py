@@ -175,7 +175,7 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
         return Finding(name, "not_found", probability, 0.0, title=title)
     rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
     places, estimates = dict[str, float](), []
-    for p, one, joint in ((p, model.parameters[p], model.keys[p][1]) for p in active):
+    for p, one, joint in ((p, model.parameters[p], model.joint_of(model.parameters[p])) for p in active):
         called = f"{one.label}, {joint}" if joint else one.label
         estimates.append(Estimate(called, float(choice.point.values[p]), float(deviations[p]), one.unit, True))
         if joint:

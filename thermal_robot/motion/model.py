@@ -31,7 +31,10 @@ SHARED = -1
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unknown of a model: the ``number`` that it moves in a joint, or the weight of a load that all joints share."""
+    """Unknown of a model: the ``number`` that it moves in a joint, or the weight of a load that all joints share.
+
+    ``of`` tells parameters apart that belong to one effect of all joints.
+    """
 
     effect: str
     joint: int
@@ -41,6 +44,7 @@ class Parameter:
     spread: float
     positive: bool
     number: str
+    of: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +94,12 @@ class JointModel(ABC):
 
     @cached_property
     def keys(self) -> list[tuple[str, str]]:
-        """Effect and joint of each parameter, the joint empty where all share it."""
-        return [(one.effect, "" if one.joint == SHARED else self.log.joints[one.joint]) for one in self.parameters]
+        """Effect of each parameter, and its joint or, where all joints share it, what it is of: no two are alike."""
+        return [(one.effect, self.joint_of(one) or one.of) for one in self.parameters]
+
+    def joint_of(self, parameter: Parameter) -> str:
+        """Return the name of a parameter's joint, empty where all share it."""
+        return "" if parameter.joint == SHARED else self.log.joints[parameter.joint]
 
     def index(self, effect: str, joint: int = SHARED) -> int | None:
         """Return the place of a parameter, ``None`` where the model has none of it."""

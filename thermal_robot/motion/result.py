@@ -62,7 +62,8 @@ class MotionDiagnosis(RenderedPage):
     faults
         Sentences about the log's own faults.
     values
-        By effect and joint (``""`` for all joints) the value that was fitted, SI.
+        By effect and joint the value that was fitted, SI; of all joints by ``""`` or, of the links' masses, by the name
+        that the parameter has in the finding.
     curves
         By joint: time, command, measured and simulated position, before and after, load and number of the motion.
     shares

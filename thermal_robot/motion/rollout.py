@@ -14,7 +14,7 @@ from thermal_robot.correction.mujoco_models import compiled, known, mujoco_or_er
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Motion, MotionLog
-from thermal_robot.motion.model import SHARED, ServoModel
+from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.result import MotionDiagnosis, rms
 
 
@@ -91,10 +91,9 @@ def rollout(found: MotionDiagnosis, mjcf: str | Path, log: MotionLog) -> Rollout
 def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
     """(P,) parameters of the diagnosis in a model of another log; ends of ranges are told from that log's commands."""
     values, first = np.zeros(len(model.parameters)), ServoModel(found.log)
-    for (effect, joint), value in found.values.items():
-        j = SHARED if joint == "" else model.log.joints.index(joint)
-        place = model.index(effect, j)
-        if place is None:
+    for p, (effect, joint) in enumerate(model.keys):
+        value, j = found.values.get((effect, joint), 0.0), model.parameters[p].joint
+        if not value:
             continue
         if effect == "low_stop":
             value = max(value + first.commanded[:, j].min() - model.commanded[:, j].min(), 0.0)
@@ -102,7 +101,7 @@ def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
             value = max(value - first.commanded[:, j].max() + model.commanded[:, j].max(), 0.0)
         elif effect == "contact":
             value = max(value + first.lowest - model.lowest, 0.0)
-        values[place] = value
+        values[p] = value
     return values
 
 

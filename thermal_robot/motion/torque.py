@@ -66,7 +66,8 @@ class TorqueModel(JointModel):
                 first = 0.1 * numbers[0] * settings.LINK
                 known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
                 for i, (what, (size, unit)) in enumerate(zip(_INERTIAL, known, strict=True), 10 * k):
-                    found.append(Parameter("masses", SHARED, what.format(name), unit, size, 1.0, False, f"mass {i}"))
+                    label = what.format(name)
+                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {i}", label))
         return tuple(found)
 
     @cached_property
