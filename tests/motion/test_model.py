@@ -8,12 +8,15 @@ from motion import arms
 from motion.arms import COUNT
 
 pytest.importorskip("numba", reason="the extra fast is not installed")
+pytest.importorskip("mujoco", reason="worlds are simulated by MuJoCo")
 
+from thermal_robot.blind.motions.fault import Fault
+from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.fit import Point, deflated, fit, ratios
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import held_out_loss
+from thermal_robot.motion.select import held_out_loss, select
 
 
 def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT):
@@ -134,6 +137,22 @@ def test_what_is_needed_lowers_the_loss_of_motions_held_out(known):
         less = values != 0.0
         less[model.index(effect, joint)] = False
         assert held_out_loss(point, less).sum() > 1.1 * whole, (effect, joint)
+
+
+def test_what_is_asked_of_a_choice_changes_no_probability():
+    """Of a short log, in which a dead zone does what friction does, and nobody asked for it."""
+    world = draw_world(np.random.default_rng(5), 3, 9)
+    world = replace(world, commands=world.commands[:, :300])
+    model = ServoModel(world.log(world.simulated(Fault("coulomb", 0, 0.05))))
+    names = np.array([one.effect for one in model.parameters])
+    choice = select(model, names != "dead_zone", lambda _: None)
+    told = [choice.probability(p) for p in range(len(names))]
+    own = np.flatnonzero(choice.active).tolist()
+    rivals = {names[k] for p in own for k in choice.alternatives(p)}
+    assert "coulomb" in names[own]
+    assert all(choice.odds(p) > 0.0 for p in own)
+    assert [choice.probability(p) for p in range(len(names))] == told
+    assert "dead_zone" not in rivals
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,11 +26,12 @@ ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 class Choice:
     """The effects that were chosen, and the model there.
 
-    ``active`` (P,) parameters; ``point`` of the exact fit, ``best`` and ``search`` the evidence there, ``deflation``
-    (P,) the ratios.
+    ``active`` (P,) parameters of those ``allowed`` (P,); ``point`` of the exact fit, ``best`` and ``search`` the
+    evidence there, ``deflation`` (P,) the ratios.
     """
 
     active: Mask
+    allowed: Mask
     point: Point
     best: Combination
     search: Search
@@ -45,16 +46,21 @@ class Choice:
         """(P,) parameters of the choice but one."""
         return np.asarray(self.active & (np.arange(len(self.active)) != block))
 
+    def evidence(self, active: Mask) -> float:
+        """Log evidence of parameters (P,), apart from the memo: what is asked changes no probability."""
+        apart = replace(self.search, seen={})
+        return apart.evaluate(np.flatnonzero(active).tolist(), self.best).log_evidence
+
     def odds(self, block: int) -> float:
         """Log odds of a parameter of the choice against nothing in its place."""
-        without = self.search.evaluate(np.flatnonzero(self.without(block)).tolist(), self.best)
-        return self.best.log_evidence - without.log_evidence
+        return self.best.log_evidence - self.evidence(self.without(block))
 
     def alternatives(self, block: int) -> list[int]:
         """Parameters that could stand in the place of one: their evidence is near that of the choice."""
-        rest, least = np.flatnonzero(self.without(block)).tolist(), self.best.log_evidence - settings.ALIKE
-        others = [b for b, rank in enumerate(self.search.gram.ranks) if rank and b not in self.best.blocks]
-        return [b for b in others if self.search.evaluate([*rest, b], self.best).log_evidence > least]
+        rest, least = self.without(block), self.best.log_evidence - settings.ALIKE
+        places = np.arange(len(rest))
+        others = places[self.allowed & ~self.active & (np.array(self.search.gram.ranks) > 0)].tolist()
+        return [b for b in others if self.evidence(rest | (places == b)) > least]
 
     def deviations(self) -> Array:
         """(P,) posterior standard deviations of the chosen parameters, NaN of the others."""
@@ -98,28 +104,38 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], st
         values = fit(model, values, known)
         model.refreshed(values)
         values = fit(model, values, known)
-        choice = _weighed(model, values, allowed, deflation, known, final=True)
+        choice = _weighed(model, values, allowed, deflation, known, frozenset())
         left = held_out_loss(choice.point, known).sum(axis=1) * choice.point.noise**2
         counts = [len(one.residual) for one in choice.point.rows]
         fitted.append((float(counts @ np.log(np.maximum(left, 1e-300))), choice))
     # a search that left the neighbourhood of its point may have chosen worse than the round before
     choice = min(fitted, key=lambda one: one[0])[1]
     model.refreshed(choice.point.values)
-    return _pruned(choice, allowed)
+    return _pruned(choice)
 
 
 def _weighed(
-    model: JointModel, values: Array, allowed: Mask, deflation: Array | None, start: Mask | None, final: bool = False
-) -> Choice:
-    """Search by evidence at some values; where ``final`` the choice is the start, and the search tells its rivals."""
+    model: JointModel, values: Array, allowed: Mask, deflation: Array | None, start: Mask | None,
+    gone: frozenset[int] | None = None,
+) -> Choice:  # fmt: skip
+    """Search by evidence at some values.
+
+    Where it is said which parameters are ``gone``, the choice is the start, and the search tells its rivals but these.
+    """
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
-    barred = frozenset(np.flatnonzero(~allowed).tolist())
+    barred = frozenset(np.flatnonzero(~allowed).tolist()) | (gone or frozenset())
     search = Search(deflated(point, deflation), [log_odds()] * len(values), out=barred)
     first = [] if start is None else np.flatnonzero(start).tolist()
     best = search.run(first)
-    best = search.evaluate(first) if final else best
-    return Choice(np.isin(np.arange(len(values)), best.blocks), point, best, search, deflation)
+    best = best if gone is None else search.evaluate(first)
+    return Choice(np.isin(np.arange(len(values)), best.blocks), allowed, point, best, search, deflation)
+
+
+def _fewer(choice: Choice, values: Array, kept: Mask) -> Choice:
+    """Return the choice of the parameters that are kept (P,), at values with them; those that go do not come back."""
+    gone = choice.search.out | set(np.flatnonzero(choice.active & ~kept).tolist())
+    return _weighed(choice.point.model, values, choice.allowed, choice.deflation, kept, gone)
 
 
 def held_out_loss(point: Point, active: Mask) -> Array:
@@ -135,23 +151,20 @@ def held_out_loss(point: Point, active: Mask) -> Array:
     return np.asarray(total + fitted - 2.0 * (found * along).sum(axis=2))
 
 
-def _pruned(choice: Choice, allowed: Mask) -> Choice:
+def _pruned(choice: Choice) -> Choice:
     """Backward elimination by odds below nine to one or harm in motions held out, the worst first.
 
     What stays is fitted exactly, and judged again there.
     """
-    model = choice.point.model
     for _ in range(settings.SELECTIONS):
         kept = _kept(choice)
-        allowed = allowed & (kept | ~choice.active)
-        values = fit(model, choice.point.values, kept)
-        choice = _weighed(model, values, allowed, choice.deflation, kept, final=True)
+        choice = _fewer(choice, fit(choice.point.model, choice.point.values, kept), kept)
         if (_kept(choice) == kept).all():
             break
-    return _needed(choice, allowed)
+    return _needed(choice)
 
 
-def _needed(choice: Choice, allowed: Mask) -> Choice:
+def _needed(choice: Choice) -> Choice:
     """Likelihood-ratio test of the weakest effect at the exact fit without it, counting what motions are worth.
 
     No odds exceed that ratio; but a linear problem misses what other effects can do together in its place.
@@ -163,20 +176,18 @@ def _needed(choice: Choice, allowed: Mask) -> Choice:
         values = fit(model, choice.point.values, less)
         if worth @ np.log(Point.at(model, values, less).noise / choice.point.noise) >= np.log(settings.ODDS):
             break
-        allowed = allowed & (less | ~choice.active)
-        choice = _weighed(model, values, allowed, choice.deflation, less, final=True)
+        choice = _fewer(choice, values, less)
     return choice
 
 
 def _kept(choice: Choice) -> Mask:
     """Backward elimination at a fit: mask of the parameters with enough odds that do no harm on held-out rows."""
-    active, search = choice.active & seen(choice.point), choice.search
+    active = choice.active & seen(choice.point)
     while active.any():
-        best = search.evaluate(np.flatnonzero(active).tolist(), choice.best)
-        whole, worst = held_out_loss(choice.point, active).sum(), None
-        for block in best.blocks:
+        here, whole, worst = choice.evidence(active), held_out_loss(choice.point, active).sum(), None
+        for block in np.flatnonzero(active).tolist():
             less = active & (np.arange(len(active)) != block)
-            odds = best.log_evidence - search.evaluate(np.flatnonzero(less).tolist(), best).log_evidence
+            odds = here - choice.evidence(less)
             harm = whole - held_out_loss(choice.point, less).sum()
             if (odds < np.log(settings.ODDS) or harm > 0.0) and (worst is None or odds < worst[0]):
                 worst = odds, block
