@@ -12,6 +12,8 @@ from thermal_robot.blind.motions.fault import NOTHING, Fault
 from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.diagnosis.values import HeldOut, Unexplained
 from thermal_robot.errors import CampaignError
+from thermal_robot.motion.diagnose import diagnose_motion
+from thermal_robot.motion.mjcf import servos_of_mjcf
 from thermal_robot.motion.result import MotionDiagnosis
 from thermal_robot.motion.rollout import Rollout, rollout, simulated
 from thermal_robot.motion.write import causes, motion_mjcf, motion_urdf
@@ -74,6 +76,25 @@ def test_mujoco_with_what_was_written_does_what_the_faulty_arm_did(name, size, v
     moved = float(np.abs(faulty.position - sound.position).max())
     assert moved > 1e-3
     assert float(np.abs(own - faulty.position).max()) < 0.03 * moved + 1e-5
+
+
+@pytest.mark.parametrize(("name", "size"), [("gain", 0.03), ("zero", 0.02)])
+def test_a_servo_that_was_written_is_read_again_and_leaves_nothing_to_find(name, size, tmp_path):
+    world = strong(a_world(motions=4))
+    log = world.log(world.simulated(Fault(name, JOINT, size)))
+    found = diagnose_motion(log, only=("gain", "zero", "kp"))
+    assert found.values[name, log.joints[JOINT]] == pytest.approx(size, rel=0.05)
+    (tmp_path / "arm.xml").write_text(motion_mjcf(found, world.mjcf()).text)
+    better = replace(log, servos=servos_of_mjcf(tmp_path / "arm.xml"))
+    assert list(better.servos) == list(log.joints)
+    again = diagnose_motion(better, only=("gain", "zero", "kp"))
+    assert again.values == {}
+    assert again.rms_before == pytest.approx(found.rms_after, rel=0.05)
+    more = found_of(better, {"zero": 1e-3})
+    (tmp_path / "arm.xml").write_text(motion_mjcf(more, tmp_path / "arm.xml").text)
+    servo, before = (one[log.joints[JOINT]] for one in (servos_of_mjcf(tmp_path / "arm.xml"), better.servos))
+    assert servo.zero == pytest.approx((before.zero or 0.0) + 1e-3, rel=1e-4)
+    assert servo.gain == (before.gain and pytest.approx(before.gain, rel=1e-3))
 
 
 def test_a_delay_of_every_joint_is_held_by_the_actuators():

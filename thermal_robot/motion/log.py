@@ -79,12 +79,16 @@ class Servo:
         Largest torque, N·m.
     dead_band
         Error within which the servo does nothing, rad.
+    gain, zero
+        Share of the command and rad that it adds: at rest without load the joint is at (1 + gain) u + zero.
     """
 
     kp: float | None = None
     kd: float | None = None
     limit: float | None = None
     dead_band: float | None = None
+    gain: float | None = None
+    zero: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

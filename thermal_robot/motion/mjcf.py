@@ -30,18 +30,29 @@ def opened(file: Path) -> Any:
     return compiled(file)[1]
 
 
+def position_actuators(model: Any) -> dict[str, int]:
+    """Return the number of the first position actuator of each joint: one that pulls to its command, whatever its gain.
+
+    Its force is g₀ u + b₀ + b₁ q + b₂ q̇ with g₀ > 0 > b₁, see :mod:`thermal_robot.motion.write`.
+    """
+    at_joint = model.actuator_trntype == mujoco_or_error().mjtTrn.mjTRN_JOINT
+    pulls = at_joint & (model.actuator_gainprm[:, 0] > 0.0) & (model.actuator_biasprm[:, 1] < 0.0)
+    found: dict[str, int] = {}
+    for k in np.flatnonzero(pulls).tolist():
+        found.setdefault(model.joint(model.actuator_trnid[k, 0]).name, k)
+    return found
+
+
 def servos_of_mjcf(file: Path) -> dict[str, Servo]:
-    """Return stiffness, damping and limit of the position actuators, by joint, as they act on the joint."""
-    mujoco, model, found = mujoco_or_error(), opened(file), {}
-    for k in range(model.nu):
-        joint, gear = int(model.actuator_trnid[k, 0]), float(model.actuator_gear[k, 0])
-        gain, (_, stiff, damp) = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k, :3]
-        at_joint = model.actuator_trntype[k] == mujoco.mjtTrn.mjTRN_JOINT
-        if at_joint and gain > 0.0 and np.isclose(stiff, -gain):
-            limits = [abs(gear) * float(model.actuator_forcerange[k, 1])] if model.actuator_forcelimited[k] else []
-            limits += [float(model.jnt_actfrcrange[joint, 1])] if model.jnt_actfrclimited[joint] else []
-            limit = min(limits, default=None)
-            found[model.joint(joint).name] = Servo(gain * gear**2, -float(damp) * gear**2 or None, limit)
+    """Return stiffness, damping, limit, gain and zero of the position actuators, by joint, as they act on the joint."""
+    model, found = opened(file), {}
+    for name, k in position_actuators(model).items():
+        joint, gear = model.joint(name).id, float(model.actuator_gear[k, 0])
+        gain, (offset, stiff, damp) = model.actuator_gainprm[k, 0], model.actuator_biasprm[k, :3]
+        limits = [abs(gear) * float(model.actuator_forcerange[k, 1])] if model.actuator_forcelimited[k] else []
+        limits += [float(model.jnt_actfrcrange[joint, 1])] if model.jnt_actfrclimited[joint] else []
+        numbers = (-stiff * gear**2, -damp * gear**2, min(limits, default=0.0), 0.0, -gain / stiff - 1.0)
+        found[name] = Servo(*(float(x) or None for x in (*numbers, -offset / stiff / gear)))
     return found
 
 
@@ -50,11 +61,8 @@ def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
 
     Arrays are qpos, qvel, qfrc_actuator and, by position actuators, ctrl.
     """
-    model, servos, ctrl = opened(file), servos_of_mjcf(file), {}
-    for k in range(model.nu):
-        joint = model.joint(int(model.actuator_trnid[k, 0])).name
-        if joint in servos:
-            ctrl[joint] = (k, 1.0 / float(model.actuator_gear[k, 0]))
+    model = opened(file)
+    ctrl = {joint: (k, 1.0 / float(model.actuator_gear[k, 0])) for joint, k in position_actuators(model).items()}
     single = [k for k in range(model.njnt) if model.jnt_type[k] in (_SLIDE, _HINGE)]
     q = {model.joint(k).name: (int(model.jnt_qposadr[k]), 1.0) for k in single}
     v = {model.joint(k).name: (int(model.jnt_dofadr[k]), 1.0) for k in single}

@@ -30,7 +30,7 @@ from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo, joint_ki
 from thermal_robot.motion.refuse import refused
 from thermal_robot.motion.settings import FEWEST_SAMPLES, LONGEST_GAP
 from thermal_robot.robot import Robot
-from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, either, mapping, record, text
+from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, either, mapping, number, record, text
 from thermal_robot.schema import listed as list_of
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ FILE_NAME = "motion.toml"
 _COLUMN = text("the name of a column")
 _PATH = text("the path of a table")
 _OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": NOT_NEGATIVE}
+_OF_A_SERVO |= {"gain": number(above=-1.0), "zero": number()}
 TOLERANCE = mapping(NOT_NEGATIVE)
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "robot": {
@@ -417,9 +418,9 @@ def _channel(
     """Return the samples of a quantity by motion, clocks as recorded; rows in which no joint has any are left out."""
     kinds_of = joint_kinds(robot)
     parts: dict[str, list[tuple[Array, Array]]] = {}
-    for number, clock in enumerate(clocks):
+    for k, clock in enumerate(clocks):
         values = np.full((len(clock.time), len(joints)), np.nan)
-        own = [source for source in held if source.table == number]
+        own = [source for source in held if source.table == k]
         for source in sorted(own, key=lambda each: bool(each.joint)):  # a joint's own column counts for more
             if source.joint and source.joint not in joints:
                 continue
@@ -428,8 +429,8 @@ def _channel(
             chosen = joints.index(source.joint) if source.joint else slice(None)
             values[:, chosen] = cells if source.joint else cells[:, None]
         some = clock.kept & ~np.isnan(values).all(axis=1)
-        for k, label in enumerate(clock.order if some.any() else ()):
-            rows = np.flatnonzero(some & (clock.index == k))
+        for m, label in enumerate(clock.order if some.any() else ()):
+            rows = np.flatnonzero(some & (clock.index == m))
             if len(rows):
                 parts.setdefault(label, []).append((clock.time[rows], values[rows]))
     return {label: _merged(several) for label, several in parts.items()}

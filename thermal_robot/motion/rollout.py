@@ -14,6 +14,7 @@ from thermal_robot.correction.mujoco_models import compiled, known, mujoco_or_er
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Motion, MotionLog
+from thermal_robot.motion.mjcf import position_actuators
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.result import MotionDiagnosis, rms
 
@@ -112,8 +113,8 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
     """
     mujoco = mujoco_or_error()
     file, model, _ = compiled(mjcf)
-    numbers = [known(model, "joint", name) for name in log.joints]
-    servos = [_servo(model, number) for number in numbers]
+    numbers, own_servos = [known(model, "joint", name) for name in log.joints], position_actuators(model)
+    servos = [own_servos.get(name) for name in log.joints]
     for name, number, servo in zip(log.joints, numbers, servos, strict=True):
         if number is None or servo is None:
             problem = f"has no {'joint' if number is None else 'position actuator of joint'} {name!r}"
@@ -122,13 +123,6 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
     own = {int(model.jnt_dofadr[number]) for number in numbers}
     held = [d for d in range(model.nv) if d not in own]
     return [_motion(mujoco, model, motion, at, servos, held) for motion in log.motions]
-
-
-def _servo(model: Any, joint: int | None) -> int | None:
-    """Return the number of the position actuator of a joint."""
-    hinge = mujoco_or_error().mjtTrn.mjTRN_JOINT
-    at_joint = (model.actuator_trntype == hinge) & (model.actuator_trnid[:, 0] == joint)
-    return next(iter(np.flatnonzero(at_joint & (model.actuator_biasprm[:, 1] != 0.0)).tolist()), None)
 
 
 def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence[Any], held: list[int]) -> Array:

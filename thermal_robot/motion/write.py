@@ -22,6 +22,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.urdf import text_of, tree
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Servo
+from thermal_robot.motion.mjcf import position_actuators
 from thermal_robot.motion.result import MotionDiagnosis
 
 _FAR = 1e3
@@ -85,6 +86,12 @@ class Cause:
         return self.stiffness / (self.values["torque_limit"] + stated)
 
     @property
+    def law(self) -> tuple[float, float]:
+        """Gain and zero, rad, of the position servo: the stated ones with what was found of them."""
+        gain, zero = (self.values.get(name, 0.0) for name in ("gain", "zero"))
+        return gain + (self.servo.gain or 0.0), zero + (self.servo.zero or 0.0)
+
+    @property
     def stops(self) -> tuple[float | None, float | None]:
         """End stops that were found, rad."""
         low, high = (self.values.get(name) for name in ("low_stop", "high_stop"))
@@ -123,16 +130,17 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
         If MuJoCo is not installed or does not take the model, or if that lacks a joint of the log.
     """
     mujoco = mujoco_or_error()
-    name, _, path = compiled(mjcf)  # refused in words
+    name, model, path = compiled(mjcf)  # refused in words
     spec = mujoco.MjSpec.from_file(str(path)) if path else mujoco.MjSpec.from_string(str(mjcf))
     written, joints = Written(), {joint.name: joint for joint in spec.joints}
+    servos = {joint: spec.actuators[k] for joint, k in position_actuators(model).items()}
     for cause in causes(found):
         if cause.name not in joints:
             raise CampaignError(name, f"has no joint {cause.name!r}", found=", ".join(joints) or "no joint")
         _into_joint(joints[cause.name], cause, written)
         if cause.torque("coulomb") is not None:
             stick(spec, joints[cause.name])
-        _into_servo(spec, cause, written)
+        _into_servo(spec, servos.get(cause.name), cause, written)
         _tell_kept(cause, written, _CANNOT)
     _into_masses(spec, found, written)
     spec.compile()
@@ -180,15 +188,18 @@ def _into_joint(joint: Any, cause: Cause, written: Written) -> None:
         written.held.append(f"range of {cause.name}: {low:.4g} to {high:.4g} rad")
 
 
-def _into_servo(spec: Any, cause: Cause, written: Written) -> None:
+def _into_servo(spec: Any, actuator: Any, cause: Cause, written: Written) -> None:
     """Write stiffness, zero, gain, limit and delay into the position actuator of a joint, or into a new one."""
     stiffness, limit = cause.stiffness, cause.limit
     told = {"kp", "droop", "zero", "gain", "torque_limit", "delay"} & set(cause.values)
     if stiffness is None or not told:
         return
-    actuator = _servo_of(spec, cause, written)
-    gear = float(actuator.gear[0])
-    gain, zero = cause.values.get("gain", 0.0), cause.values.get("zero", 0.0)
+    if actuator is None:
+        at = mujoco_or_error().mjtTrn.mjTRN_JOINT
+        actuator = spec.add_actuator(name=f"{cause.name} servo", target=cause.name, trntype=at)
+        actuator.set_to_position(kp=1.0)
+        written.held.append(f"a position actuator of {cause.name}, which had none")
+    gear, (gain, zero) = float(actuator.gear[0]), cause.law
     actuator.gainprm[0] = stiffness * (1.0 + gain) / gear**2
     actuator.biasprm[0], actuator.biasprm[1] = stiffness * zero / gear, -stiffness / gear**2
     for name, value, unit in (("kp", stiffness, "N·m/rad"), ("zero", zero, "rad"), ("gain", gain, "")):
@@ -205,19 +216,6 @@ def _into_servo(spec: Any, cause: Cause, written: Written) -> None:
     elif "delay" in told:
         reason = f"this version of MuJoCo has no delay of actuators; command it {1e3 * delay:.0f} ms later"
         written.kept.append(f"delay of {cause.name}: {reason}")
-
-
-def _servo_of(spec: Any, cause: Cause, written: Written) -> Any:
-    """Return the position actuator of a joint."""
-    mujoco = mujoco_or_error()
-    for actuator in spec.actuators:
-        at_joint = actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT and actuator.target == cause.name
-        if at_joint and actuator.gainprm[0] > 0.0 and np.isclose(actuator.biasprm[1], -actuator.gainprm[0]):
-            return actuator
-    actuator = spec.add_actuator(name=f"{cause.name} servo", target=cause.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    actuator.set_to_position(kp=1.0)
-    written.held.append(f"a position actuator of {cause.name}, which had none")
-    return actuator
 
 
 def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
