@@ -14,6 +14,7 @@ from thermal_robot.blind.motions.fault import Fault
 from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.fit import Point, deflated, fit, ratios
+from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
 from thermal_robot.motion.select import held_out_loss, select
@@ -110,6 +111,14 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     near = 1e-3 * np.abs(gram.vector).max()
     np.testing.assert_allclose(gram.matrix @ found, gram.vector, atol=near)
     assert [one.effect for one in model.parameters if one.joint == SHARED] == ["payload", "contact"]
+
+
+def test_few_motions_are_cut_into_as_many_pieces_for_the_fit_as_for_faults():
+    whole = arms.log(*arms.tables(9, 8.0, 3)).with_joints(("joint_1",))
+    for count, independent in ((1, 8), (3, 9), (7, 14), (8, 8), (9, 9)):
+        log = replace(whole, motions=whole.motions[:count])
+        assert len(clusters(log)) == independent
+        np.testing.assert_array_equal(np.unique(ServoModel(log).motion_of(0)), np.arange(independent))
 
 
 def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(known):

@@ -11,7 +11,7 @@ from scipy.stats import siegelslopes
 from thermal_robot.arrays import Array
 from thermal_robot.motion.following import Correlation, Moves, slope
 from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog
-from thermal_robot.motion.settings import CLEAR, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
+from thermal_robot.motion.settings import CLEAR, CLUSTERS, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
 
 _COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
 _MOST = 8  # motions that tell a rate roughly
@@ -112,7 +112,7 @@ def _drift(motions: Sequence[Motion]) -> tuple[float, float, bool]:
             away = np.abs(lag - np.median(lag))
             kept = away <= CLEAR * max(_SIGMA * np.median(away), STRIDE)
             t, lag = t[kept] - t[kept].mean(), lag[kept] - lag[kept].mean()
-            whole = len(motions) >= _MOST
+            whole = len(motions) >= CLUSTERS
             squares += [(t @ t,)] if whole else [(each * each,) for each in t]
             products += [(t @ lag,)] if whole else [(a * b,) for a, b in zip(t, lag, strict=True)]
     far = lost > len(sizes) or max(sizes) > _NEAR / 4.0

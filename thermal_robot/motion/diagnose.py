@@ -17,6 +17,7 @@ from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import fit
+from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
@@ -85,7 +86,7 @@ def _gate(choice: Choice) -> dict[str, float]:
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
     """
-    if choice.point.model.pieces > 1:  # what one motion leaves has no others to be compared with
+    if parts(choice.point.model.log) > 1:  # what one motion leaves has no others to be compared with
         return {}
     kinds = np.array([m.kind or m.name for m in choice.point.model.log.motions])
     each = np.zeros((len(kinds), len(choice.point.rows)))

@@ -18,6 +18,7 @@ from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import EFFECTS, size
+from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
@@ -78,19 +79,14 @@ class JointModel(ABC):
     @cached_property
     def clusters(self) -> int:
         """Number of motions, or of the pieces into which few are cut: what counts as independent."""
-        return len(self.log.motions) * self.pieces
-
-    @cached_property
-    def pieces(self) -> int:
-        """Pieces of every motion: one, unless there are too few motions to be counted."""
-        count = len(self.log.motions)
-        return 1 if count >= settings.CLUSTERS else -(-settings.BLOCKS // count)
+        return len(self.log.motions) * parts(self.log)
 
     def cluster_of(self, motion: NDArray[np.int64]) -> NDArray[np.int64]:
         """(N,) number of the cluster of readings whose motions (N,) are in order."""
         counts = np.bincount(motion, minlength=len(self.log.motions))
         place = np.arange(len(motion)) - (np.cumsum(counts) - counts)[motion]
-        return np.asarray(motion * self.pieces + place * self.pieces // np.maximum(counts[motion], 1))
+        pieces = parts(self.log)
+        return np.asarray(motion * pieces + place * pieces // np.maximum(counts[motion], 1))
 
     @cached_property
     def keys(self) -> list[tuple[str, str]]:

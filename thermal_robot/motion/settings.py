@@ -67,9 +67,10 @@ STEP = 4e-3
 """s: longest time step, a tenth of the shortest lag that is found."""
 DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
-CLUSTERS, BLOCKS = 8, 20
-"""Motions from which they count as independent: fewer give no standard error worth the name. Below, a fit cuts them
-into so many blocks, and ± is said to be weak."""
+CLUSTERS = 8
+"""Motions from which they count as independent: fewer give no standard error worth the name. Fewer are cut into pieces
+until there are so many, and ± is said to be weak. No more: errors hang together within a motion, and the shorter the
+pieces, the less of that is seen."""
 ROUNDS = 12
 """Gauss-Newton steps at most of one fit."""
 SETTLED = 1e-3
