@@ -1,6 +1,7 @@
 """The torque channel: friction, second moments and bias found in torques that Pinocchio computes of another arm."""
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -10,11 +11,14 @@ import pytest
 pytest.importorskip("numba", reason="the extra fast is not installed")
 
 from thermal_robot.blind.motions.arm import TOOL, draw_arm
-from thermal_robot.motion import motion_from_table
+from thermal_robot.errors import CampaignError
+from thermal_robot.motion import Servo, motion_from_table
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.model import ServoModel
+from thermal_robot.motion.rollout import rollout
 from thermal_robot.motion.torque import _prandtl
+from thermal_robot.motion.write import motion_urdf
 from thermal_robot.robot import load_robot
 
 ARM = draw_arm(np.random.default_rng(4), 2)
@@ -81,6 +85,20 @@ def test_masses_of_two_links_stand_side_by_side_among_the_values():
     assert both.values["masses", "mass of joint_1"] > 0.2
     assert both.values["masses", "mass of joint_2"] == pytest.approx(0.5, rel=0.15)
     assert sorted(both.values.values()) == sorted(both.parameters["value"])
+
+
+@pytest.mark.parametrize("kp", [None, 20.0])
+def test_torques_are_written_as_they_are_whatever_the_servo(found, kp):
+    """Friction and damping are in N·m whether a stiffness is stated or not; what a file does not hold is said."""
+    servos = {joint: Servo(kp) for joint in found.log.joints} if kp else {}
+    values = found.values | {("viscous", "joint_1"): 0.3}
+    written = motion_urdf(replace(found, log=replace(found.log, servos=servos), values=values))
+    dynamics = ElementTree.fromstring(written.text.encode()).find("joint[@name='joint_1']/dynamics")
+    assert float(dynamics.get("friction")) == pytest.approx(COULOMB, rel=0.05)
+    assert float(dynamics.get("damping")) == pytest.approx(0.3)
+    assert {told.split(" of ")[0].split(":")[0] for told in written.kept} == {"offset", "masses"}
+    with pytest.raises(CampaignError, match="explains torques"):
+        rollout(found, "<mujoco/>", found.log)
 
 
 def test_a_joint_stands_once_among_the_places(found):

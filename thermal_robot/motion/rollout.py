@@ -73,8 +73,12 @@ def rollout(found: MotionDiagnosis, mjcf: str | Path, log: MotionLog) -> Rollout
     Raises
     ------
     CampaignError
-        If MuJoCo is not installed or does not take the model, or if the log has other joints, or a joint no servo.
+        If MuJoCo is not installed or does not take the model, if the log has other joints, or a joint no servo, or if
+        the diagnosis is one of torques.
     """
+    if found.unit != "rad":
+        problem = "the diagnosis explains torques, and says nothing of what follows a command"
+        raise CampaignError(found.log.name, problem, expected="a log of commands")
     if log.joints != found.log.joints:
         raise CampaignError(log.name, "has other joints", found=str(log.joints), expected=str(found.log.joints))
     model = ServoModel(log)

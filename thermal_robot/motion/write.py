@@ -1,8 +1,8 @@
 """Parameters of a diagnosis of motions written into the user's simulator: MJCF by MuJoCo's MjSpec, and URDF.
 
-The servo model divides torques by the servo's stiffness K; what a robot file holds is in N·m, and K is the stated one
-with its change, or one over the droop that was found. In MuJoCo a position actuator's force is that of Hooke's law with
-offset and gain, and acts on its joint times its gear:
+The servo model divides torques by the servo's stiffness K, the model of the torque channel does not; what a robot file
+holds is in N·m, and K is the stated one with its change, or one over the droop that was found. In MuJoCo a position
+actuator's force is that of Hooke's law with offset and gain, and acts on its joint times its gear:
 
     f = g₀ u + b₀ + b₁ q + b₂ q̇ ,   g₀ = K (1 + g) ,  b₀ = K z ,  b₁ = −K ,  b₂ = −k_d .
 """
@@ -34,8 +34,17 @@ _CANNOT = {
     "load_friction": "its friction does not grow with load",
     "stribeck": "its friction does not fall with speed",
     "contact": "it is the surroundings' and not the robot's",
+    "offset": "it is the torque channel's and not the robot's",
+    "torque_constant": "it is the torque channel's and not the robot's",
+    "masses": "torques of joints tell sums of the links' numbers, and no link's own",
 }
 """Effects that neither an MJCF nor a URDF holds, and why."""
+_OF_A_JOINT = (
+    ("frictionloss", "friction", "coulomb", "N·m"),
+    ("damping", "damping", "lag", "N·m·s/rad"),
+    ("damping", "damping", "viscous", "N·m·s/rad"),
+)
+"""What an MJCF and a URDF call a joint's friction and damping, the effects that are these, and the unit."""
 _OF_THE_SERVO = dict.fromkeys(("armature", "delay", "gain", "zero", "kp", "droop"), "a URDF describes no servo")
 
 
@@ -62,12 +71,15 @@ class Cause:
         Of its effects, by name.
     reach
         rad, lowest and highest command.
+    torques
+        Whether the values of friction, damping and inertia are torques, and not over the stiffness.
     """
 
     name: str
     servo: Servo
     values: dict[str, float]
     reach: tuple[float, float]
+    torques: bool = False
 
     @property
     def stiffness(self) -> float | None:
@@ -98,8 +110,9 @@ class Cause:
         return None if low is None else self.reach[0] + low, None if high is None else self.reach[1] - high
 
     def torque(self, name: str) -> float | None:
-        """Return an effect over the stiffness as torque, N·m, N·m·s/rad or kg·m²; ``None`` where it is not found."""
-        return None if self.stiffness is None or name not in self.values else self.stiffness * self.values[name]
+        """Return an effect as torque, N·m, N·m·s/rad or kg·m²; ``None`` where it is not found, or nothing tells it."""
+        factor = 1.0 if self.torques else self.stiffness
+        return None if factor is None or name not in self.values else factor * self.values[name]
 
 
 def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
@@ -108,7 +121,7 @@ def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
     commands = np.concatenate([motion.command.values for motion in log.motions])
     for name, low, high in zip(log.joints, np.nanmin(commands, axis=0), np.nanmax(commands, axis=0), strict=True):
         values = {effect: value for (effect, joint), value in found.values.items() if joint == name}
-        told.append(Cause(name, log.servo(name), values, (float(low), float(high))))
+        told.append(Cause(name, log.servo(name), values, (float(low), float(high)), found.unit == "N·m"))
     return tuple(told)
 
 
@@ -167,15 +180,14 @@ def _tell_kept(cause: Cause, written: Written, reasons: dict[str, str]) -> None:
 def _need_stiffness(cause: Cause, written: Written, *effects: str) -> None:
     """Record the effects that cannot be written because the joint's stiffness is unknown."""
     for effect in effects:
-        if effect in cause.values and cause.stiffness is None:
+        if effect in cause.values and cause.stiffness is None and not cause.torques:
             reason = "its stiffness is not stated, and no droop tells it, so that no torque follows"
             written.kept.append(f"{effect} of {cause.name}: {reason}; state [servo.{cause.name}] kp")
 
 
 def _into_joint(joint: Any, cause: Cause, written: Written) -> None:
     _need_stiffness(cause, written, "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay")
-    put = {"frictionloss": ("coulomb", "N·m"), "damping": ("lag", "N·m·s/rad"), "armature": ("armature", "kg·m²")}
-    for what, (effect, unit) in put.items():
+    for what, _, effect, unit in (*_OF_A_JOINT, ("armature", "", "armature", "kg·m²")):
         value = cause.torque(effect)
         if value is not None:
             set_damping(joint, value) if what == "damping" else setattr(joint, what, value)
@@ -236,8 +248,8 @@ def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
 def _payload(found: MotionDiagnosis, written: Written) -> tuple[float, Array]:
     """Payload to be added, kg, and its centre in the tool frame, m; what is no load at the tool is told as kept."""
     mass = found.values.get(("payload", ""), 0.0)
-    if ("contact", "") in found.values:
-        written.kept.append(f"contact: {_CANNOT['contact']}")
+    whole = dict.fromkeys(effect for effect, _ in found.values if effect in ("contact", "masses"))
+    written.kept += [f"{effect}: {_CANNOT[effect]}" for effect in whole]
     if mass < 0.0:
         said = f"payload: {-mass:.4g} kg less than the masses say; which of them, no log of one load tells"
         written.kept.append(said)
@@ -263,7 +275,7 @@ def motion_urdf(found: MotionDiagnosis) -> Written:
         if cause.name not in joints:
             raise CampaignError("the URDF", f"has no joint {cause.name!r}", found=", ".join(map(str, joints)))
         _need_stiffness(cause, written, "coulomb", "lag", "torque_limit")
-        for key, effect, unit in (("friction", "coulomb", "N·m"), ("damping", "lag", "N·m·s/rad")):
+        for _, key, effect, unit in _OF_A_JOINT:
             _attribute(joints[cause.name], "dynamics", key, cause.torque(effect), cause, written, unit)
         limit = cause.limit if "torque_limit" in cause.values and cause.stiffness is not None else None
         _attribute(joints[cause.name], "limit", "effort", limit, cause, written, "N·m")
