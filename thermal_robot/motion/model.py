@@ -134,12 +134,8 @@ class JointModel(ABC):
         """One sigma of the readings of a joint."""
 
     @abstractmethod
-    def followed(self, joint: int) -> tuple[Array, ...]:
-        """(N,) what the residual of a joint may follow: position, velocity, load and time."""
-
-    @abstractmethod
-    def drawn(self, joint: int) -> tuple[Array, ...]:
-        """(N,) time, command, what was measured, and load, at the readings of a joint."""
+    def readings(self, joint: int) -> dict[str, Array]:
+        """(N,) time, s, command and what was measured, and position, velocity and load there, of a joint, by name."""
 
     def motion_of(self, joint: int) -> NDArray[np.int64]:
         """(N,) number of the cluster of each reading of a joint."""
@@ -147,17 +143,19 @@ class JointModel(ABC):
 
     def quantities(self, joint: int) -> dict[str, Array]:
         """(N,) what the residual of a joint may follow, by name."""
-        names = f"the position of {self.log.joints[joint]}", "velocity", "load", "time"
-        return dict(zip(names, self.followed(joint), strict=True))
+        told = self.readings(joint)
+        rest = {name: told[name] for name in ("velocity", "load", "time")}
+        return {f"the position of {self.log.joints[joint]}": told["position"], **rest}
 
     def curves(self, joint: int, values: Array) -> pd.DataFrame:
         """Table of what is drawn of a joint; ``nominal`` is simulated without any effect."""
         import pandas as pd
 
-        time, command, measured, load = self.drawn(joint)
-        nominal, simulated = measured - self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        given = {"motion": self.motions[joint], "time": time, "command": command, "measured": measured}
-        return pd.DataFrame({**given, "nominal": nominal, "simulated": simulated, "load": load})
+        told = self.readings(joint)
+        nominal, simulated = told["measured"] - self.residuals(joint, np.stack([np.zeros_like(values), values]))
+        given = {name: told[name] for name in ("time", "command", "measured")}
+        more = {"nominal": nominal, "simulated": simulated, "load": told["load"]}
+        return pd.DataFrame({"motion": self.motions[joint], **given, **more})
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
         """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.
@@ -352,16 +350,17 @@ class ServoModel(JointModel):
         steps = np.abs(np.diff(np.unique(np.round(self._samples[joint][0], 9))))
         return max(float(np.median(steps)) / np.sqrt(12.0) if len(steps) else 0.0, settings.LEAST_NOISE)
 
-    def followed(self, joint: int) -> tuple[Array, ...]:
-        """(N,) position, velocity, load and time at the step before each reading."""
-        (_, at, _, motion), velocity = self._samples[joint], np.gradient(self.about[:, joint], self.step)
-        return self.about[at, joint], velocity[at], self.loads.torque[0, at, joint], self.grid[at] - self.first[motion]
-
-    def drawn(self, joint: int) -> tuple[Array, ...]:
-        """(N,) time, s, command and measured position, rad, and load, N·m."""
+    def readings(self, joint: int) -> dict[str, Array]:
+        """(N,) by name: time, s, of each reading, command and measured position, and what is simulated just before."""
         measured, at, beyond, motion = self._samples[joint]
-        time, near = self.grid[at] + beyond * self.step - self.first[motion], np.where(beyond > 0.5, at + 1, at)
-        return time, self.commanded[near, joint], measured, self.loads.torque[0, at, joint]
+        return {
+            "time": self.grid[at] + beyond * self.step - self.first[motion],
+            "command": self.commanded[np.where(beyond > 0.5, at + 1, at), joint],
+            "measured": measured,
+            "position": self.about[at, joint],
+            "velocity": np.gradient(self.about[:, joint], self.step)[at],
+            "load": self.loads.torque[0, at, joint],
+        }
 
     def refreshed(self, values: Array) -> None:
         """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.

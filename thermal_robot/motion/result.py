@@ -137,12 +137,7 @@ class MotionDiagnosis(RenderedPage):
         return own or effect.replace("_", " ")
 
     def visible(self, effect: str) -> tuple[str, ...]:
-        """Joints that an effect moves by twice the encoder's noise, and by the tolerance that the log states.
-
-        Where nobody computed how far it moves them, all joints in which it acts.
-        """
-        if not self.moves:
-            return tuple(one.name for one in self.finding(effect).locations) or tuple(self.joints)
+        """Joints that an effect moves by twice the encoder's noise, and by the tolerance that the log states."""
         least = {name: self.log.visible_from(name, one.noise) for name, one in self.joints.items()}
         return tuple(name for name, size in least.items() if self.moves.get((effect, name), 0.0) >= size)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.correction.mujoco_models import compiled, known, mujoco_or_error
+from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Motion, MotionLog
@@ -117,14 +117,12 @@ def simulated(mjcf: str | Path, log: MotionLog) -> list[Array]:
     """
     mujoco = mujoco_or_error()
     file, model, _ = compiled(mjcf)
-    numbers, own_servos = [known(model, "joint", name) for name in log.joints], position_actuators(model)
-    servos = [own_servos.get(name) for name in log.joints]
-    for name, number, servo in zip(log.joints, numbers, servos, strict=True):
-        if number is None or servo is None:
-            problem = f"has no {'joint' if number is None else 'position actuator of joint'} {name!r}"
-            raise CampaignError(file, problem)
-    at = np.array([model.jnt_qposadr[number] for number in numbers])
-    own = {int(model.jnt_dofadr[number]) for number in numbers}
+    actuators = position_actuators(model)
+    for name in log.joints:
+        if name not in actuators:
+            raise CampaignError(file, f"has no position actuator of a joint {name!r}")
+    servos, numbers = [actuators[name] for name in log.joints], [model.joint(name).id for name in log.joints]
+    at, own = model.jnt_qposadr[numbers], set(model.jnt_dofadr[numbers].tolist())
     held = [d for d in range(model.nv) if d not in own]
     return [_motion(mujoco, model, motion, at, servos, held) for motion in log.motions]
 

@@ -136,16 +136,12 @@ class TorqueModel(JointModel):
         """One sigma of a joint's smoothed torque, N·m."""
         return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
 
-    def followed(self, joint: int) -> tuple[Array, ...]:
-        """(N,) position, velocity, load and time."""
+    def readings(self, joint: int) -> dict[str, Array]:
+        """(N,) by name: time, s, position, in place of a command, too, and its velocity, measured torque and load."""
+        names = "command", "position", "velocity", "measured", "load"
+        every = self._q, self._q, self._v, self._measured, self._loads.torque[0]
         rows = self._used[joint]
-        return self._q[rows, joint], self._v[rows, joint], self._loads.torque[0, rows, joint], self._time[rows]
-
-    def drawn(self, joint: int) -> tuple[Array, ...]:
-        """(N,) time, s, position, rad, and measured torque and load, N·m."""
-        rows = self._used[joint]
-        load = self._loads.torque[0, rows, joint]
-        return self._time[rows], self._q[rows, joint], self._measured[rows, joint], load
+        return {"time": self._time[rows], **{n: one[rows, joint] for n, one in zip(names, every, strict=True)}}
 
 
 def _sums(labels: NDArray[np.int64], values: Array) -> Array:
