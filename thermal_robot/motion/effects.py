@@ -18,9 +18,10 @@ SOURCED, UNSOURCED = 1.0, 1.5
 
 @dataclass(frozen=True)
 class ServoEffect:
-    """One number of the servo model that may differ from what the maker states.
+    """One number of the servo model, or of the torque channel's, that may differ from what the maker states.
 
-    ``size`` is its one sigma in ``unit``; of a kind ``drive`` a share of what the torque limit deflects, L/K in rad.
+    ``size`` is its one sigma in ``unit``, of some in shares of what the torque limit deflects, L/K in rad, or of the
+    limit itself, N·m, and over the fastest speed. ``torque`` is name and unit once it is multiplied by a stiffness.
     """
 
     name: str
@@ -31,8 +32,10 @@ class ServoEffect:
     unit: str
     size: float
     of_limit: bool = False
+    of_speed: bool = False
     spread: float = SOURCED
     positive: bool = True
+    torque: tuple[str, str] | None = None
 
 
 EFFECTS = (
@@ -42,15 +45,16 @@ EFFECTS = (
                 spread=UNSOURCED),
     ServoEffect("lag", "lag of the servos", "the servo's lag", "time constant", "lag", "s", 80e-3),
     ServoEffect("armature", "inertia of the drives", "the drive's inertia", "inertia over stiffness", "inertia", "s²",
-                5e-3, of_limit=True),
+                5e-3, of_limit=True, torque=("inertia", "kg·m²")),
     ServoEffect("droop", "droop under load", "droop under load", "compliance", "droop", "rad/(N·m)", 0.07),
     ServoEffect("kp", "stiffness of the servos", "the servo's stiffness", "change of stiffness", "kp", "", 0.2,
                 positive=False),
-    ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True),
+    ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True,
+                torque=("torque", "N·m")),
     ServoEffect("load_friction", "friction that grows with load", "friction that grows with load",
-                "share of the load", "load_friction", "", 0.15),
+                "share of the load", "load_friction", "", 0.15, torque=("share of the load", "")),
     ServoEffect("stribeck", "Stribeck friction", "Stribeck friction", "breakaway", "stribeck", "rad", 0.01,
-                of_limit=True, spread=UNSOURCED),
+                of_limit=True, spread=UNSOURCED, torque=("breakaway torque", "N·m")),
     ServoEffect("dead_zone", "dead zone or play", "a dead zone or play", "half width", "dead_zone", "rad", 5e-3),
     ServoEffect("torque_limit", "saturation of the servos", "the servo's saturation", "inverse of the limit",
                 "saturation", "1/rad", 5.0),
@@ -59,6 +63,16 @@ EFFECTS = (
     ServoEffect("high_stop", "upper end stops", "an upper end stop", "above which it stops", "high", "rad", 0.5,
                 spread=UNSOURCED),
 )  # fmt: skip
+TORQUE_EFFECTS = (
+    *(replace(one, label=one.torque[0], unit=one.torque[1]) for one in EFFECTS if one.torque),
+    ServoEffect("offset", "offsets of the torque channel", "the torque channel's offset", "offset", "offset", "N·m",
+                0.02, of_limit=True, positive=False),
+    ServoEffect("viscous", "viscous friction", "viscous friction", "damping", "viscous", "N·m·s/rad", 0.02,
+                of_limit=True, of_speed=True, spread=UNSOURCED),
+    ServoEffect("torque_constant", "the torque channel's constant", "the torque channel's constant",
+                "change of the torque constant", "torque_constant", "", 0.1, positive=False),
+)  # fmt: skip
+"""Effects that a torque channel shows, in its units."""
 
 TITLES = {effect.name: effect.title for effect in EFFECTS}
 SHARED_TITLES = {
@@ -66,17 +80,8 @@ SHARED_TITLES = {
     "contact": "contact of the tool with a plane",
     "masses": "masses of the links",
 }
-TORQUE_TITLES = {
-    "offset": "offsets of the torque channel",
-    "viscous": "viscous friction",
-    "torque_constant": "the torque channel's constant",
-}
-_TIMES_STIFFNESS = {
-    ("coulomb", "rad"): ("torque", "N·m"),
-    ("stribeck", "rad"): ("breakaway torque", "N·m"),
-    ("armature", "s²"): ("inertia", "kg·m²"),
-}
-"""Name and unit of a parameter, by effect and the unit in which it was fitted, once it is multiplied by a stiffness."""
+TORQUE_TITLES = {effect.name: effect.title for effect in TORQUE_EFFECTS if effect.name not in TITLES}
+_TIMES_STIFFNESS = {(effect.name, effect.unit): effect.torque for effect in EFFECTS if effect.torque}
 _SHARES = {"gain", "kp", "load_friction", "torque_constant", "masses"}
 
 

@@ -12,7 +12,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import SCHEMA, estimate_table
 from thermal_robot.diagnosis.values import Estimate, Finding, HeldOut, Unexplained, jsonable
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import EFFECTS, physical
+from thermal_robot.motion.effects import EFFECTS, TORQUE_EFFECTS, physical
 from thermal_robot.motion.log import MotionLog, joint_kinds
 from thermal_robot.renderer import RenderedPage, registered_renderer
 
@@ -131,7 +131,7 @@ class MotionDiagnosis(RenderedPage):
     def title(self, effect: str, joint: str = "") -> str:
         """Return an effect's name in plain words; of one joint where one is named."""
         if joint:
-            single = {one.name: one.singular for one in EFFECTS}.get(effect) or self.title(effect)
+            single = {one.name: one.singular for one in (*EFFECTS, *TORQUE_EFFECTS)}.get(effect) or self.title(effect)
             return f"{single} in {joint}"
         own = next((one.title for one in self.effects if one.name == effect), "")
         return own or effect.replace("_", " ")

@@ -18,6 +18,7 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.motion import settings
+from thermal_robot.motion.effects import TORQUE_EFFECTS
 from thermal_robot.motion.following import at, slope, usual_step
 from thermal_robot.motion.log import Channel, MotionLog
 from thermal_robot.motion.model import SHARED, JointModel, Mask, Parameter, Rows
@@ -50,16 +51,9 @@ class TorqueModel(JointModel):
             # sizes go by the torque limit: as stated, else no less than the masses leave
             limit = servo.limit or max(settings.TORQUE_LIMIT, float(left[j]))
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
-            for name, label, unit, size, spread, positive in (
-                ("offset", "offset", "N·m", 0.02 * limit, 1.0, False),
-                ("coulomb", "half width", "N·m", 0.02 * limit, 1.0, True),
-                ("stribeck", "breakaway", "N·m", 0.01 * limit, 1.5, True),
-                ("viscous", "damping", "N·m·s/rad", 0.02 * limit / fastest, 1.5, True),
-                ("armature", "inertia", "kg·m²", 0.005 * limit, 1.0, True),
-                ("load_friction", "share of the load", "", 0.15, 1.0, True),
-                ("torque_constant", "change of the torque constant", "", 0.1, 1.0, False),
-            ):
-                found.append(Parameter(name, j, label, unit, size, spread, positive, name))
+            for e in TORQUE_EFFECTS:
+                size = e.size * (limit if e.of_limit else 1.0) / (fastest if e.of_speed else 1.0)
+                found.append(Parameter(e.name, j, e.label, e.unit, size, e.spread, e.positive, e.name))
         if self.log.robot.has_masses:
             found.append(self.payload(self._loads.torque[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
