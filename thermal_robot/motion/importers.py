@@ -32,7 +32,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, write_text
 from thermal_robot.motion.columns import sources
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.read import FILE_NAME, KINDS, Declaration, build_motions, joints_of, robot_of
+from thermal_robot.motion.read import FILE_NAME, KINDS, Declaration, build_motions, robot_of
 from thermal_robot.robot import Robot
 from thermal_robot.schema import text
 
@@ -318,7 +318,7 @@ def import_motion(
     raw = dict(Document(mapping, _MAPPED, FILE_NAME).data) if mapping else {}
     topics, said = raw.pop("recording", {}), {**raw.pop("robot", {}), **robot}
     folder = mapping.parent if mapping and "urdf" not in robot and "mjcf" not in robot else Path()
-    loaded, servos = robot_of(said, mapping or Path("import"), folder, ())
+    loaded, servos = robot_of(said, mapping or Path("import"), folder)
     taken = MOTION_FORMATS[format].read(files, Asked(loaded, folder / said["mjcf"] if "mjcf" in said else None, topics))
     frames = {name: pd.concat(parts, ignore_index=True) for name, parts in taken.parts.items()}
     require_imported(files, directory, (FILE_NAME, ROBOT_NAME, *frames))
@@ -328,8 +328,7 @@ def import_motion(
         raise CampaignError("import", problem, expected="--angle-unit, or a mapping with [channels]")
     tables = [table_from_frame(frame, str(directory / name), first_row=2) for name, frame in frames.items()]
     if "tool_frame" not in said:
-        held = sources(tables, {})
-        loaded, _ = robot_of(said, mapping or Path("import"), folder, joints_of(held))
+        loaded, _ = robot_of(said, mapping or Path("import"), folder, sources(tables, {}))
     own = {joint: {k: v for k, v in vars(servo).items() if v is not None} for joint, servo in servos.items()}
     ends = {"tool_frame": loaded.tool_frame, "root_frame": loaded.root_frame, "gravity": loaded.gravity.tolist()}
     sections = {
@@ -339,8 +338,7 @@ def import_motion(
         "servo": {**own, **raw.get("servo", {})},
     }
     fitted = fitted_sections(KINDS, sections)
-    held = sources(tables, fitted.get("channels", {}))
-    log = build_motions(tables, held, Declaration.stated(directory.resolve().name, fitted, {}), loaded)
+    log = build_motions(tables, Declaration.stated(directory.resolve().name, fitted, {}), loaded)
     origin = f"{IMPORTED} {format}` from {listed(map(str, files))}."
     texts = {ROBOT_NAME: loaded.urdf, FILE_NAME: f"# {' '.join(origin.split())}\n{tomli_w.dumps(sections)}"}
     try:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
+from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import compiled, digits, mujoco_or_error
@@ -78,18 +78,18 @@ def urdf_of_mjcf(file: Path) -> str:
         If MuJoCo is not installed or does not take the file, or if a joint is a ball.
     """
     model = opened(file)
-    robot = ElementTree.Element("robot", name=file.stem)
+    robot = etree.Element("robot", name=file.stem)
     anchors, links = {0: np.zeros(3)}, {0: "world"}
-    ElementTree.SubElement(robot, "link", name="world")
+    etree.SubElement(robot, "link", name="world")
     for body in range(1, model.nbody):
         _body(robot, model, body, anchors, links, str(file))
     for site in range(model.nsite):
         name, body = model.site(site).name, int(model.site_bodyid[site])
         if name and name not in {link.get("name") for link in robot.iter("link")}:
-            ElementTree.SubElement(robot, "link", name=name)
+            etree.SubElement(robot, "link", name=name)
             pose = _pose(model.site_pos[site] - anchors[body], model.site_quat[site])
-            _joint(robot, f"{name} is fixed", "fixed", (links[body], name), pose)
-    return ElementTree.tostring(robot, encoding="unicode")
+            add_joint(robot, f"{name} is fixed", "fixed", (links[body], name), pose)
+    return str(etree.tostring(robot, encoding="unicode"))
 
 
 def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: dict[int, str], file: str) -> None:
@@ -110,7 +110,7 @@ def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: d
         before, pose = link, np.eye(4)
         _link(robot, model, body if link == own else None, link, anchor)
     if not joints:
-        _joint(robot, f"{own} is fixed", "fixed", (before, own), pose)
+        add_joint(robot, f"{own} is fixed", "fixed", (before, own), pose)
         _link(robot, model, body, own, anchor)
     anchors[body], links[body] = anchor, own
 
@@ -120,38 +120,44 @@ def _moving(robot: Any, model: Any, joint: int, between: tuple[str, str], pose: 
     slides, limited = model.jnt_type[joint] == _SLIDE, bool(model.jnt_limited[joint])
     turn, shift = (np.eye(3), -zero * axis) if slides else (exp3(-zero * axis), np.zeros(3))
     kind = "prismatic" if slides else "revolute" if limited else "continuous"
-    element = _joint(robot, model.joint(joint).name or f"joint {joint}", kind, between, pose @ homogeneous(turn, shift))
-    ElementTree.SubElement(element, "axis", xyz=digits(axis))
+    name = model.joint(joint).name or f"joint {joint}"
+    element = add_joint(robot, name, kind, between, pose @ homogeneous(turn, shift))
+    etree.SubElement(element, "axis", xyz=digits(axis))
     low, high = model.jnt_range[joint] if limited else (-_FAR, _FAR)
     if kind != "continuous":
-        ElementTree.SubElement(
-            element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort="0", velocity="0"
-        )
+        etree.SubElement(element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort="0", velocity="0")
 
 
-def _joint(robot: Any, name: str, kind: str, between: tuple[str, str], pose: Array) -> Any:
-    element = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+def add_joint(robot: Any, name: str, kind: str, between: tuple[str, str], pose: Array) -> Any:
+    """Add a joint to a URDF between two of its links, at a pose (4, 4) in the first, and return it."""
+    element = etree.SubElement(robot, "joint", name=name, type=kind)
     for end, link in zip(("parent", "child"), between, strict=True):
-        ElementTree.SubElement(element, end, link=link)
+        etree.SubElement(element, end, link=link)
     _origin(element, pose)
     return element
 
 
 def _link(robot: Any, model: Any, body: int | None, name: str, anchor: Array) -> None:
     """Add a link, with the mass of a body where it is one's own."""
-    link = ElementTree.SubElement(robot, "link", name=name)
     if body is None or not model.body_mass[body] > 0.0:
-        return
-    inertial = ElementTree.SubElement(link, "inertial")
-    _origin(inertial, _pose(model.body_ipos[body] - anchor, model.body_iquat[body]))
-    ElementTree.SubElement(inertial, "mass", value=repr(float(model.body_mass[body])))
-    ixx, iyy, izz = (repr(float(value)) for value in model.body_inertia[body])
-    ElementTree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
+        etree.SubElement(robot, "link", name=name)
+    else:
+        pose = _pose(model.body_ipos[body] - anchor, model.body_iquat[body])
+        add_mass(robot, name, model.body_mass[body], pose, model.body_inertia[body])
+
+
+def add_mass(robot: Any, name: str, mass: float, pose: Array, inertia: Array) -> None:
+    """Add a link to a URDF: its mass, kg, and principal moments (3,), kg·m², in the axes of a pose (4, 4)."""
+    inertial = etree.SubElement(etree.SubElement(robot, "link", name=name), "inertial")
+    _origin(inertial, pose)
+    etree.SubElement(inertial, "mass", value=repr(float(mass)))
+    ixx, iyy, izz = (repr(float(value)) for value in inertia)
+    etree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
 
 
 def _origin(element: Any, pose: Array) -> None:
     xyz, rpy = xyz_rpy(pose)
-    ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
+    etree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
 
 
 def _pose(place: Array, quaternion: Array) -> Array:

@@ -135,12 +135,12 @@ def read_motion(path: str | Path, *, folder: str | Path | None = None) -> Motion
     document.required("motion", "angle_unit")
     tables = [read_table(each) for each in logs]
     held = sources(tables, document.sections.get("channels", {}))
-    robot, servos = robot_of(document.sections.get("robot", {}), file, base, joints_of(held))
+    robot, servos = robot_of(document.sections.get("robot", {}), file, base, held)
     declaration = Declaration.stated(name_of(file, FILE_NAME), document.sections, servos)
     for section in ("servo", "tolerance"):
         lines = {joint: document.row(section, joint) for joint in document.sections.get(section, {})}
         check_joints(str(file), section, lines, robot.joint_names, lines)
-    return build_motions(tables, held, declaration, robot)
+    return build_motions(tables, declaration, robot)
 
 
 def _declared(path: str | Path, folder: str | Path | None) -> tuple[Path, Path, Document, list[Path]]:
@@ -152,7 +152,7 @@ def _declared(path: str | Path, folder: str | Path | None) -> tuple[Path, Path, 
 
 
 def robot_of(
-    said: Mapping[str, Any], file: Path, folder: Path, joints: Sequence[str]
+    said: Mapping[str, Any], file: Path, folder: Path, held: Sequence[Source] = ()
 ) -> tuple[Robot, dict[str, Servo]]:
     """Return the robot of the section ``[robot]``, and what its MJCF says of the servos."""
     if ("urdf" in said) == ("mjcf" in said):
@@ -171,10 +171,10 @@ def robot_of(
     ends = {"root_frame": said.get("root_frame"), "gravity": said.get("gravity")}
     if "tool_frame" in said:
         return stated_robot(file, reference, said["tool_frame"], **ends), servos
-    return _fullest(file, reference, ends, joints), servos
+    return _fullest(file, reference, ends, {source.joint for source in held}), servos
 
 
-def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints: Sequence[str]) -> Robot:
+def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints: set[str]) -> Robot:
     """Load the chain, to one of the links at the ends of the tree, that holds most of the joints."""
     from thermal_robot.kinematics.model import leaf_links
     from thermal_robot.urdf_text import urdf_text
@@ -186,7 +186,7 @@ def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints:
             chains.append(stated_robot(file, reference, leaf, **ends))
     if not chains:  # say why
         return stated_robot(file, reference, "", **ends)
-    return max(chains, key=lambda robot: len(set(joints) & set(robot.joint_names)))
+    return max(chains, key=lambda robot: len(joints & set(robot.joint_names)))
 
 
 def files_of(path: str | Path, folder: Path | None = None) -> list[Path]:
@@ -264,16 +264,12 @@ def motion_from_table(
     declaration = Declaration.stated(given(call, "name", name, text(empty=True)), sections, servos or {})
     for key, named in (("servos", declaration.servos), ("tolerance", declaration.tolerance)):
         check_joints(call, key, named, robot.joint_names)
-    return build_motions(tables, sources(tables, declaration.channels), declaration, robot)
+    return build_motions(tables, declaration, robot)
 
 
-def joints_of(held: Sequence[Source]) -> tuple[str, ...]:
-    """Return the joints that columns name."""
-    return tuple(dict.fromkeys(source.joint for source in held if source.joint))
-
-
-def build_motions(tables: Sequence[Table], held: Sequence[Source], declaration: Declaration, robot: Robot) -> MotionLog:
+def build_motions(tables: Sequence[Table], declaration: Declaration, robot: Robot) -> MotionLog:
     """Validate tables and return the log; what cannot be used is refused with row and column."""
+    held = sources(tables, declaration.channels)
     joints, notes = _joints(tables, held, robot)
     clocks = [_Clock.of(table, declaration) for table in tables]
     _require_labels(clocks)

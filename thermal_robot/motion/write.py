@@ -17,12 +17,13 @@ import numpy as np
 from lxml import etree
 
 from thermal_robot.arrays import Array
-from thermal_robot.correction.mujoco_models import compiled, digits, mujoco_or_error, set_damping
+from thermal_robot.correction.mujoco_models import compiled, mujoco_or_error, set_damping
 from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import homogeneous
 from thermal_robot.kinematics.urdf import text_of, tree
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Servo
-from thermal_robot.motion.mjcf import position_actuators
+from thermal_robot.motion.mjcf import add_joint, add_mass, position_actuators
 from thermal_robot.motion.result import MotionDiagnosis
 
 _FAR = 1e3
@@ -307,13 +308,6 @@ def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
     if not mass:
         return
     name = f"{tool}_payload"
-    link = etree.SubElement(root, "link", name=name)
-    inertial = etree.SubElement(link, "inertial")
-    etree.SubElement(inertial, "origin", xyz=digits(at), rpy="0 0 0")
-    etree.SubElement(inertial, "mass", value=repr(float(mass)))
-    across = dict.fromkeys(("ixy", "ixz", "iyz"), "0")
-    etree.SubElement(inertial, "inertia", **dict.fromkeys(("ixx", "iyy", "izz"), repr(_POINT)), **across)
-    joint = etree.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
-    etree.SubElement(joint, "parent", link=tool)
-    etree.SubElement(joint, "child", link=name)
+    add_mass(root, name, mass, homogeneous(np.eye(3), at), np.full(3, _POINT))
+    add_joint(root, f"{name}_joint", "fixed", (tool, name), np.eye(4))
     written.held.append(f"payload at {tool}: {mass:.4g} kg")
