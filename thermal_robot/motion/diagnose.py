@@ -99,12 +99,12 @@ def _gate(choice: Choice) -> dict[str, float]:
     return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
 
 
-def _folds(choice: Choice, folds: int, progress: Callable[[str], None]) -> list[Array]:
+def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
     model, found = choice.point.model, [one.residual.copy() for one in choice.point.rows]
-    for fold in range(folds if folds > 1 and choice.active.any() else 0):
-        progress(f"motions held out, part {fold + 1} of {folds}")
-        held = np.arange(model.clusters) % folds == fold
+    for fold in range(settings.FOLDS if choice.active.any() else 0):
+        progress(f"motions held out, part {fold + 1} of {settings.FOLDS}")
+        held = np.arange(model.clusters) % settings.FOLDS == fold
         values = fit(model, choice.point.values, choice.active, ~held)
         for joint, left in enumerate(model.all_residuals(values)):
             out = held[choice.point.rows[joint].motion]
@@ -114,8 +114,7 @@ def _folds(choice: Choice, folds: int, progress: Callable[[str], None]) -> list[
 
 def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     point, model, log = choice.point, choice.point.model, choice.point.model.log
-    folds = min(settings.FOLDS, model.clusters)
-    before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(choice, folds, progress)
+    before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(choice, progress)
     joints = {
         name: JointGap(rms(before[j]), rms(point.rows[j].residual), rms(held[j]), model.noise(j))
         for j, name in enumerate(log.joints)
@@ -130,7 +129,7 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     shrinkage, *others = 1.0 - sums[:, 1] / np.maximum(sums[:, 0], 1e-300)
     low, high = np.quantile(others, [0.025, 0.975]).tolist()
     total = np.sqrt(sums[0] / len(before)).tolist()
-    held_out = HeldOut("motion", folds, total[0], total[1], float(shrinkage), (low, high))
+    held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
     findings, shares = _findings(choice, before, weights)
     unexplained = _unexplained(choice)
     told = not unexplained.flagged or shrinkage >= settings.MOST

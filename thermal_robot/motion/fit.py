@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import Gram
 from thermal_robot.motion import settings
+from thermal_robot.motion.following import slope
 from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 
 
@@ -129,9 +130,8 @@ def ratios(point: Point) -> Array:
         pieces = [slice(a, b) for a, b in pairwise(ends)]
         score = np.array([one.derivative[p].T @ one.residual[p] for p in pieces]) / noise**2
         bread = np.array([(one.derivative[p] ** 2).sum(axis=0) for p in pieces]) / noise**2
-        whole = bread.sum(axis=0)
-        rest = score - bread * (score.sum(axis=0) / np.where(whole > 0.0, whole, 1.0))
-        clustered[one.columns] += (rest**2).sum(axis=0) * len(pieces) / (len(pieces) - 1)
+        whole, (_, error) = bread.sum(axis=0), slope(bread, score)
+        clustered[one.columns] += np.nan_to_num(error * whole) ** 2
         white[one.columns] += whole
     seen = white > 0.0
     found[seen] = np.maximum(clustered[seen] / white[seen], 1.0)

@@ -99,12 +99,6 @@ class Cause:
         return self.stiffness / (self.values["torque_limit"] + stated)
 
     @property
-    def law(self) -> tuple[float, float]:
-        """Gain and zero, rad, of the position servo: the stated ones with what was found of them."""
-        gain, zero = (self.values.get(name, 0.0) for name in ("gain", "zero"))
-        return gain + (self.servo.gain or 0.0), zero + (self.servo.zero or 0.0)
-
-    @property
     def stops(self) -> tuple[float | None, float | None]:
         """End stops that were found, rad."""
         low, high = (self.values.get(name) for name in ("low_stop", "high_stop"))
@@ -212,7 +206,8 @@ def _into_servo(spec: Any, actuator: Any, cause: Cause, written: Written) -> Non
         actuator = spec.add_actuator(name=f"{cause.name} servo", target=cause.name, trntype=at)
         actuator.set_to_position(kp=1.0)
         written.held.append(f"a position actuator of {cause.name}, which had none")
-    gear, (gain, zero) = float(actuator.gear[0]), cause.law
+    gear = float(actuator.gear[0])
+    gain, zero = (cause.values.get(name, 0.0) + (getattr(cause.servo, name) or 0.0) for name in ("gain", "zero"))
     actuator.gainprm[0] = stiffness * (1.0 + gain) / gear**2
     actuator.biasprm[0], actuator.biasprm[1] = stiffness * zero / gear, -stiffness / gear**2
     for name, value, unit in (("kp", stiffness, "N·m/rad"), ("zero", zero, "rad"), ("gain", gain, "")):
