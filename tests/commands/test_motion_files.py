@@ -34,6 +34,15 @@ def put(folder, world, fault, robot='mjcf = "arm.xml"'):
     return log
 
 
+def test_what_is_stated_of_a_servo_stands_beside_what_its_mjcf_says(tmp_path):
+    log = put(tmp_path, a_world(), Fault("nothing"))
+    with (tmp_path / "motion.toml").open("a") as file:
+        file.write(f"[servo.{log.joints[JOINT]}]\ndead_band = 0.002\n")
+    servo = read_motion(tmp_path).servo(log.joints[JOINT])
+    assert servo.dead_band == 0.002
+    assert servo.kp == pytest.approx(stiffness(log), rel=1e-5)
+
+
 def asked(folder, **more):
     usual = {"mjcf": None, "urdf": None, "from_mjcf": None, "unseen": None, "loudness": 1}
     return Namespace(campaign=str(folder / "motion.toml"), **{**usual, **more})

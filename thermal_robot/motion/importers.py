@@ -330,12 +330,13 @@ def import_motion(
     if "tool_frame" not in said:
         loaded, _ = robot_of(said, mapping or Path("import"), folder, sources(tables, {}))
     own = {joint: {k: v for k, v in vars(servo).items() if v is not None} for joint, servo in servos.items()}
+    own |= {joint: own.get(joint, {}) | stated for joint, stated in raw.get("servo", {}).items()}
     ends = {"tool_frame": loaded.tool_frame, "root_frame": loaded.root_frame, "gravity": loaded.gravity.tolist()}
     sections = {
         **raw,
         "robot": {"urdf": ROBOT_NAME, **ends},
         "motion": {"log": list(frames), **raw.get("motion", {}), "angle_unit": unit},
-        "servo": {**own, **raw.get("servo", {})},
+        "servo": own,
     }
     fitted = fitted_sections(KINDS, sections)
     log = build_motions(tables, Declaration.stated(directory.resolve().name, fitted, {}), loaded)

@@ -6,7 +6,7 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +87,8 @@ class Declaration:
         units = Units(motion["angle_unit"], motion.get("length_unit", "m"))
         com = np.array(payload.get("com", (0.0, 0.0, 0.0))) * units.length_scale
         labels = {key: motion[key] for key in ("time", "motion", "kind") if motion.get(key)}
-        servos = {**servos, **{joint: Servo(**said) for joint, said in sections.get("servo", {}).items()}}
+        said = sections.get("servo", {})
+        servos = {**servos, **{joint: replace(servos.get(joint, Servo()), **own) for joint, own in said.items()}}
         held = (payload["mass"], com) if "mass" in payload else None
         channels, tolerance, about = (sections.get(key, {}) for key in ("channels", "tolerance", "about"))
         return cls(name, units, labels, channels, servos, held, tolerance, about)
