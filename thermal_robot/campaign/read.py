@@ -127,11 +127,12 @@ def readings(
         for column in texts:
             labels[column] = np.array(table.text(column), dtype=np.str_)
             table.refuse(np.asarray(here & (labels[column] == "")), missing, column, "a label")
-    for column in names.ENDS if (apart := np.isin(kind, names.APART)).any() else ():
-        of_a_stand = np.char.add(np.char.add(labels["stand"], "\n"), labels[column])
-        sat = np.char.add(np.char.add(labels["stand"], "\n"), labels["socket"])[kind == "socket"]
+    if (apart := np.isin(kind, names.APART)).any():
+        sat = {*zip(labels["stand"][kind == "socket"], labels["socket"][kind == "socket"], strict=True)}
         expected = "a socket in which the ball sits, in a row of the same stand"
-        table.refuse(apart & ~np.isin(of_a_stand, sat), "no such socket", column, expected)
+        for column in names.ENDS:
+            astray = [end not in sat for end in zip(labels["stand"], labels[column], strict=True)]
+            table.refuse(apart & np.array(astray), "no such socket", column, expected)
     return figures, labels | {names.KIND: kind}
 
 

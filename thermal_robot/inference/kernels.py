@@ -175,12 +175,11 @@ Labels = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class GroupKernel:
-    """Covariance 1 + τ²BBᵀ of a block-diagonal factor B: c columns for each of G groups of rows.
+    """Spectrum of a kernel BBᵀ with a block-diagonal factor B: c columns for each of G groups of rows.
 
-    With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ²
-    Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|. ``moves`` (n, m, c) are in units of the
-    noise with the square roots of the weights, ``everywhere`` (N, m, c) without weights; ``values`` (G, c) and
-    ``vector`` (G, c, c) are the eigensystem of every M_g.
+    ``moves`` (n, m, c) are in units of the noise with the square roots of the weights, ``everywhere`` (N, m, c) without
+    weights; ``values`` (G, c) and ``vector`` (G, c, c) are the eigensystem of BᵀB in every group, the sum over its rows
+    of movesᵀ moves.
     """
 
     moves: Array
