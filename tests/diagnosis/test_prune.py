@@ -318,15 +318,26 @@ def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
     assert names.count(("encoder_resolution",)) >= 11, names
 
 
+def with_steps_of_two_joints(robot, seed):
+    """Twenty-six poses, each visited three times."""
+    once = simulate(robot, samples=26, seed=seed, noise=25e-6)[0]
+    plain = replace(once.take(np.tile(np.arange(26), 3)), rows=np.arange(2, 80), noise_position=25e-6)
+    return counted(plain, {0: 4e-4, 3: 1.5e-3}, 25e-6, seed)
+
+
 @pytest.mark.slow
 def test_steps_of_two_joints_are_the_whole_verdict():
-    """Twenty-six poses, each visited three times."""
-    robot, verdicts = load_robot("example-robot-data:ur10", "tool0"), []
-    for seed in range(8):
-        once = simulate(robot, samples=26, seed=seed, noise=25e-6)[0]
-        plain = replace(once.take(np.tile(np.arange(26), 3)), rows=np.arange(2, 80), noise_position=25e-6)
-        verdicts.append(diagnose(counted(plain, {0: 4e-4, 3: 1.5e-3}, 25e-6, seed)).verdict)
+    robot = load_robot("example-robot-data:ur10", "tool0")
+    verdicts = [diagnose(with_steps_of_two_joints(robot, seed)).verdict for seed in range(8)]
     assert verdicts.count(("encoder_resolution",)) >= 7, verdicts
+
+
+def test_joints_that_scatter_together_are_kept_at_their_likeliest_sizes():
+    robot = load_robot("example-robot-data:ur10", "tool0")
+    found = fit(with_steps_of_two_joints(robot, 0), choose(("joint_offset",), (), ())).explanation
+    assert found.discrepancy.kernel.joints == (robot.joint_names[0], robot.joint_names[3])
+    names = [kernel.name for kernel in found.kernels]
+    assert len(set(names)) == len(names) > 1
 
 
 def scattering(robot, effects=()):

@@ -253,19 +253,27 @@ class ModelSearch:
 
         A kernel whose most probable amplitude is the smallest is noise; one that is far less probable is left out.
         """
-        peaks: dict[int, tuple[float, float]] = {}
+        least, near = best.log_evidence - settings.KERNEL_REACH, self._peaks(best)
+        kept = [k for log, tau, k in near.values() if tau > settings.TAUS[0] and log > least]
+        return tuple(self.kernels[k] for k in sorted(kept))
+
+    def _peaks(self, best: Combination) -> dict[str, tuple[float, float, int]]:
+        """Maximum over amplitudes, and over the relative sizes of joints, of the log evidence of kernels, by name.
+
+        Beside the best combination; with the amplitude and the number of the kernel.
+        """
+        peaks: dict[str, tuple[float, float, int]] = {}
         for ((kernel, tau), blocks), log in self._log_evidences.items():
             if blocks == best.blocks and kernel >= 0:
-                peaks[kernel] = max(peaks.get(kernel, (-np.inf, 0.0)), (log, tau))
-        least = best.log_evidence - settings.KERNEL_REACH
-        near = {kernel for kernel, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
-        return tuple(f for k, f in enumerate(self.kernels) if k in near)
+                name = self.kernels[kernel].name
+                peaks[name] = max(peaks.get(name, (-np.inf, 0.0, -1)), (log, tau, kernel))
+        return peaks
 
     def _beside_others(self, best: Combination) -> tuple[Hyperparameters, Combination] | None:
         """Evaluate the neighbours with all plausible discrepancies; return an improvement, if any."""
-        near = [
-            r for (r, blocks), log in self._log_evidences.items() if blocks == best.blocks and self._is_near(log, best)
-        ]
+        likeliest = {kernel for _, _, kernel in self._peaks(best).values()}
+        asked = [(r, log) for (r, blocks), log in self._log_evidences.items() if blocks == best.blocks]
+        near = [r for r, log in asked if r[0] in likeliest and self._is_near(log, best)]
         for other in dict.fromkeys((PLAIN, *near)):
             if self._is_near(self.search_at(other).evaluate(best.blocks).log_evidence, best):
                 nearby = self.search_at(other).evaluate_neighbours(best.blocks)
