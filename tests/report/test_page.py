@@ -493,7 +493,7 @@ def test_the_page_of_a_robot_over_time_tells_what_rings():
     shown = report.wear_html(by_hand())
     for said in (
         "zero offset, elbow jumped by +0.200",
-        "2026-07-20 (2026-06-30 to 2026-08-19)",
+        "2026-07-20 (2026-06-30 to 2026-08-19)".replace("-", "\u2011"),
         "cannot be compared: unknown frames hide its changes",
         "a &lt;note&gt; to know",
     ):

@@ -33,6 +33,7 @@ def test_values_to_be_compared_share_unit_and_decimals():
     assert units.together((2.41e-3, 2.83e-5, 0.0), "m") == ["2.410 mm", "0.028 mm", "0.000 mm"]
     assert units.together((1e-3, None), "rad") == ["1.00 mrad", "–"]
     assert units.together((0.0, 0.0), "m") == ["0 µm", "0 µm"]
+    assert units.together((-1.97e-3, 2e-4), "rad") == ["−1.97 mrad", "0.20 mrad"]
 
 
 @pytest.mark.parametrize(

@@ -660,6 +660,7 @@ def plot_wear(wear: Wear) -> Figure:
     for axes in drawn[max(len(shown) - _COLUMNS, 0) : len(shown)]:
         axes.set_xlabel(f"days since {wear.campaigns[0].date}" if wear.dated else "campaign")
         axes.tick_params(labelbottom=True)
+        axes.xaxis.set_major_locator(MaxNLocator(6, steps=_STEPS, integer=True))
     if not shown:
         note(drawn[0], "No parameter can be compared.")
     return figure

@@ -312,7 +312,7 @@ def fleet_text(summary: Plain) -> str:
 
 def wear_table(wear: Wear) -> list[Line]:
     """Table of the parameters over time: kind of change, limit, size, rate, certainty."""
-    heads = ("parameter", "it", "limit", "change", "a day", "moved", "by chance")
+    heads = ("parameter", "how it moves", "limit", "change", "a day", "moved", "by chance")
     return [heads, *((w.parameter, _does(w), *_figures(w)) for w in wear.parameters)]
 
 
@@ -337,8 +337,8 @@ def _figures(worn: Worn) -> Line:
     if worn.crossing is not None:
         limit, dates = worn.crossing.state, worn.crossing.dates
         if limit == "expected":
-            limit = f"{dates[0]} ({dates[1]} to {dates[2] or 'never'})"
-    return limit, change, rate, units.probability(worn.moved), f"{min(worn.chance, 1.0):.1g}"
+            limit = f"{dates[0]} ({dates[1]} to {dates[2] or 'never'})".replace("-", "\u2011")  # dates do not break
+    return limit, change, rate, units.probability(worn.moved), _chance(min(worn.chance, 1.0))
 
 
 def wear_visits(wear: Wear) -> list[Line]:

@@ -80,10 +80,9 @@ def together(values: Iterable[float | None], unit: str) -> list[str]:
     decimals = 0
     if known:
         decimals = max(_decimals(max(known) * best.factor, 3), _decimals(min(known) * best.factor, 2))
-    return [
-        MISSING if v is None or not isfinite(v) else f"{v * best.factor:.{min(decimals, 4)}f} {best.unit}"
-        for v in wanted
-    ]
+    shown = [v if v is not None and isfinite(v) else None for v in wanted]
+    told = [MISSING if v is None else f"{v * best.factor:.{min(decimals, 4)}f} {best.unit}" for v in shown]
+    return [each.replace("-", "−") for each in told]
 
 
 def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
