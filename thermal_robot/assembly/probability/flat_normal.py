@@ -270,10 +270,7 @@ def fit_moments(sample: Array) -> Estimate:
 
 def log_likelihood(sample: Array, ratio: float, loc: float, scale: float) -> float:
     """Log-likelihood of a sample under the flat-normal distribution."""
-    angle = np.arctan(ratio)
-    half_width = scale * _ROOT_3 * np.sin(angle)
-    sigma = 0.0 if np.isinf(ratio) else scale * np.cos(angle)
-    return float(np.sum(log_density(sample - loc, sigma, half_width)))
+    return float(np.sum(log_density(sample - loc, *(scale * part for part in _parts(ratio)))))
 
 
 def fit_maximum_likelihood(

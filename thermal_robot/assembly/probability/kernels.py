@@ -83,14 +83,10 @@ def _log_difference(upper: Array, lower: Array) -> Array:
         return np.where(np.isneginf(lower), upper, upper + np.log1p(-np.exp(np.minimum(lower - upper, 0.0))))
 
 
-def _split(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> tuple[Array, Array, Array]:
-    """Broadcast to arrays of one shape, at least one-dimensional."""
-    one, two, three = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in (x, sigma, half_width)))
-    return one, two, three
-
-
-def _shape(*arguments: npt.ArrayLike) -> tuple[int, ...]:
-    return np.broadcast_shapes(*(np.shape(a) for a in arguments))
+def _split(*arguments: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, ...]]:
+    """Broadcast shape, and the arguments as arrays of it, at least one-dimensional."""
+    arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in arguments))
+    return arrays[0].shape, tuple(map(np.atleast_1d, arrays))
 
 
 def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
@@ -98,8 +94,7 @@ def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLik
 
     Where both ``sigma`` and ``half_width`` are zero there is no density: ``inf`` at zero, ``-inf`` elsewhere.
     """
-    shape = _shape(x, sigma, half_width)
-    x, sigma, half_width = _split(x, sigma, half_width)
+    shape, (x, sigma, half_width) = _split(x, sigma, half_width)
     distance = np.abs(x)
     result = np.empty(x.shape)
     flat = sigma <= 0.0
@@ -130,8 +125,7 @@ def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLik
 
 def log_tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
     """Log survival function P(X > x) with ``x`` measured from the mean; arguments broadcast."""
-    shape = _shape(x, sigma, half_width)
-    x, sigma, half_width = _split(x, sigma, half_width)
+    shape, (x, sigma, half_width) = _split(x, sigma, half_width)
     distance = np.abs(x)
     lower = np.empty(x.shape)  # logarithm of P(X > |x|)
     flat = sigma <= 0.0
@@ -179,8 +173,9 @@ def density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -
 
 def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
     """Survival function P(X > x); as `log_tail`, but cheaper, and zero below 1e-300."""
-    shape = _shape(x, sigma, half_width)
-    x, sigma, half_width = _split(x, sigma, half_width)
+    shape, (x, sigma, half_width) = _split(x, sigma, half_width)
+    if not np.any(half_width) and np.all(sigma > 0.0):
+        return np.asarray(ndtr(-x / sigma)).reshape(shape)
     distance = np.abs(x)
     result = np.empty(x.shape)
     apart = (sigma > 0.0) & (half_width * np.maximum(sigma, distance) > sigma * sigma)
@@ -194,20 +189,12 @@ def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> A
     return np.where(x < 0.0, 1.0 - result, result).reshape(shape)
 
 
-def _either_tail(x: Array, sigma: Array, half_width: Array) -> Array:
-    """Survival function P(X > x); without the uniform part one call of ``ndtr``."""
-    if not np.any(half_width) and np.all(sigma > 0.0):
-        return np.asarray(ndtr(-x / sigma))
-    return tail(x, sigma, half_width)
-
-
 def outside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
     """Probability P(X < low or X > high), relatively accurate; bounds from the mean, ``low <= high`` of one shape.
 
     A point mass (``sigma = half_width = 0``) on the edge is inside. The widths broadcast.
     """
-    width, half = np.asarray(sigma, dtype=float), np.asarray(half_width, dtype=float)
-    return _either_tail(-low, width, half) + _either_tail(high, width, half)
+    return tail(-low, sigma, half_width) + tail(high, sigma, half_width)
 
 
 def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
@@ -221,8 +208,7 @@ def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width
     near, far = np.where(mirrored, -high, low), np.where(mirrored, -low, high)  # near + far >= 0
     beside = near > 0.0
     # One sided: the nearer tail less the farther one. Else both are taken from one.
-    nearer = _either_tail(np.abs(near), sigma, half_width)
-    farther = _either_tail(far, sigma, half_width)
+    nearer, farther = tail(np.abs(near), sigma, half_width), tail(far, sigma, half_width)
     result = np.where(beside, nearer - farther, 1.0 - nearer - farther)
     short = (far - near < 0.5 * sigma) & (far > near)
     if np.any(short):
