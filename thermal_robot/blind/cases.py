@@ -50,6 +50,13 @@ How = Literal["", "changes", "begins", "jumps", "grows", "all", "hall"]
 ASKS = {"same": "comparison", "changed": "comparison", "steady": "wear", "series": "wear", "fleet": "fleet"}
 """Type of answer requested for each kind of several campaigns: the request says no more."""
 SEVERAL = tuple(ASKS)
+CONDITION = {
+    "thermal_elongation": ("temperature",),
+    "drift": ("time",),
+    "backlash": ("approach",),
+    "tracking_lag": ("velocity", "acceleration", "approach"),
+}
+"""Columns without which an effect is not observable; the diagnosis should ask for the first."""
 LISTED = "campaigns.csv"
 """The list of several campaigns in a case's folder: ``campaign``, and ``date`` or ``robot`` and ``hall``."""
 

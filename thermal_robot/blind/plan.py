@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from thermal_robot.blind.cases import SEVERAL, Case, How, Kind, RobotChoice, Several
+from thermal_robot.blind.cases import CONDITION, SEVERAL, Case, How, Kind, RobotChoice, Several
 from thermal_robot.effects import library
 from thermal_robot.errors import EffectError, RobotError
 from thermal_robot.robot import load_robot
@@ -44,13 +44,6 @@ IMITATES = {"transmission_error": {"joint_gain"}, "link_compliance": {"base_comp
 link that stands on the base bends under the moment that tips it."""
 RANDOM = ("encoder_resolution", "excess_repeatability")
 """Random effects: they leave nothing for a mean to explain, and are asked alone."""
-CONDITION = {
-    "thermal_elongation": ("temperature",),
-    "drift": ("time",),
-    "backlash": ("approach",),
-    "tracking_lag": ("velocity", "acceleration", "approach"),
-}
-"""Columns without which an effect is not observable."""
 _FRAMES = ("base_frame", "tool_frame")
 
 

@@ -130,7 +130,7 @@ def weights(setting: Setting, places: Sequence[Place]) -> list[str]:
     return ["payload", *setting.world.names]
 
 
-def warmths(setting: Setting, places: Sequence[Place] = ()) -> list[str]:
+def warmths(setting: Setting, places: Sequence[Place]) -> list[str]:
     """All temperatures that may be recorded of a robot."""
     return ["temperature", *(f"temperature.{link}" for link in dict.fromkeys(setting.world.links))]
 

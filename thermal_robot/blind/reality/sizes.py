@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.cases import Case
+from thermal_robot.blind.cases import CONDITION, Case
 from thermal_robot.blind.reality.fault import FAULTS, Fault, Place
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Array, Slopes, World, free_columns, slopes
@@ -178,7 +178,6 @@ def place(
 
 
 _CLEAR = 0.25  # of what the largest place leaves: places that leave less are not asked for
-_NEEDS = {"thermal_elongation": "temperature", "drift": "time", "backlash": "approach", "tracking_lag": "velocity"}
 
 
 def truth(
@@ -220,7 +219,7 @@ def truth(
         "places": _named(answers),
         "near": _named(near(gauge.setting.world, answers)),
         "quantities": list(dict.fromkeys(quantities)),
-        "needs": [_NEEDS[name] for name in case.effects if case.hidden and name in _NEEDS],
+        "needs": [CONDITION[name][0] for name in case.effects if case.hidden and name in CONDITION],
     }
 
 
