@@ -69,13 +69,12 @@ def segment_loads(
     *,
     payload: ArrayLike | None = None,
     payload_com: ArrayLike = _AT_TOOL,
-    frames: ChainFrames | None = None,
 ) -> Array:
     """Gravity wrench on the far end of each segment: the weight of everything beyond it.
 
     Parameters
     ----------
-    robot, q, payload, payload_com, frames
+    robot, q, payload, payload_com
         As for :func:`gravity_torques`.
 
     Returns
@@ -89,8 +88,8 @@ def segment_loads(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    frames = chain_frames(robot, q) if frames is None else frames
-    chain, rows = robot.chain, len(frames.tool_position)
+    frames, chain = chain_frames(robot, q), robot.chain
+    rows = len(frames.tool_position)
     rotations, positions = _with_tool(frames)
     mass, com = _payload(payload, payload_com, rows)
     moment = mass * (positions[-1] + com @ rotations[-1])
@@ -115,7 +114,7 @@ def segment_loads(
     return loads
 
 
-def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None) -> Array:
+def static_regressor(robot: Robot, q: ArrayLike) -> Array:
     """Regressor of statics: joint torques per unit mass and first moment of each body.
 
     Holding torques are linear in the masses and first moments of the bodies (Pinocchio's ``computeStaticRegressor``):
@@ -123,7 +122,7 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
 
     Parameters
     ----------
-    robot, q, frames
+    robot, q
         As for :func:`gravity_torques`.
 
     Returns
@@ -132,7 +131,7 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
         (N, n, M, 4): joint, body (one behind each of the M movable joints, mimicking ones too), then its mass and
         first moment (x, y, z) in the frame of the element after that joint (the tool frame for the last).
     """
-    frames = chain_frames(robot, q) if frames is None else frames
+    frames = chain_frames(robot, q)
     chain, (rotations, positions) = robot.chain, ([np.moveaxis(e, -1, 0) for e in each] for each in _with_tool(frames))
     rows, bodies = len(frames.tool_position), len(chain.movable)
     regressor = np.zeros((rows, bodies, bodies, 4))

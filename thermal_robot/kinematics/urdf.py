@@ -336,8 +336,8 @@ def _wrong(element: Element, kind: str) -> Iterator[str]:
             yield f"its limits are {low:g} and {high:g}, expected the lower one first"
 
 
-def _short(text: str, most: int = 60) -> str:
-    return repr(text if len(text) <= most else f"{text[:most]}…")
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else f"{text[:60]}…")
 
 
 def rewritten(
