@@ -204,11 +204,14 @@ def calibrated(
         problem = "the model does not tell how the robot grows"
         raise CampaignError("temperature", problem, found=f"{temperature:g} °C", expected="none")
     moved = found.displacement
+    joint, segment = np.asarray(moved.joint), np.asarray(moved.segment)
+    if alone:
+        joint, segment = np.split(fitted_alone(model, PLACEMENTS), [model.robot.n])
     left_out = {(told.effect, told.parameter) for told in gone}
     held = [told for told, own in zip(found.parameters, found.held, strict=True) if own]
     return Calibrated(
         robot=model.robot,
-        displacement=_fitted_alone(model) if alone else Displacement(moved.joint, moved.segment),
+        displacement=Displacement(joint, segment.reshape(-1, 6)),
         base=model.frames.base @ exp6(np.asarray(moved.base)),
         target=exp6(np.asarray(moved.tool)) @ model.frames.tool,
         temperature=found.temperature if found.grows else None,
@@ -221,11 +224,6 @@ def calibrated(
         gaps=model.files if temperature is None else (),
         alone=alone,
     )
-
-
-def _fitted_alone(model: CorrectedModel) -> Displacement:
-    joint, segment = np.split(fitted_alone(model, PLACEMENTS), [model.robot.n])
-    return Displacement(joint, segment.reshape(-1, 6))
 
 
 def _beyond(model: CorrectedModel, temperature: float) -> str:

@@ -86,7 +86,8 @@ def pal_calibration(
             offsets[f"{joint}_offset"] = _number(own, f"{joint}_offset", offsets.get(f"{joint}_offset", 0.0)) + zero
     notes = [
         f"Calibrated by thermal_robot: the zeros of {robot.name!r}, rad.",
-        *zero_notes(model, "pal", min_sigma, alone),
+        *expectation(model.files, "pal", min_sigma, alone),
+        f"It cannot hold {FORMATS['pal'].lacks}, nor what changes with the pose: these stay in the model.",
     ]
     return "\n".join([*(f"# {note}" for note in notes), yaml_text(whole)])
 
@@ -156,12 +157,6 @@ def lerobot_calibration(
             raise CampaignError(str(own), problem, key=f"{joint}.homing_offset", found=str(offset), expected="±2047")
         motor["homing_offset"] = offset
     return json.dumps(held, indent=4, ensure_ascii=False) + "\n"
-
-
-def zero_notes(model: CorrectedModel, name: str, min_sigma: float | None, alone: bool) -> list[str]:
-    """Sentences on a file of zeros: what to expect of it, and what it cannot hold."""
-    lacks = f"It cannot hold {FORMATS[name].lacks}, nor what changes with the pose: these stay in the model."
-    return [*expectation(model.files, name, min_sigma, alone), lacks]
 
 
 def _json(file: Path) -> Any:
