@@ -98,12 +98,7 @@ class JointGain(OfPosition):
 
 
 @dataclass(frozen=True)
-class Waves(OfPosition):
-    """Waves in a joint's own position, reported together by their peak-to-peak value."""
-
-
-@dataclass(frozen=True)
-class TransmissionError(Waves):
+class TransmissionError(OfPosition):
     """Transmission error of low order: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
     An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign states
@@ -139,7 +134,7 @@ class TransmissionError(Waves):
 
 
 @dataclass(frozen=True)
-class JointRipple(Waves):
+class JointRipple(OfPosition):
     """Transmission error of high order, ripple: q_actual = q_command + Σ_k a_k sin(n_k q) + b_k cos(n_k q).
 
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number.
