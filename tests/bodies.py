@@ -1,8 +1,12 @@
 """The same robot here and in MuJoCo, where a link is a row of hinges: another program, another method."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from helpers import commanded, tool_with
+
+from thermal_robot.robot import load_robot
 
 COM = (0.0, 0.0, 0.05)
 
@@ -26,3 +30,25 @@ def displaced(world, campaign, body):
 
 def mine(campaign, effect, values):
     return tool_with(campaign, effect, values) - tool_with(campaign, effect, 0.0 * np.asarray(values))
+
+
+def hinged(arm, name, axis, moving):
+    """The same arm with a hinge in the frame of a joint, moved by the joint or before it."""
+    root = ElementTree.fromstring(arm.urdf)
+    (joint,) = (j for j in root.findall("joint") if j.get("name") == name)
+    origin, child = joint.find("origin"), joint.find("child")
+    ElementTree.SubElement(root, "link", name="between")
+    hinge = ElementTree.SubElement(root, "joint", name="hinge", type="revolute")
+    ElementTree.SubElement(hinge, "axis", xyz=" ".join(map(repr, map(float, axis))))
+    ElementTree.SubElement(hinge, "limit", lower="-1", upper="1", effort="1", velocity="1")
+    ends = ("between", child.get("link")) if moving else (joint.find("parent").get("link"), "between")
+    ElementTree.SubElement(hinge, "parent", link=ends[0])
+    ElementTree.SubElement(hinge, "child", link=ends[1])
+    if moving:
+        child.set("link", "between")
+    else:
+        ElementTree.SubElement(hinge, "origin", dict(origin.attrib))
+        joint.find("parent").set("link", "between")
+        origin.set("xyz", "0 0 0")
+        origin.set("rpy", "0 0 0")
+    return load_robot(ElementTree.tostring(root, encoding="unicode"), arm.tool_frame, gravity=arm.gravity)

@@ -2,10 +2,10 @@
 
 import json
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from bodies import hinged
 from conftest import load_arm
 from helpers import NOISE, SAMPLES, commanded, commands, some, tool_at, tool_with
 
@@ -193,28 +193,6 @@ def test_lost_motion_may_grow_with_torque(arm):
     expected = tool_at(arm, campaign.q - 0.5 * width * approach)
     np.testing.assert_allclose(tool_with(campaign, grows, values), expected, atol=1e-14)
     assert restored("backlash", json.dumps(grows.arguments())) == grows
-
-
-def hinged(arm, slide, axis, moving):
-    """The same arm with a hinge on the carriage of a slide, behind its stroke or before it."""
-    root = ElementTree.fromstring(arm.urdf)
-    (joint,) = (j for j in root.findall("joint") if j.get("name") == slide)
-    origin, child = joint.find("origin"), joint.find("child")
-    ElementTree.SubElement(root, "link", name="between")
-    hinge = ElementTree.SubElement(root, "joint", name="hinge", type="revolute")
-    ElementTree.SubElement(hinge, "axis", xyz=" ".join(map(str, axis)))
-    ElementTree.SubElement(hinge, "limit", lower="-1", upper="1", effort="1", velocity="1")
-    ends = ("between", child.get("link")) if moving else (joint.find("parent").get("link"), "between")
-    ElementTree.SubElement(hinge, "parent", link=ends[0])
-    ElementTree.SubElement(hinge, "child", link=ends[1])
-    if moving:
-        child.set("link", "between")
-    else:
-        ElementTree.SubElement(hinge, "origin", dict(origin.attrib))
-        joint.find("parent").set("link", "between")
-        origin.set("xyz", "0 0 0")
-        origin.set("rpy", "0 0 0")
-    return load_robot(ElementTree.tostring(root, encoding="unicode"), arm.tool_frame)
 
 
 @pytest.mark.parametrize("moving", [True, False])

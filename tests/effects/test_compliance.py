@@ -1,11 +1,10 @@
 """What yields to load or bows with heat: against hinges in MuJoCo and a URDF, energy, and what inclinometers read."""
 
 from dataclasses import replace
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from bodies import bodies, displaced, mine
+from bodies import bodies, displaced, hinged, mine
 from helpers import NOISE, SAMPLES, commanded, tool_at, tool_with, without_masses
 from reference import tool_poses
 from simulate import simulate
@@ -84,30 +83,13 @@ def test_bending_by_heat_is_of_the_difference_to_the_robot_and_is_drawn_against_
         np.testing.assert_allclose(response, response[0], rtol=1e-9)  # twice as much warmer, twice the bow
 
 
-def hinged(arm, s):
-    """The same arm with a joint at the end of a segment, which turns about the segment."""
-    segment, root = arm.segments[s], ElementTree.fromstring(arm.urdf)
-    (joint,) = (j for j in root.findall("joint") if j.get("name") == segment.name)
-    along = arm.chain.rotations[segment.index] @ segment.direction
-    added = ElementTree.SubElement(root, "joint", name="hinge", type="revolute")
-    ElementTree.SubElement(added, "origin", xyz=joint.find("origin").get("xyz"), rpy="0 0 0")
-    ElementTree.SubElement(added, "parent", link=segment.parent_link)
-    ElementTree.SubElement(added, "child", link="between")
-    ElementTree.SubElement(added, "axis", xyz=" ".join(f"{x:.17g}" for x in along))
-    ElementTree.SubElement(added, "limit", lower="-1", upper="1", effort="1", velocity="1")
-    ElementTree.SubElement(root, "link", name="between")
-    joint.find("origin").set("xyz", "0 0 0")
-    joint.find("parent").set("link", "between")
-    return load_robot(ElementTree.tostring(root, encoding="unicode"), arm.tool_frame, gravity=arm.gravity)
-
-
 @on_arms
 def test_a_shaft_twists_as_a_hinge_at_its_end_yields(arm):
     campaign = commanded(arm, {"payload": np.tile([0.0, 2.0], 5)}, payload_com=np.array([0.03, 0.02, 0.05]))
     seen, moved, count = shafts(arm), [], 2 * len(beams(arm))
     for k, s in enumerate(seen):
         values = 1e-5 * (np.arange(count + len(seen)) == count + k)
-        there = hinged(arm, s)
+        there = hinged(arm, arm.segments[s].name, arm.segments[s].direction, moving=False)
         joint = there.joint_names.index("hinge")
         turned = replace(campaign, robot=there, q=np.insert(campaign.q, joint, 0.0, axis=1))
         springs = np.where(np.arange(there.n) == joint, 1e-5 * arm.segments[s].length, 0.0)

@@ -48,7 +48,6 @@ from thermal_robot.observations import Observations, observe
 from thermal_robot.percents import percent
 
 _STILL = 1e-4  # rad: a joint that is told to move less does not arrive from any side
-_SHORTEST = 1e-9  # m: a shorter segment has no direction along which it grows
 
 
 def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Campaign:
@@ -79,7 +78,7 @@ def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
     Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
     """
     robot, frames = campaign.robot, seen_in_position(campaign).frames
-    along = np.array([np.append(s.direction * s.length * (s.length > _SHORTEST), np.zeros(3)) for s in robot.segments])
+    along = np.array([np.append(s.direction * s.length, np.zeros(3)) for s in robot.segments])
     grown = Displacement(segment=warmer[:, None, None] * strains[:, None] * along)
     # the growth of a segment turns nothing: the tool frame's origin and the target move alike
     moved = tool_poses(robot, campaign.q, grown)[:, :3, 3] - tool_poses(robot, campaign.q)[:, :3, 3]

@@ -174,18 +174,14 @@ def test_the_deviation_is_how_far_fits_to_noise_scatter(setting, gauge):
 
 
 def test_what_else_is_at_work_makes_a_number_harder_to_tell_and_what_is_not_does_not(setting, gauge):
-    gains = zeros(setting, GAIN)
+    def told(gain, noise=NOISE):
+        beside = zeros(setting, GAIN)
+        beside[3] = gain
+        return deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, beside)], noise)[0]
+
     alone, _ = deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [], NOISE)
-    assert deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[
-        0
-    ] == pytest.approx(alone)
-    gains[3] = 1e-3
-    assert (
-        deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [(GAIN, gains)], NOISE)[0] > 1.001 * alone
-    )
-    assert deviation(gauge, FaultParameter(OFFSET, 3), zeros(setting, OFFSET), [], 2 * NOISE)[0] == pytest.approx(
-        2 * alone
-    )
+    assert (told(0.0), told(0.0, 2 * NOISE)) == pytest.approx((alone, 2 * alone))
+    assert told(1e-3) > 1.001 * alone
 
 
 def test_what_frames_take_up_is_not_asked_for(setting, gauge):
