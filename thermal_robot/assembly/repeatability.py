@@ -25,7 +25,7 @@ _NO_LEVER = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class JointSigmas:
-    """Standard deviations of n joints, found from measured scatter by :func:`joint_sigmas`.
+    """Standard deviations of n joints, fitted to measured scatter of the tool by :func:`joint_sigmas`.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class JointSigmas:
 
     @property
     def compatible(self) -> bool:
-        """Whether some non-negative solution is within all tolerances."""
+        """Whether some σ_q² ≥ 0 reproduces every measured (co)variance within its tolerance: ``needed`` ≤ 1."""
         return self.needed <= 1.0
 
     @property
@@ -90,7 +90,7 @@ def tool_covariance(
     measures: Literal["position", "pose"] = "position",
     point: ArrayLike | None = None,
 ) -> Array:
-    """Covariance of the tool for independent joint errors: J diag(σ_q²) Jᵀ.
+    """Covariance of the tool's position or pose for independent joint errors: J diag(σ_q²) Jᵀ.
 
     Its diagonal is Eqs 2–4 squared; the rest is the correlation that the paper leaves out.
 
@@ -226,7 +226,7 @@ def _deviations(robot: Robot, sigma_q: ArrayLike | Mapping[str, float]) -> Array
 def _measured(
     robot: Robot, q: ArrayLike, measured: ArrayLike, point: ArrayLike | None
 ) -> tuple[Array, Array, Array | None]:
-    """Jacobian (N, c, n) of the c measured components, their standard deviations (N, c), and covariances if given."""
+    """Check measured scatter; return Jacobian (N, c, n), standard deviations (N, c), covariances (N, c, c) or None."""
     for given in (q, () if point is None else point):  # the solver of linear programs does not survive what is none
         if not np.isfinite(np.asarray(given, dtype=float)).all():
             raise EstimationError("joint positions and the point must be finite numbers")
@@ -255,9 +255,9 @@ def _equations(
     sample_size: int | None,
     risk: float,
 ) -> tuple[Array, Array, Array, Array]:
-    """Linear equations in σ_q², one for each measured (co)variance: coefficients, value, bounds.
+    """Linear equations in σ_q², one for each measured (co)variance: coefficients (m, n), value, lower and upper bound.
 
-    Each row is divided by the largest variance of its components, so that lengths and angles weigh alike.
+    Each row is divided by the largest deviations of its two components, so that lengths and angles weigh alike.
     """
     from scipy.special import chdtri, ndtri
 
@@ -282,7 +282,7 @@ def _equations(
 
 
 def _fit(design: Array, observed: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """Non-negative least squares, and the smallest common factor of the tolerances that admits a solution."""
+    """Non-negative least squares, and by linear program the least factor of all tolerances that admits a solution."""
     from scipy.optimize import linprog, nnls
 
     half, middle = (high - low) / 2.0, (high + low) / 2.0

@@ -63,7 +63,7 @@ def displacement(robot: Robot, q: ArrayLike, elongations: PerSegment, *, exact: 
 
 
 def sensitivity(robot: Robot, q: ArrayLike, *, coefficients: PerSegment) -> Array:
-    """Displacement of the tool per kelvin in each segment alone: the matrix of Eq 14 times χ_i l_i.
+    """Displacement of the tool point per kelvin in each segment alone: column i of the matrix of Eq 14 times χ_i l_i.
 
     The sum over the segments is the displacement for a kelvin in the whole robot; its norm, drawn over the workspace,
     is the map of where a part is joined with the least sensitivity to temperature.
@@ -105,7 +105,7 @@ def segment_names(robot: Robot) -> tuple[str, ...]:
 
 
 def lengths(robot: Robot) -> Array:
-    """Lengths (S,) of these segments, m."""
+    """Lengths (S,), m, of the segments with a length, in the order of :func:`segment_names`."""
     return np.array([segment.length for segment in _segments(robot)])
 
 
@@ -182,9 +182,9 @@ def expansion_coefficient(
 
 
 def per_segment(robot: Robot, values: PerSegment, what: str) -> Array:
-    """Values in any accepted form as (..., S), one for each segment with a length.
+    """Values in any form of :data:`PerSegment` as an array (..., S), one for each segment with a length.
 
-    The name of a segment goes before the name of its link.
+    A value by a segment's name overrides one by its link's. ``RobotError`` for unknown names, missing values or shapes.
     """
     names = segment_names(robot)
     if not isinstance(values, Mapping):
@@ -211,7 +211,7 @@ def per_segment(robot: Robot, values: PerSegment, what: str) -> Array:
 
 
 def columns_of(robot: Robot, name: str) -> tuple[int, ...]:
-    """Columns of a segment, or of the segments of a link, by name; an unknown name is refused."""
+    """Columns, among the segments with a length, of a segment or of a link's segments; ``RobotError`` if unknown."""
     chosen = _segments(robot)
     own = tuple(column for column, segment in enumerate(chosen) if segment.name == name)
     carried = tuple(column for column, segment in enumerate(chosen) if segment.parent_link == name)
@@ -232,7 +232,7 @@ def _segments(robot: Robot) -> list[Segment]:
 
 @dataclass(frozen=True, eq=False)
 class MeanShift:
-    """Result of :func:`mean_shift_test`; arrays have the shape of the mean, one entry for each axis.
+    """Result of the two-sided z test of a mean, :func:`mean_shift_test`; arrays have one entry for each axis.
 
     Parameters
     ----------
@@ -387,7 +387,7 @@ class LinkWarmUp:
     def displacements(
         self, q: ArrayLike, *, coefficients: PerSegment, reference: float = STANDARD_TEMPERATURE
     ) -> Array:
-        """Displacements (T, 3) m of the tool point that stands at ``q``, (n,), or at (T, n) as time goes by."""
+        """Displacements (T, 3) m of the tool point at the T instants; ``q`` is (n,) for all, or (T, n)."""
         grown = self.elongations(coefficients=coefficients, reference=reference)
         return displacement(self.robot, q, grown)
 
@@ -400,7 +400,7 @@ def warm_up(
     time_constants: PerSegment,
     initial: PerSegment | None = None,
 ) -> LinkWarmUp:
-    """First-order thermal lag of every link behind its surroundings: τ_i dT_i/dt = T_ambient − T_i.
+    """Temperatures of all segments by first-order lag behind their surroundings: τ_i dT_i/dt = T_ambient,i − T_i.
 
     Parameters
     ----------
@@ -469,7 +469,7 @@ _LEAST_SHARE = 1e-6
 
 
 def axes_of(axes: Axes, count: int) -> tuple[str, ...]:
-    """Measured axes as a word of x, y and z for each of ``count`` poses."""
+    """Measured axes as one word of letters x, y, z for each of ``count`` poses; ``EstimationError`` if invalid."""
     words = (axes,) * count if isinstance(axes, str) else tuple(axes)
     if len(words) != count:
         raise EstimationError(f"measured axes are given for {len(words)} poses, but there are {count}")
@@ -480,14 +480,14 @@ def axes_of(axes: Axes, count: int) -> tuple[str, ...]:
 
 
 def measured(words: Sequence[str]) -> NDArray[np.bool_]:
-    """Mask (N, 3) of the measured components."""
+    """Mask (N, 3) of the measured components x, y, z, from a word of these letters for each of N poses."""
     return np.array([[letter in word for letter in "xyz"] for word in words], dtype=bool).reshape(-1, 3)
 
 
 def pseudo_inverse(system: Array) -> tuple[Array, int, NDArray[np.bool_]]:
     """Pseudo-inverse (S, m) of a system (m, S), its rank, and the mask (S,) of identified unknowns.
 
-    An unknown is identified if it has no component in the null space.
+    By singular values above 1e-9 of the largest. An unknown is identified if its component in the null space is < 1e-6.
     """
     left, singular, right = np.linalg.svd(system, full_matrices=True)
     rank = int(np.sum(singular > _RANK * np.max(singular, initial=0.0)))
@@ -501,7 +501,7 @@ _SWEEPS = 30
 
 @dataclass(frozen=True, eq=False)
 class BestPoses:
-    """Poses at which to measure, from :func:`best_poses`.
+    """Optimal poses at which to measure elongations, from :func:`best_poses`.
 
     Parameters
     ----------
@@ -534,7 +534,7 @@ def best_poses(
     axes: Axes = "xyz",
     seed: int = 0,
 ) -> BestPoses:
-    """Optimal design of measuring poses: greedy choice, then exchange of one pose at a time.
+    """Optimal experimental design (D, A or E) of poses for measuring elongations: greedy choice, then exchanges.
 
     Parameters
     ----------
@@ -593,9 +593,10 @@ def _pool(robot: Robot, candidates: ArrayLike | int, seed: int) -> Array:
 
 
 def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: str) -> list[int]:
-    """Greedy choice followed by exchanges of one pose at a time.
+    """Row of the candidate for each pose, by greedy choice and then by exchanges of one pose while the criterion rises.
 
-    Poses are added by determinant, the one criterion that ranks underdetermined systems.
+    The greedy choice goes by determinant, the one criterion that ranks underdetermined systems. ``information``: Gram
+    matrices (M, k, k) of all candidates for each word of axes.
     """
     chosen: list[int] = []
     for slot in range(len(words)):
@@ -616,7 +617,10 @@ def _chosen(information: dict[str, Array], words: tuple[str, ...], criterion: st
 def _scores(
     information: dict[str, Array], words: tuple[str, ...], chosen: list[int], slot: int, criterion: str, least: float
 ) -> Array:
-    """Design criterion (M,) of each candidate with the other poses; larger is better."""
+    """Optimality criterion (M,) of the design with each candidate at ``slot`` and the other poses as chosen.
+
+    Log determinant (D), −trace of the inverse (A) or least eigenvalue (E) of the information; −inf for a repeated pose.
+    """
     others = [(words[other], c) for other, c in enumerate(chosen) if other != slot]
     own = information[words[slot]]
     total = least * np.eye(own.shape[1])
@@ -639,7 +643,7 @@ def _condition(system: Array, rank: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedElongations:
-    """Elongations of the S segments with a length, from m measured components; what is not identified is NaN.
+    """Least-squares elongations of the S segments with a length, from m components; what is not identified is NaN.
 
     Parameters
     ----------
@@ -753,7 +757,7 @@ def identify_elongations(
 
 
 def _noise(poses: int, sigma: ArrayLike | None, covariance: ArrayLike | None) -> Array | None:
-    """Covariance (N, 3, 3) of the measured displacements, or None."""
+    """Noise covariance (N, 3, 3) of the measured displacements, m²; None where neither form of it is given."""
     if sigma is not None and covariance is not None:
         raise EstimationError("give the noise as sigma or as a covariance, not as both")
     if covariance is not None:
@@ -771,7 +775,7 @@ def _noise(poses: int, sigma: ArrayLike | None, covariance: ArrayLike | None) ->
 
 
 def _root(covariance: Array) -> Array:
-    """Cholesky factor of the noise of a pose."""
+    """Cholesky factor of a pose's noise covariance; ``EstimationError`` unless finite and positive definite."""
     if not np.all(np.isfinite(covariance)):
         raise EstimationError("the noise of a measured component is not a finite number")
     try:

@@ -27,7 +27,7 @@ _SAME_BRANCH = (0.25, 0.5, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class AssemblyMap:
-    """Required clearances of M places, from :func:`assembly_map`; NaN for a pose that is NaN.
+    """Probability of joining and required clearance at M places, by :func:`assembly_map`; NaN for a pose that is NaN.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class AssemblyMap:
 
 
 def grid(xs: ArrayLike, ys: ArrayLike, zs: ArrayLike) -> Array:
-    """Grid of places (M, 3), m, x running fastest; a plane if one coordinate is a single number."""
+    """Regular grid of points (M, 3), m, x varying fastest, z slowest; a plane if one coordinate is a single number."""
     heights, ahead, across = np.meshgrid(*(np.atleast_1d(np.asarray(v, float)) for v in (zs, ys, xs)), indexing="ij")
     return np.stack([across, ahead, heights], axis=-1).reshape(-1, 3)
 
@@ -217,7 +217,10 @@ def assembly_map(
 def _solve(
     robot: Robot, targets: Array, from_q: Array, approach: Array, axis: Array, point: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Levenberg-Marquardt for all places at once, damping proportional to the squared residual."""
+    """Inverse kinematics by Levenberg-Marquardt, all places at once; damping proportional to the squared residual.
+
+    Configurations (M, n), and a mask (M,) of those that converged to 1e-11 within the joint limits.
+    """
     q = from_q.copy()
     closed = np.zeros(len(q), dtype=bool)
     for _ in range(_STEPS):

@@ -79,7 +79,7 @@ def capability_ratio(
 ) -> Array:
     """Classical capability ``C_p = L / (6 sigma)``, with ``sigma`` the largest standard deviation over directions.
 
-    It knows neither the mean nor the form of the law. With a thermal part its covariance is added (Eq 20).
+    Mean and shape of the distribution do not enter. With a thermal part its covariance is added (Eq 20).
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def required_clearance(
     Raises
     ------
     ValueError
-        Unless exactly one requirement is given, within its range; for a covariance that is none.
+        Unless exactly one requirement is given, within its range; for a matrix that is no covariance.
     """
     if (capability is not None) + (probability is not None) + (failing is not None) != 1:
         raise ValueError("give exactly one of capability, probability and failing")
@@ -176,7 +176,7 @@ def required_clearance(
 
 
 def _clearances(law: Law, log_failing: float, shape: Shape, proportion: Array) -> Array:
-    """Solve for the factors on ``proportion`` by the secant method within a bracket, all at once.
+    """Clearances ``(N,)``, as factors on ``proportion``, with a given failing probability: bracketed secant method.
 
     The failing probability as a standard normal quantile is nearly a straight line in the size wherever little fails,
     so that few steps are enough. The first comes from Wilson and Hilferty's approximation of the squared error.

@@ -17,10 +17,10 @@ MANY = 20_000
 
 
 def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt.ArrayLike) -> Array | None:
-    """Probabilities (2, ...) that normal deviations lie in, and out of, circles about the origin; inputs broadcast.
+    """Probabilities (2, ...) that bivariate normal deviations lie in, and out of, discs about the origin.
 
-    The input need not be validated: the result is NaN for an invalid case and for one outside this method's range.
-    ``None`` where numba is missing or not worth while, or the shapes do not fit.
+    Inputs broadcast and need not be valid: an invalid case, or one outside this method's range, gives NaN. The result
+    is ``None`` for fewer than `MANY` cases, without numba, or where the shapes do not fit.
     """
     matrices, sizes, means = np.asarray(covariance, float), np.asarray(diameter, float), np.asarray(mean, float)
     if not means.ndim and means == 0.0:
@@ -47,7 +47,7 @@ def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt
 
 @cache
 def _angles() -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """Angle counts, with cosines and sines of all angles and of a quarter of them."""
+    """Numbers (K,) of midpoint angles, and tables (K, 2, n) of their cosines and sines: full circle, first quarter."""
     table = np.zeros((len(ANGLES), 2, int(ANGLES[-1])))
     for row, count in zip(table, ANGLES, strict=True):
         angle = (2.0 * np.pi / count) * (np.arange(count) + 0.5)

@@ -34,12 +34,12 @@ _ROOT_3 = np.sqrt(3.0)
 
 
 def eq18_printed_area() -> float:
-    """Area under Eq 18 as printed, for any ``r``: ``1 / sqrt(pi)``, not one."""
+    """Area under the flat-normal density as Eq 18 prints it, for any ``r``: ``1 / sqrt(pi)``, not one."""
     return float(1.0 / np.sqrt(np.pi))
 
 
 def _parts(r: npt.ArrayLike) -> tuple[Array, Array]:
-    """Return the normal standard deviation and uniform half width of total variance one."""
+    """Return the normal standard deviation and the uniform half width for the ratio ``r`` at total variance one."""
     ratio = np.asarray(r, dtype=float)
     with np.errstate(divide="ignore"):
         sigma = 1.0 / np.hypot(1.0, ratio)
@@ -48,7 +48,7 @@ def _parts(r: npt.ArrayLike) -> tuple[Array, Array]:
 
 
 class FlatNormalGenerator(stats.rv_continuous):  # type: ignore[misc]  # scipy has no annotations
-    r"""Sum of a normal and an independent uniform variable.
+    r"""Flat-normal distribution: the sum of a normal and an independent uniform variable.
 
     The shape parameter is the paper's ``r`` (Eq 17), from 0 (normal) to ``inf`` (uniform), both exact. ``loc`` is the
     mean and ``scale`` the *total* standard deviation, the root of Eq 20; so that both limits are proper
@@ -118,7 +118,7 @@ class FlatNormalGenerator(stats.rv_continuous):  # type: ignore[misc]  # scipy h
         )
 
     def fit(self, data: npt.ArrayLike, *_: Any, method: str = "MLE", **fixed: Any) -> tuple[float, float, float]:
-        """Estimate ``(r, loc, scale)``.
+        """Estimate ``(r, loc, scale)`` by maximum likelihood or by moments.
 
         Parameters
         ----------
@@ -187,14 +187,14 @@ class FlatNormal(_Frozen):  # type: ignore[misc]  # scipy has no annotations
 
     @classmethod
     def fitted(cls, data: npt.ArrayLike, **options: Any) -> FlatNormal:
-        """Fit to a sample; options as in `FlatNormalGenerator.fit`."""
+        """Fit to a sample by maximum likelihood, or by moments; options as in `FlatNormalGenerator.fit`."""
         ratio, loc, scale = flat_normal.fit(data, **options)
         sigma, half_width = _parts(ratio)
         return cls(scale * sigma, scale * half_width, loc)
 
 
 def _upper_quantile(q: Array, sigma: Array, half_width: Array) -> Array:
-    """Inverse survival function: ``x`` with P(X > x) = q.
+    """Inverse survival function of a centred normal plus a uniform variable on ±``half_width``: P(X > x) = q.
 
     Newton's iteration on ``log P(X > x)``, which is concave: started beyond the root it approaches it from there
     without overshooting, down to ``q = 1e-300`` and for any proportion of the two parts.
@@ -222,7 +222,7 @@ def _upper_quantile(q: Array, sigma: Array, half_width: Array) -> Array:
 
 
 def _entropy(sigma: float, half_width: float) -> float:
-    """Entropy; closed form in both limits, otherwise Gauss-Legendre panels over the half line."""
+    """Differential entropy of a normal plus a uniform variable: closed form in both limits, else Gauss-Legendre sum."""
     if sigma == 0.0:
         return float(np.log(2.0 * half_width))
     if half_width == 0.0:
@@ -304,7 +304,10 @@ def fit_maximum_likelihood(
 
 
 def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
-    """Local maxima of the likelihood from several starts; empty where all three parameters are fixed."""
+    """Maximise the likelihood numerically from several starts; empty where all three parameters are held.
+
+    Returns, for each start, the negative log-likelihood per value and the estimate ``(r, mean, size)``.
+    """
     free = [k for k in range(3) if held[k] is None]
     if not free:
         return []
@@ -326,7 +329,7 @@ def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
 
 
 def _completed(held: Held, point: Array) -> tuple[float, float, float]:
-    """Mean, log size and angle from the fixed parameters and the free coordinates."""
+    """Merge held parameters and free coordinates into mean, log of the standard deviation, and ``arctan r``."""
     rest = iter(point)
     place, size, angle = (float(next(rest)) if value is None else value for value in held)
     return place, size, angle
@@ -338,7 +341,7 @@ def _estimate(point: tuple[float, float, float]) -> Estimate:
 
 
 def _limit(scaled: Array, limit: float, loc: float | None, log_scale: float | None) -> tuple[float, float]:
-    """Maximum likelihood at a limit, normal (``limit = 0``) or uniform (``inf``): mean, total standard deviation."""
+    """Maximum likelihood of a normal (``limit = 0``) or uniform (``inf``) law: mean and standard deviation."""
     if limit == 0.0:
         place = float(np.mean(scaled)) if loc is None else loc
         size = float(np.sqrt(np.mean((scaled - place) ** 2)))
@@ -489,7 +492,7 @@ def flat_normal_nd(covariance: npt.ArrayLike, spread: UniformSpread, mean: npt.A
 
 
 def _log_product(white: Array, edges: Array, lengths: Array) -> Array:
-    """Log density at whitened points: flat-normal along each of orthogonal edges, standard normal across."""
+    """Log density at whitened points (N, d): flat-normal along each of the orthogonal edges, standard normal across."""
     directions = edges / lengths
     along = white @ directions
     across = white - along @ directions.T

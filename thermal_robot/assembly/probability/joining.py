@@ -44,7 +44,10 @@ class Law:
         randomised: Randomised = "uniform",
         segments: npt.ArrayLike | None = None,
     ) -> Law:
-        """Validate the input of `joining_probability`, and sort the thermal part into mean, segments and box."""
+        """Validate the input of `joining_probability`, and assign the thermal part to mean, covariance or uniform part.
+
+        Vectors are added to the mean; a spread is kept, or with ``randomised="normal"`` replaced by its two moments.
+        """
         matrices = check_covariance(covariance)
         ends = None if segments is None else _vectors(segments, "segments")
         if ends is not None and isinstance(thermal, UniformSpread):
@@ -63,12 +66,12 @@ class Law:
 
     @property
     def leading(self) -> tuple[int, ...]:
-        """Leading shape of the laws."""
+        """Broadcast shape of the leading axes of covariances, means and segments."""
         own = () if self.segments is None else self.segments.shape[:-1]
         return np.broadcast_shapes(self.matrices.shape[:-2], self.means.shape[:-1], own)
 
     def flat(self, leading: tuple[int, ...]) -> Law:
-        """Laws broadcast to a shape, flattened."""
+        """Broadcast the laws to a leading shape, and flatten it to one axis of N laws."""
         ends = self.segments
         return Law(
             np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2),
@@ -83,7 +86,7 @@ class Law:
         return Law(self.matrices[chosen], self.means[chosen], self.spread, None if ends is None else ends[chosen])
 
     def square(self) -> tuple[Array, Array]:
-        """Mean ``(N,)`` of the squared error of flattened laws, and its variance as if the whole were normal."""
+        """Mean ``(N,)`` of the squared length of the error, and its variance as if the error were normal."""
         matrices, means = self.matrices, self.means
         if self.spread is not None:
             matrices, means = matrices + self.spread.covariance, means + self.spread.mean
@@ -94,7 +97,7 @@ class Law:
         return np.trace(matrices, axis1=1, axis2=2) + np.sum(means**2, axis=1), variance
 
     def probability(self, sizes: Array, shape: Shape, outside: bool) -> Array:
-        """Probability ``(N,)`` of flattened laws in, or out of, regions of diameters ``(N, 1)`` or sides ``(N, 2)``."""
+        """Probability ``(N,)`` that errors lie in (or ``outside``) discs of diameter ``(N, 1)`` or sides ``(N, 2)``."""
         result = np.full(len(sizes), 1.0 if outside else 0.0)
         endless = np.all(np.isinf(sizes), axis=1)
         result[endless] = 0.0 if outside else 1.0
@@ -119,7 +122,7 @@ def _vectors(value: npt.ArrayLike, name: str) -> Array:
 
 
 def check_covariance(covariance: npt.ArrayLike) -> Array:
-    """Validate a covariance of shape ``(..., 2, 2)``; ``ValueError`` otherwise."""
+    """Return covariances ``(..., 2, 2)`` made exactly symmetric; ``ValueError`` unless positive semidefinite."""
     matrices = np.asarray(covariance, dtype=float)
     if matrices.shape[-2:] != (2, 2) or not np.all(np.isfinite(matrices)):
         raise ValueError(f"covariance must be finite with shape (..., 2, 2), not of shape {matrices.shape}")
@@ -143,11 +146,11 @@ _SMOOTH = 6.0
 
 
 def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
-    """Quadrature nodes (N, d) and weights (N,) for the mean over ``generators @ u``, ``u`` uniform on [-1, 1].
+    """Gauss-Legendre product nodes (N, d), weights (N,) for the mean over ``generators @ u``, ``u`` uniform on [-1, 1].
 
     A function smoothed by the normal part grows along a generator no faster than ``exp(reach * length * u)``, with the
-    length and the reach in standard deviations; panels and nodes follow from that. Refused where the normal part is too
-    narrow for a sum of reasonable length.
+    length and the reach in standard deviations; panels and nodes follow from that. ``ValueError`` where the normal part
+    is so narrow that there would be more than `_LARGEST` nodes.
     """
     lengths = generator_lengths(covariance, generators)
     rates = lengths * ((_REACH if len(lengths) == 1 else _REACH_MANY) + lengths)
@@ -166,12 +169,12 @@ def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
 
 
 def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
-    """Quadrature nodes (N, 2) and weights (N,) for the same mean in the plane, for any number of generators.
+    """Quadrature nodes (N, 2), weights (N,) for the mean over planar ``generators @ u``, ``u`` uniform on [-1, 1].
 
-    A smooth function of the sum of many generators depends on a point in the plane only. The law of the sum is
-    therefore moved, one generator after the other, on a fixed product grid of Chebyshev points over the sum's bounding
-    box, such that every polynomial up to the grid's degree keeps its mean. Weights may be slightly negative. Refused
-    where the normal part is too narrow for a grid of reasonable size.
+    As `link_nodes`, for any number of generators: the distribution of their sum is moved, one generator after the
+    other, on a fixed product grid of Chebyshev points over the sum's bounding box, such that every polynomial up to the
+    grid's degree keeps its mean. Weights may be slightly negative. ``ValueError`` where the normal part is so narrow
+    that the grid would hold more than `_LARGEST_GRID` nodes.
     """
     if generators.shape[1] < 2:
         return link_nodes(covariance, generators)
@@ -202,14 +205,14 @@ def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Arra
 
 
 def generator_lengths(covariance: Array, generators: Array) -> Array:
-    """Length of every generator in standard deviations of the normal part along it."""
+    """Mahalanobis length ``sqrt(g' C**-1 g)`` of each generator ``g``, a column; ``C`` with its eigenvalues floored."""
     values, vectors = np.linalg.eigh(covariance)
     floor = 1e-12 * max(float(values[-1]), float(np.max(np.sum(generators**2, axis=0))))
     return np.asarray(np.linalg.norm((vectors / np.sqrt(np.maximum(values, floor))).T @ generators, axis=0))
 
 
 def _node_count(rate: Array) -> Array:
-    """Points per panel [-1, 1] for functions that grow like ``exp(rate * u)``, to rounding."""
+    """Return the number of Gauss-Legendre nodes that integrate ``exp(rate * u)`` over [-1, 1] to rounding error."""
     return np.ceil(7.0 + 0.8 * rate)
 
 
@@ -231,7 +234,7 @@ def joining_probability(
     randomised: Randomised = "uniform",
     segments: npt.ArrayLike | None = None,
 ) -> Array:
-    """Probability that the deviation lies within the clearance (Eq 22).
+    """Probability that a planar normal error, with its thermal part, lies within the clearance (Eq 22).
 
     Parameters
     ----------
@@ -278,7 +281,7 @@ def failing_probability(
     randomised: Randomised = "uniform",
     segments: npt.ArrayLike | None = None,
 ) -> Array:
-    """Probability that the deviation exceeds the clearance, ``1 - P`` of Eq 22, integrated directly over the outside.
+    """Probability that a planar error exceeds the clearance, ``1 - P`` of Eq 22, integrated directly over the outside.
 
     It keeps its digits (1e-10 relative) when ``P`` rounds to one. Parameters, shapes and errors as in
     `joining_probability`.
@@ -297,7 +300,7 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
-    """Validate, broadcast and integrate all cases; large batches of plain ones go to compiled loops."""
+    """Validate, broadcast and integrate all cases; large batches of discs without uniform part go to compiled loops."""
     plain = shape == "circle" and thermal is None and segments is None
     chances = circle_chances(covariance, clearance, mean) if plain else None
     result = np.array(np.nan) if chances is None else chances[int(outside)]
@@ -314,7 +317,7 @@ def _evaluate(
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
-    """Clearances as diameters ``(..., 1)`` or side lengths ``(..., 2)``."""
+    """Clearances as diameters ``(..., 1)`` or side lengths ``(..., 2)``; ``ValueError`` for negative ones or NaN."""
     sizes = np.asarray(clearance, dtype=float)
     if shape == "circle":
         sizes = sizes[..., None]
@@ -330,7 +333,7 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
 
 
 def _piece(law: Law, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
-    """Integrate one parallelotope: longest generator in closed form, the others by quadrature."""
+    """Probability ``(N,)`` for one piece of the uniform part: longest generator in closed form, rest by quadrature."""
     count = generators.shape[1]
     segment = generators[:, 0] if count else law.segments
     if count < 2:
@@ -345,7 +348,10 @@ def _piece(law: Law, means: Array, sizes: Array, shape: Shape, generators: Array
 
 
 def _several(matrix: Array, means: Array, sizes: Array, shape: Shape, generators: Array, outside: bool) -> Array:
-    """Sum over all generators but the longest; a second one long beside the normal part by halved panels."""
+    """Average the probability over all generators but the longest by quadrature, ``(N,)``.
+
+    A second one of `_SMOOTH` normal standard deviations or more goes by adaptive panels, others by fixed nodes.
+    """
 
     def shifted(owner: npt.NDArray[np.intp], shifts: Array) -> Array:
         centres = (means[owner][:, None] + shifts).reshape(-1, 2)

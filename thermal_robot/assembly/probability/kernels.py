@@ -33,15 +33,15 @@ _UNDERFLOW = 39.0  # standard deviations beyond which the normal density is zero
 
 
 def mills_ratio(t: Array) -> Array:
-    """Return ``Phi(-t) / phi(t)`` for ``t >= 0``."""
+    """Mills's ratio ``Phi(-t) / phi(t)`` of the standard normal law, survival function over density; ``t >= 0``."""
     return np.asarray(_ROOT_HALF_PI * erfcx(t * _ROOT_HALF))
 
 
 def second_mills_ratio(t: Array) -> Array:
-    """Return ``I(-t) / phi(t) = 1 - t m(t)`` for ``t >= 0``, with ``I`` the integral of ``Phi``, ``m`` Mills's ratio.
+    """Integral of the standard normal survival function beyond ``t >= 0``, over the density: ``1 - t m(t)``.
 
-    ``m = 1 / (t + k)`` with ``k = 1 / (t + 2 / (t + 3 / ...))``, hence ``1 - t m = k m``, a product without
-    cancellation.
+    ``m`` is Mills's ratio, ``m = 1 / (t + k)`` with ``k = 1 / (t + 2 / (t + 3 / ...))``, hence ``1 - t m = k m``, a
+    product without cancellation.
     """
     t = np.asarray(t, dtype=float)
     ratio = mills_ratio(t)
@@ -58,7 +58,7 @@ def second_mills_ratio(t: Array) -> Array:
 
 
 def _integral(t: Array) -> Array:
-    """Return ``I(t)``, any sign of ``t``; zero where it underflows."""
+    """Integral ``I(t) = t Phi(t) + phi(t)`` of the standard normal distribution function; zero for ``t <= -39``."""
     size = np.abs(t)
     result = np.zeros(t.shape)
     within = size < _UNDERFLOW
@@ -68,7 +68,7 @@ def _integral(t: Array) -> Array:
 
 
 def _log_integral(t: Array) -> Array:
-    """Logarithm of ``I(t)``, any sign of ``t``."""
+    """Logarithm of ``I(t) = t Phi(t) + phi(t)``, the integral of the standard normal distribution function."""
     size = np.abs(t)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         below = -0.5 * size**2 - _LOG_ROOT_2PI + np.log(second_mills_ratio(size))
@@ -84,15 +84,15 @@ def _log_difference(upper: Array, lower: Array) -> Array:
 
 
 def _split(*arguments: npt.ArrayLike) -> tuple[tuple[int, ...], tuple[Array, ...]]:
-    """Broadcast shape, and the arguments as arrays of it, at least one-dimensional."""
+    """Broadcast the arguments; return their common shape, and them as arrays of it, at least one-dimensional."""
     arrays = np.broadcast_arrays(*(np.asarray(a, dtype=float) for a in arguments))
     return arrays[0].shape, tuple(map(np.atleast_1d, arrays))
 
 
 def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Logarithm of the density (Eqs 16-18 with any scale) at ``x``, measured from the mean; arguments broadcast.
+    """Log density at ``x`` of a centred normal plus an independent uniform variable on ±``half_width`` (Eqs 16-18).
 
-    Where both ``sigma`` and ``half_width`` are zero there is no density: ``inf`` at zero, ``-inf`` elsewhere.
+    Arguments broadcast. Where ``sigma`` and ``half_width`` are both zero: ``inf`` at zero, ``-inf`` elsewhere.
     """
     shape, (x, sigma, half_width) = _split(x, sigma, half_width)
     distance = np.abs(x)
@@ -124,7 +124,7 @@ def log_density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLik
 
 
 def log_tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Log survival function P(X > x) with ``x`` measured from the mean; arguments broadcast."""
+    """Log survival function log P(X > x) of a centred normal plus a uniform variable on ±``half_width``; broadcasts."""
     shape, (x, sigma, half_width) = _split(x, sigma, half_width)
     distance = np.abs(x)
     lower = np.empty(x.shape)  # logarithm of P(X > |x|)
@@ -154,7 +154,10 @@ def log_tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) 
 
 
 def _log_tail_near(z: Array, ratio: Array) -> Array:
-    """Mean of ``Phi(-z + A u)`` over ``u``, relative to ``phi(z)``; ``z >= 0``, ``A max(1, z) <= 1``."""
+    """Log survival function at ``z >= 0``, in sigmas: log of the mean of ``Phi(-z + A u)`` over ``u`` in [-1, 1].
+
+    ``A = ratio`` is the uniform half width in sigmas, ``A max(1, z) <= 1``; the mean is a sixteen-point Gauss sum.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         shift = ratio[:, None] * NODES
         point = z[:, None] - shift
@@ -167,12 +170,15 @@ def _log_tail_near(z: Array, ratio: Array) -> Array:
 
 
 def density(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Density at ``x`` measured from the mean; see `log_density`."""
+    """Density at ``x`` of a centred normal plus an independent uniform variable on ±``half_width``."""
     return np.exp(log_density(x, sigma, half_width))
 
 
 def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Survival function P(X > x); as `log_tail`, but cheaper, and zero below 1e-300."""
+    """Survival function P(X > x) of a centred normal plus an independent uniform variable on ±``half_width``.
+
+    Cheaper than `log_tail`, but may underflow to zero below 1e-300.
+    """
     shape, (x, sigma, half_width) = _split(x, sigma, half_width)
     if not np.any(half_width) and np.all(sigma > 0.0):
         return np.asarray(ndtr(-x / sigma)).reshape(shape)
@@ -190,18 +196,18 @@ def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> A
 
 
 def outside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Probability P(X < low or X > high), relatively accurate; bounds from the mean, ``low <= high`` of one shape.
+    """Probability P(X < low or X > high) for X a centred normal plus a uniform variable on ±``half_width``.
 
-    A point mass (``sigma = half_width = 0``) on the edge is inside. The widths broadcast.
+    Relatively accurate. ``low <= high`` have one shape, the widths broadcast. A point mass on the edge is inside.
     """
     return tail(-low, sigma, half_width) + tail(high, sigma, half_width)
 
 
 def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
-    """Probability P(low <= X <= high), relatively accurate; bounds from the mean, ``low <= high`` of one shape.
+    """Probability P(low <= X <= high) for X a centred normal plus a uniform variable on ±``half_width``.
 
-    An interval on one side of the mean is a difference of the tails on that side; an interval much shorter than
-    ``sigma`` is a Gauss-Legendre sum of the density, because there that difference cancels. The widths broadcast.
+    Relatively accurate; ``low <= high`` have one shape, the widths broadcast. An interval on one side of the mean is a
+    difference of tails; one shorter than ``sigma / 2``, where they cancel, is a Gauss-Legendre sum of the density.
     """
     sigma, half_width = np.asarray(sigma, dtype=float), np.asarray(half_width, dtype=float)
     mirrored = low + high < 0.0
@@ -222,7 +228,7 @@ def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width
 
 
 def _inside_uniform(low: Array, high: Array, half_width: Array) -> Array:
-    """P(low <= X <= high) without a normal part, point masses included."""
+    """P(low <= X <= high) for X uniform on ±``half_width``; for X = 0 where ``half_width`` is zero."""
     overlap = np.minimum(high, half_width) - np.maximum(low, -half_width)
     point = np.where((low <= 0.0) & (high >= 0.0), 1.0, 0.0)
     share = np.maximum(overlap, 0.0) / np.where(half_width > 0.0, 2.0 * half_width, 1.0)
@@ -246,11 +252,11 @@ def _panel_sums(integrand: Integrand, owner: Owners, left: Array, right: Array) 
 
 
 def integrate_panels(integrand: Integrand, breakpoints: Array, *, tolerance: float = 1e-13, depth: int = 48) -> Array:
-    """Integrate ``N`` non-negative functions, each over its own ascending breakpoints ``(N, M)``, relatively accurate.
+    """Integrate ``N`` non-negative functions by adaptive Gauss-Legendre panels, between own breakpoints ``(N, M)``.
 
-    The integrand takes the number of the integral of each panel, ``(P,)``, and points ``(P, n)``. A panel is halved, at
-    most ``depth`` times, while its two halves differ from it by more than the ``tolerance`` as a share of its
-    integral's total; the halves are kept, so that the error is far smaller than that.
+    The integrand takes the number of the integral of each panel, ``(P,)``, and points ``(P, n)``. Breakpoints ascend. A
+    panel is halved, at most ``depth`` times, while its two halves differ from it by more than the ``tolerance`` as a
+    share of its integral's total; the halves are kept, so that the error is far smaller than that.
     """
     count = breakpoints.shape[0]
     left, right = breakpoints[:, :-1], breakpoints[:, 1:]

@@ -41,7 +41,7 @@ def _exact(function: Any) -> Any:
 
 @_exact
 def _product(p: float, q: float) -> tuple[float, float]:
-    """Exact product: rounded value and rounding error (Dekker)."""
+    """Dekker's error-free product ``p q``: rounded value, and its rounding error."""
     head, p1, q1 = p * q, p * _SPLIT, q * _SPLIT
     ph, qh = p1 - (p1 - p), q1 - (q1 - q)
     pl, ql = p - ph, q - qh
@@ -79,7 +79,11 @@ def _decays(room: Array, bits: npt.NDArray[np.int64], count: int) -> None:
 def _edge(
     axes: tuple[float, float], at: tuple[float, float], circle: Array, room: Array, bits: npt.NDArray[np.int64]
 ) -> tuple[float, float]:
-    """Means of w (1 − exp(−h))/2h and of w exp(−h)/2h over the angles, of which ``circle`` is (2, n)."""
+    """Trapezoidal sums of a disc's probabilities inside and outside along its edge, at the angles of ``circle`` (2, n).
+
+    Means of w (1 − exp(−h))/2h and, before `_poles`, of w exp(−h)/2h, with the edge's weight w and h = |z|²/2 of
+    `planar`; ``axes`` and ``at`` are its a and b.
+    """
     count = circle.shape[1]
     area, by_cosine, by_sine, least = axes[0] * axes[1], -at[0] * axes[1], -at[1] * axes[0], np.inf
     for k in range(count):
@@ -106,7 +110,7 @@ def _edge(
 
 @_exact
 def _poles(axes: tuple[float, float], at: tuple[float, float], count: int) -> float:
-    """Pole correction of the trapezoidal sum of exp(−h)/2h over the angles; see `planar`."""
+    """Pole correction to add to the trapezoidal mean of w exp(−h)/2h (outside) over ``count`` angles; see `planar`."""
     lead, low = 0.5 * (axes[0] + axes[1]), 0.5 * (axes[0] - axes[1])
     middle = complex(at[0], at[1])
     root = np.sqrt(middle * middle - 4.0 * lead * low)
@@ -142,10 +146,10 @@ def circles(
     stop: int,
     found: Array,
 ) -> None:
-    """Write probabilities (2, N) inside and outside, of the cases from ``start`` to ``stop``; NaN where not applicable.
+    """Write to ``found`` (2, N) the probabilities of normal deviations in, and out of, discs about the origin.
 
-    ``nodes`` (K,) numbers of angles; ``table``, ``quarters`` (K, 2, most) their cosines and sines, those of a quarter
-    of the edge apart.
+    Cases from ``start`` to ``stop``; NaN where the rule does not apply. ``nodes`` (K,) numbers of angles; ``table``
+    (K, 2, most) their cosines and sines, ``quarters`` (K, 2, most / 4) those of the first quarter.
     """
     room = np.empty((3, table.shape[2]))
     bits = room.view(np.int64)

@@ -88,7 +88,7 @@ def _difference_of_products(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 @dataclass(frozen=True)
 class Principal:
-    """Eigendecomposition of 2x2 covariances: variances ``large >= small >= 0``, unit vector of the first."""
+    """Eigendecomposition of N 2x2 covariances: variances ``large >= small >= 0``, unit vectors (N, 2) of the first."""
 
     large: Array
     small: Array
@@ -96,7 +96,7 @@ class Principal:
 
     @classmethod
     def of(cls, covariance: Array) -> Principal:
-        """Decompose; the smaller variance comes from the determinant, accurate next to a large one."""
+        """Decompose ``(N, 2, 2)``; the smaller eigenvalue, determinant over the larger, is relatively accurate."""
         size = np.max(np.abs(covariance), axis=(-2, -1))
         nothing = size == 0.0
         # a power of two: to divide by it rounds nothing
@@ -113,7 +113,7 @@ class Principal:
         return np.stack([x * u + y * v, y * u - x * v], axis=1)
 
     def rows(self, chosen: Rows) -> Principal:
-        """Subset of the rows."""
+        """Select cases by row number."""
         return Principal(self.large[chosen], self.small[chosen], self.direction[chosen])
 
 
@@ -152,9 +152,10 @@ def planar_probability(
 
 
 def disc_chances(principal: Principal, means: Array, radii: Array, segments: Array) -> Array:
-    """Probabilities ``(2, N)`` in, to rounding, and out of discs about the origin, to ten digits; NaN where not told.
+    """Probabilities ``(2, N)`` that normal plus uniform deviations lie in, and out of, discs about the origin.
 
-    Means and half segments ``(N, 2)``. A segment that is short beside the deviations is a sum of sixteen means.
+    Means and half segments ``(N, 2)``. Inside to rounding, outside to ten digits; NaN where that is not reached.
+    A segment of at most a standard deviation is averaged over sixteen Gauss-Legendre nodes.
     """
     result = np.full((2, len(means)), np.nan)
     deviations = np.sqrt(np.stack([principal.large, principal.small], axis=1))
@@ -191,7 +192,7 @@ def disc_chances(principal: Principal, means: Array, radii: Array, segments: Arr
 
 
 def _fill(result: Array, chance: Callable[[Rows], tuple[Array, Array]], chosen: Mask, cells: int) -> None:
-    """Compute the chosen rows in chunks that fit the cache."""
+    """Write ``chance(rows)`` to the ``chosen`` columns of ``result`` ``(2, N)``, in chunks that fit the cache."""
     rows = np.flatnonzero(chosen)
     step = max(_CELLS // cells, 1)
     for start in range(0, len(rows), step):
@@ -200,10 +201,10 @@ def _fill(result: Array, chance: Callable[[Rows], tuple[Array, Array]], chosen: 
 
 
 def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, rows: Rows) -> tuple[Array, Array]:
-    """Probabilities in and out of discs about the origin, by ``count`` angles on the edge.
+    """Probabilities of normal deviations in and out of discs about the origin: trapezoidal rule along the edge.
 
     ``axes`` and ``centre`` ``(N, 2)``: radius and mean over standard deviation along both principal axes; where the
-    means are zero (``central``) a quarter of the edge says all.
+    means are zero (``central``) a quarter of the ``count`` angles suffices by symmetry.
     """
     axes, centre = axes[rows], centre[rows]
     angle = (2.0 * np.pi / count) * (np.arange(count // 4 if central else count) + 0.5)
@@ -216,7 +217,10 @@ def _disc_by_edge(axes: Array, centre: Array, count: int, central: bool, rows: R
 
 
 def _edge_sums(axes: Array, centre: Array, circle: Array, central: bool) -> tuple[Array, Array]:
-    """Means of w (1 - exp(-h)) / 2h and of w exp(-h) / 2h over the angles of ``circle`` ``(2, n)``; each ``(N,)``."""
+    """Trapezoidal sums ``(N,)`` of discs' probabilities inside, and outside before `_poles`, along their edges.
+
+    Means of w (1 - exp(-h)) / 2h and of w exp(-h) / 2h, see the module, over the angles of ``circle`` ``(2, n)``.
+    """
     area, count = axes[:, 0] * axes[:, 1], circle.shape[1]
     half, second = np.multiply.outer(axes[:, 0], circle[0]), np.multiply.outer(axes[:, 1], circle[1])
     weight: Array = area[:, None]
@@ -243,7 +247,7 @@ def _edge_sums(axes: Array, centre: Array, circle: Array, central: bool) -> tupl
 
 
 def _poles(axes: Array, centre: Array, count: int) -> Array:
-    """Pole corrections of the trapezoidal sum of ``exp(-h)``: one for each root of ``z1 + i z2`` in ``exp(it)``.
+    """Pole corrections (N,) of the trapezoidal mean of ``w exp(-h) / 2h``, summed over both poles in ``exp(it)``.
 
     Over the ``n`` roots of -1 the mean of ``z / (z - c)`` is ``1 / (1 + c**n)``.
     """
@@ -258,10 +262,10 @@ def _poles(axes: Array, centre: Array, count: int) -> Array:
 
 
 def _segment_by_edge(axes: Array, centre: Array, segment: Array, count: int, rows: Rows) -> tuple[Array, Array]:
-    """Probabilities in and out of discs about the origin, the mean uniform on a segment about ``centre``.
+    """Probabilities in and out of discs, normal with the mean uniform on a segment: trapezoidal rule along the edge.
 
-    Arguments as for `_disc_by_edge`; ``segment`` ``(N, 2)`` is half of it over the standard deviations, not short
-    beside one: then the angles that a centred disc needs are enough. The absolute error is rounding.
+    Arguments as for `_disc_by_edge`; ``segment`` ``(N, 2)`` is the half segment over the standard deviations, longer
+    than one: then the angles that a centred disc needs are enough. The absolute error is rounding.
     """
     axes, centre, segment = axes[rows], centre[rows], segment[rows]
     angle = (2.0 * np.pi / count) * (np.arange(count) + 0.5)
@@ -282,9 +286,10 @@ def _segment_by_edge(axes: Array, centre: Array, segment: Array, count: int, row
 
 @dataclass(frozen=True)
 class _Window:
-    """Window ``z = centre + half sin t`` in standard deviations of ``x``, within ``reach`` and the region's extent.
+    """Integration interval of ``z``, ``x`` from its mean in its standard deviations, with ``z = centre + half sin t``.
 
-    ``gaps``: distances ``(2, N)`` from its ends to the region's, zero where the region ends it.
+    It ends ``reach`` from the mean or at the region's ends. ``gaps``: distances ``(2, N)`` in ``x`` to those ends, zero
+    where the region ends it; ``step``: ``half`` in the unit of ``x``.
     """
 
     centre: Array
@@ -319,10 +324,10 @@ class _Window:
 
 
 def _disc_by_chords(deviations: Array, centre: Array, radii: Array) -> tuple[Array, Array]:
-    """Probabilities in and out of discs about the origin, by 64 chords along the first axis; NaN where too few.
+    """Probabilities of normal deviations in and out of discs about the origin: Gauss-Legendre sum over 64 chords.
 
     ``deviations`` and ``centre`` ``(N, 2)``: standard deviation, the second may be zero, and mean along the principal
-    axes. Absolute errors of rounding, relative ones of ``1 - P`` below 1e-11 where it is told.
+    axes. NaN where chords change by more than `_CHANGE` wide deviations. The absolute error is rounding.
     """
     (wide, narrow), (along, across) = deviations.T, centre.T
     window = _Window.of(across, narrow, radii, _REACH)
@@ -344,7 +349,7 @@ def _disc_by_chords(deviations: Array, centre: Array, radii: Array) -> tuple[Arr
 
 @dataclass(frozen=True)
 class _Frame:
-    """Normal laws in the frames of their chords: ``x`` normal, ``y`` given ``x`` normal about a line.
+    """Bivariate normal laws in axes across (``x``) and along (``y``) the chords: law of x, and that of y given x.
 
     Rows of ``rotation`` are the two axes in the plane; ``spread`` is the standard deviation of ``x``; ``y = slope x``
     on the average, with the deviation ``remainder`` about it.
@@ -377,7 +382,7 @@ class _Disc:
     extent: Array
 
     def chord(self, owner: Rows, below: Array, above: Array) -> tuple[Array, Array]:
-        """Return the ends of chords that far from the lower and the upper end of the region."""
+        """Return both ends in ``y`` of chords at distances ``below`` and ``above`` from the disc's ends in ``x``."""
         high = np.sqrt(below * above)
         return -high, high
 
@@ -402,7 +407,7 @@ class _Rectangle:
         return np.asarray(np.sum(np.abs(self.sides[:, :, 0]) * self.half, axis=1))
 
     def chord(self, owner: Rows, below: Array, above: Array) -> tuple[Array, Array]:
-        """Return the ends of chords, within both strips ``|side . point| <= half``."""
+        """Return both ends in ``y`` of chords at distances ``below``, ``above`` from the rectangle's ends in ``x``."""
         low, high = np.full_like(below, -np.inf), np.full_like(below, np.inf)
         for k in (0, 1):
             across, along = self.sides[owner, k].T[..., None]
@@ -424,9 +429,9 @@ class _Rectangle:
 
 
 def by_chords(principal: Principal, means: Array, sizes: Array, segments: Array, shape: str, outside: bool) -> Array:
-    """Sum chords on panels between the places where their probability may change quickly, halved until they agree.
+    """Probabilities ``(N,)`` in, or ``outside``, regions: adaptive Gauss-Legendre integral of chords' probabilities.
 
-    Arguments as for `planar_probability`.
+    Panels end where a chord's probability may change quickly. Arguments as for `planar_probability`.
     """
     length, half = np.hypot(*segments.T), 0.5 * sizes
     second = principal.direction if shape == "circle" else np.tile([0.0, 1.0], (len(means), 1))

@@ -19,9 +19,9 @@ from thermal_robot.arrays import Array
 
 @dataclass(frozen=True)
 class Parallelotope:
-    """Piece of a zonotope: ``centre + generators @ u`` with ``u`` independent and uniform on [-1, 1].
+    """Distribution of ``centre + generators @ u`` with ``u`` independent and uniform on [-1, 1].
 
-    ``weight``: share of the spread's probability; generators are half edges ``(d, m)``, none zero, longest first.
+    ``weight``: its share in a mixture; generators are half edges ``(d, m)``, none zero, longest first.
     """
 
     weight: float
@@ -31,21 +31,23 @@ class Parallelotope:
 
 @dataclass(frozen=True)
 class UniformSpread:
-    """Uniform distribution of a displacement known by its bounds (section 4 of the paper).
+    """Distribution of a displacement of which only bounds are known (section 4 of the paper): a mixture of pieces.
 
     Use the constructors `segment`, `box` and `zonotope`; the fields are what they have in common.
 
     Parameters
     ----------
     pieces
-        Parallelotopes; the law is their mixture.
+        Linear images of independent uniform variables; their weights sum to one.
     """
 
     pieces: tuple[Parallelotope, ...]
 
     @classmethod
     def segment(cls, end: npt.ArrayLike, start: npt.ArrayLike | None = None) -> UniformSpread:
-        """Uniform on the segment from ``start`` (default ``-end``) to ``end``; one link, or all links warming together.
+        """Uniform distribution on the segment from ``start`` (default ``-end``) to ``end``.
+
+        It is that of one link, or of all links warming together.
 
         Parameters
         ----------
@@ -58,7 +60,7 @@ class UniformSpread:
 
     @classmethod
     def box(cls, half_widths: npt.ArrayLike, axes: npt.ArrayLike | None = None) -> UniformSpread:
-        """Uniform on a box about the origin: independent axes, as the paper's Eqs 19-20 treat them.
+        """Uniform distribution on a box about the origin: independent axes, as the paper's Eqs 19-20 treat them.
 
         Parameters
         ----------
@@ -128,7 +130,7 @@ class UniformSpread:
         return total
 
     def rvs(self, size: int, random_state: int | np.random.Generator | None = None) -> Array:
-        """Draw ``size`` displacements, shape ``(size, d)``."""
+        """Draw ``size`` random displacements, shape ``(size, d)``."""
         generator = np.random.default_rng(random_state)
         which = generator.choice(len(self.pieces), size=size, p=[p.weight for p in self.pieces])
         result = np.empty((size, self.dimension))
@@ -142,7 +144,7 @@ class UniformSpread:
 def generator_bounds(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Validate columns ``(d, k)`` and their bounds, scalars or ``(k,)``; return all as arrays."""
+    """Return generators ``(d, k)`` and bounds ``(k,)``; ``ValueError`` for wrong shapes, infinities, lower > upper."""
     columns = np.asarray(generators, dtype=float)
     if columns.ndim != 2:
         raise ValueError(f"generators must be columns, shape (d, k), not {columns.shape}")
@@ -238,7 +240,7 @@ class Zonotope:
 
     @property
     def centre(self) -> Array:
-        """Point of symmetry, shape ``(d,)``."""
+        """Point of symmetry: the displacement at the middle of all bounds, shape ``(d,)``."""
         return np.asarray(self.generators @ (0.5 * (self.lower + self.upper)))
 
     @property
@@ -340,7 +342,7 @@ def zonotope(generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLi
 def polygon_in_plane(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike, plane: npt.ArrayLike | str
 ) -> Zonotope:
-    """Projection of the displacements on a plane, and its polygon.
+    """Polygon of a zonotope in space projected orthogonally on a plane, in the two coordinates of `plane_axes`.
 
     Parameters
     ----------
@@ -396,7 +398,10 @@ def planes(normals: npt.ArrayLike) -> Array:
 
 
 def _groups(edges: Array) -> list[tuple[Array, Array]]:
-    """Sort edge vectors ``(d, k)`` into directions: a unit vector, and the sign of each edge along it, or zero."""
+    """Group parallel edge vectors ``(d, k)``: for each direction a unit vector ``(d,)`` and the edges' signs ``(k,)``.
+
+    The sign of an edge along another direction, or without length, is zero.
+    """
     found: list[tuple[Array, Array]] = []
     lengths = np.linalg.norm(edges, axis=0)
     for k in np.flatnonzero(lengths > _PARALLEL * np.max(lengths, initial=0.0)):
@@ -414,7 +419,7 @@ def _groups(edges: Array) -> list[tuple[Array, Array]]:
 
 
 def _polygon(columns: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Vertices counter-clockwise: from the lowest, walk along the directions by their angle, out and back."""
+    """Vertices (V, 2) of a planar zonotope, counter-clockwise from the lowest, and the elongations (V, k) there."""
     edges = columns * (high - low)
     groups = []
     for direction, signs in _groups(edges):
@@ -436,7 +441,7 @@ def _polygon(columns: Array, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _directions(edges: Array) -> tuple[Array, int]:
-    """Return the unit vectors ``(n, d)`` of the edges' directions, then those orthogonal to all, and their rank."""
+    """Return unit vectors ``(n, d)`` of the edges' directions, then of their orthogonal complement; and their rank."""
     basis = np.array([direction for direction, _ in _groups(edges)]).reshape(-1, len(edges))
     rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if len(basis) else 0
     return np.concatenate([basis, np.linalg.svd(basis)[2][rank:] if len(basis) else np.eye(len(edges))]), rank
@@ -456,7 +461,10 @@ def _facet_normals(edges: Array) -> Array:
 
 
 def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
-    """Polyhedron by its facet normals: each face is the polygon of its generators, at one end of all the others."""
+    """Zonotope in space by facet normals: a face is the polygon of the generators in its plane, the others at bounds.
+
+    Of rank below three it has no faces: its vertices are those of a polygon, a segment or a point.
+    """
     edges = columns * (high - low)
     basis, rank = _directions(edges)
     if rank < 3:  # no volume: its polygon, segment or point, in its own plane
