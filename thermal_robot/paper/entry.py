@@ -30,7 +30,7 @@ _UNITS = {"µm": -6, "mm": -3, "%": -2}
 
 @dataclass(frozen=True)
 class Printed:
-    """Printed numbers: text, SI values, and one unit of each last digit."""
+    """Numbers as the paper prints them: text, SI values, and the size of each one's last printed digit, SI."""
 
     text: str
     values: tuple[float, ...]
@@ -38,7 +38,10 @@ class Printed:
 
     @classmethod
     def of(cls, text: str, digit: float | None = None) -> Printed:
-        """Parse printed numbers, each part in its own unit; with an exponent in the unit squared."""
+        """Parse numbers and convert to SI: parts between semicolons have a unit each, squared for 1e-n numbers.
+
+        ``digit`` overrides the size of the last digit.
+        """
         values, digits = [], []
         for part in text.replace("−", "-").split(";"):
             exponent = next((power for unit, power in _UNITS.items() if unit in part), 0)
@@ -89,7 +92,7 @@ def rounds_to(printed: Printed, low: ArrayLike, high: ArrayLike) -> bool:
 
 
 def truncates_to(printed: Printed, computed: ArrayLike) -> bool:
-    """Whether every printed number is the computed one truncated."""
+    """Whether every printed number is the computed one with its further digits cut off (rounded towards zero)."""
     exact, values, digits = np.ravel(np.asarray(computed, float)), np.array(printed.values), np.array(printed.digits)
     beyond = np.abs(exact) - np.abs(values)
     return bool(np.all((exact * values >= 0.0) & (beyond >= -_SLACK * digits) & (beyond < digits)))
@@ -116,17 +119,17 @@ def judge(
 
 
 def numbers(values: ArrayLike, decimals: int = 1, *, factor: float = 1.0) -> str:
-    """Format rows of numbers (..., n) separated by a stroke, with a true minus sign."""
+    """Format numbers (n,) or (m, n) times ``factor``: spaces within a row, " / " between rows, a true minus sign."""
     rows = np.atleast_2d(np.asarray(values, dtype=float) * factor)
     said = (" ".join(f"{value:.{decimals}f}" for value in row) for row in rows)
     return " / ".join(said).replace("-", "−")
 
 
 class Words(Formatter):
-    """Formatter of the table's texts: ``{x:2u}`` is two decimals in millionths, ``m`` thousandths, ``c`` %."""
+    """Formatter of the ledger's texts: ``{x:2u}`` has two decimals, times 1e6 (``m``: 1e3, ``c``: 100 for %)."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Format numbers by :func:`numbers`, other values as usual."""
+        """Format by :func:`numbers` where the spec begins with a digit, its decimals; else as Python does."""
         factor = {"u": 1e6, "m": 1e3, "c": 1e2}.get(format_spec[-1:], 1.0)
         if format_spec[:1].isdigit():
             return numbers(value, int(format_spec[0]), factor=factor)

@@ -102,7 +102,7 @@ class PaperInputs:
 
 @lru_cache(maxsize=8)
 def rv_m2_with_hand(l5: float | None = None) -> Robot:
-    """Load the RV-M2 with the tool point ``l5`` metres from the wrist; as its file says by default."""
+    """Load the RV-M2 with the tool point ``l5`` metres from the wrist; by default as far as its robot file says."""
     robot = load_robot("builtin:rv_m2", "tool0")
     if l5 is None:
         return robot

@@ -87,12 +87,12 @@ def _escaped(cell: str) -> str:
 
 @dataclass(frozen=True)
 class Ledger:
-    """The paper's figures beside the computed ones.
+    """Table that compares each printed figure of the paper with the recomputed one.
 
     Parameters
     ----------
     inputs
-        What it was computed from.
+        Inputs of the computed column.
     entries
         The rows, in the order of the paper; slips last.
     """
@@ -162,7 +162,7 @@ def ledger(inputs: PaperInputs | None = None) -> Ledger:
 
 
 class _Reading:
-    """Inputs that record which fields are read."""
+    """Proxy of the inputs that records the names of the fields that are read."""
 
     def __init__(self, inputs: PaperInputs) -> None:
         self._inputs, self._read = inputs, set[str]()
@@ -174,7 +174,7 @@ class _Reading:
 
 
 def compute(row: Mapping[str, Any], inputs: PaperInputs) -> Entry:
-    """Compute one row of the table."""
+    """Compute one row of the ledger: run its equation, judge printed against computed numbers, fill in its texts."""
     reading, figures = _Reading(inputs), rows.printed(row["quantity"])
     equation = getattr(rows, row["equation"]) if "equation" in row else lambda *_: {"values": ()}
     # It has every field of the inputs, which is all that an equation may ask for.

@@ -58,14 +58,14 @@ _AXES = [f"{axis} of row {row}" for row in (1, 2) for axis in "xyz"]
 
 @cache
 def table() -> list[dict[str, Any]]:
-    """Rows of ``ledger.toml``, those with common texts one after the other."""
+    """Rows of ``ledger.toml`` in order; a row with cases (``each``) is expanded to one for each case."""
     rows = tomllib.loads(files("thermal_robot.paper").joinpath("ledger.toml").read_text(encoding="utf-8"))["row"]
     return [row | case | {"quantity": row["quantity"].format(**case)} for row in rows for case in row.get("each", [{}])]
 
 
 @cache
 def printed(quantity: str) -> Printed:
-    """Return the printed numbers of a row."""
+    """Return the paper's printed numbers of the ledger row of that quantity."""
     row = next(row for row in table() if row["quantity"] == quantity)
     return Printed.of(row["printed"], row.get("digit"))
 
@@ -74,14 +74,14 @@ def printed(quantity: str) -> Printed:
 
 
 def theoretical_sigma(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Return the standard deviations of the tool from those of the joints, Eqs 2–4."""
+    """Return the tool's standard deviations x, y, z (2, 3) in both poses, propagated from the joints', Eqs 2–4."""
     covariance = tool_covariance(rv_m2_with_hand(i.l5), joints(*i.poses), (*i.sigma_q, 0.0))
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return {"values": sigma, "sigma": sigma}
 
 
 def sigma_q_behind_table_1(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Joint standard deviations σ_q from the theoretical column of Table 1, Eqs 2–4 inverted."""
+    """Joint standard deviations σ_q, and their feasible ranges, from the theoretical column of Table 1 (Eqs 2–4)."""
     rows = np.reshape(printed("Table 1, theoretical σ").values, (2, 3))
     found = joint_sigmas(rv_m2_with_hand(i.l5), joints(*i.poses), rows, rounding=_HALF)
     low, high, sigma = (values[:4] for values in (found.lower, found.upper, found.sigma))
@@ -112,7 +112,7 @@ def experimental_sigma(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def sampled(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Compare the extremes and the skewness of n errors with their sampling distributions."""
+    """Two-sided p-values of Table 1's minima, maxima or skewness for samples of n normal errors, with intervals."""
     skew = case["extreme"] == "skewness"
     below, ends, said = _skewness(i, figures) if skew else _extreme(i, figures, case["extreme"])
     p = 2.0 * np.minimum(below, 1.0 - below)
@@ -159,7 +159,7 @@ def _skewness(i: PaperInputs, figures: Printed) -> tuple[Array, Array, str]:
 
 @lru_cache(maxsize=8)
 def _skewness_law(n: int, samples: int, seed: int) -> Array:
-    """Simulate the skewness g1 of normal samples; ascending."""
+    """Monte Carlo distribution of the skewness g1 of samples of ``n`` normal numbers: ``samples`` values, ascending."""
     rng = np.random.default_rng(seed)
     sizes = [min(5000, samples - start) for start in range(0, samples, 5000)]
     return np.sort(np.concatenate([stats.skew(rng.standard_normal((size, n)), axis=1) for size in sizes]))
@@ -169,7 +169,7 @@ def _skewness_law(n: int, samples: int, seed: int) -> Array:
 
 
 def calculated(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Table 2's displacement by Eqs 9–11, which need directions, not lengths."""
+    """Tool displacement of a row of Table 2 from the elongations, Eqs 9–11 (link directions, no lengths, enter)."""
     robot = rv_m2_with_hand()
     moved = displacement(robot, joints(i.poses[case["n"] - 1]), i.delta_l)[0]
     # Could the printed Δl be rounded so that all six figures of the table come out rounded, not cut off?
@@ -195,7 +195,7 @@ def calculated(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def u_of_eq_13(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Test statistic U of the mean after stabilisation, Eq 13."""
+    """Two-sided z test (statistic U, Eq 13) of the sample mean after stabilisation against the static displacement."""
     row = case["n"] - 1
     sigma = i.experimental_sigma[row]
     test = mean_shift_test(i.sample_means[row], i.static_displacements[row], sigma, n=i.n, alpha=i.alpha)
@@ -205,7 +205,7 @@ def u_of_eq_13(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def u_before_stabilisation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Missing share of the rise of temperature at which Eq 13 still rejects the final mean."""
+    """Share of the temperature rise that must still be missing for Eq 13's test to reject the final mean, per axis."""
     test = mean_shift_test(np.zeros((2, 3)), i.static_displacements, i.experimental_sigma, n=i.n, alpha=i.alpha)
     share = test.critical / np.abs(test.u)
     rejected = share < 1.0
@@ -223,7 +223,7 @@ def u_before_stabilisation(i: PaperInputs, figures: Printed, case: Case) -> Foun
 
 
 def equation_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Condition and standard errors of five unknowns from four Δx and one Δz, over random poses."""
+    """Condition number of Eq 12 (five elongations from four Δx, one Δz) and standard errors, over random poses."""
     condition, errors, _ = random_systems(i.pose_sets, i.seed)
     noise = i.reading_noise / np.sqrt(i.n)
     best, typical = noise * errors[np.argmin(errors.max(axis=1))], noise * np.median(errors, axis=0)
@@ -241,7 +241,7 @@ def equation_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def strain(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Strain for a kelvin, Δl/(l ΔT), Eq 5."""
+    """Coefficient of thermal expansion Δl/(l ΔT), Eq 5, of links and hand, and a common one of the four links."""
     robot, rise = rv_m2_with_hand(i.l5), i.temperature - i.reference_temperature
     found = expansion_coefficients(robot, i.delta_l, rise)
     common = expansion_coefficient(robot, i.delta_l, rise, segments=segment_names(robot)[:4])
@@ -250,7 +250,7 @@ def strain(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def figure_5(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Farthest point of the polygon in y–z, Eqs 14–15."""
+    """Largest displacement and area of the polygon of thermal displacements in y–z (Fig 5, Eqs 14–15)."""
     q = i.pose_5a if case["figure"] == "5a" else i.poses[0]
     sensitivities, grown = elongation_jacobian(rv_m2_with_hand(), joints(q))[0], np.array(i.delta_l)
     one, two = (polygon_in_plane(sensitivities, low, grown, "yz") for low in (0.0 * grown, -grown))
@@ -266,7 +266,7 @@ def figure_5(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def median_error(values: Array) -> float:
-    """Monte Carlo standard error of a median: order statistics one standard error of rank away."""
+    """Return the standard error of a sample median: half the distance of the quantiles 0.5 ± 0.5/√n."""
     rank = 0.5 * np.sqrt(len(values)) / len(values)
     low, high = np.quantile(values, [0.5 - rank, 0.5 + rank])
     return float(high - low) / 2.0
@@ -274,10 +274,10 @@ def median_error(values: Array) -> float:
 
 @lru_cache(maxsize=4)
 def random_systems(sets: int, seed: int) -> tuple[Array, Array, Array]:
-    """Design matrices of Eq 12 at ``sets`` times five random poses; four Δx and one Δz, or all ten.
+    """Condition numbers and standard errors of Eq 12's design matrix, for ``sets`` times five random poses.
 
-    Conditions ``(sets,)``, standard errors ``(sets, 5)`` of the elongations for a noise of 1, and the conditions of all
-    ten.
+    Condition numbers ``(sets,)`` of four Δx and one Δz, the elongations' standard errors ``(sets, 5)`` from these for a
+    noise of 1, and the condition numbers of five Δx and five Δz.
     """
     robot = rv_m2_with_hand()
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (5 * sets, robot.n))
@@ -314,20 +314,20 @@ def area_of_eq_18(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def variance_of_eq_19(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Variance of the uniform part, Eq 19."""
+    """Variance (2Δy)²/12 of the uniform thermal displacement, Eq 19."""
     variance = _thermal_variance(i)
     shown = {"range": 2.0 * i.delta_y, "deviation": np.sqrt(variance), "mantissa": 1e11 * variance}
     return {"values": variance} | shown
 
 
 def ratio(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Parameter r of Eq 17."""
+    """Ratio r = σ_t/σ_k of the thermal to the kinematic standard deviation in y, Eq 17."""
     r = _ratio(i)
     return {"values": r, "r": r, "thermal": np.sqrt(_thermal_variance(i)), "kinematic": i.experimental_sigma[0][1]}
 
 
 def variance_of_eq_20(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Total variance, Eq 20."""
+    """Total variance σ_k² + σ_t² of the kinematic and the thermal error in y, Eq 20."""
     kinematic = i.experimental_sigma[0][1] ** 2
     total, with_printed = kinematic + _thermal_variance(i), kinematic + printed("Eq 19, σ_t²").values[0]
     shown = {"mantissa": 1e10 * total, "deviation": np.sqrt(total), "from_printed": 1e10 * with_printed}
@@ -335,7 +335,7 @@ def variance_of_eq_20(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def critical_w(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Critical value of Shapiro–Wilk's W, and the level to which the printed one belongs."""
+    """Critical value of Shapiro–Wilk's W at n and α, and the level α to which the printed one belongs."""
     w, one_percent = (shapiro_wilk_critical(i.n, alpha) for alpha in (i.alpha, 0.01))
     level = brentq(lambda alpha: shapiro_wilk_critical(i.n, alpha) - figures.values[0], 1e-12, 1.0 - 1e-12)
     values = {"values": (w, one_percent, level), "compared": w}
@@ -343,7 +343,7 @@ def critical_w(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def not_rejected(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Repeat the paper's own tests of normality, at its r."""
+    """Power of the Shapiro–Wilk test at the paper's r and both of its sample sizes, by simulation."""
     r = _ratio(i)
     small, large = (_power(r, n, i) for n in (i.n, i.n_simulated))
     return {
@@ -357,7 +357,7 @@ def not_rejected(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def normal_enough(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Power of the normality test against the total error at r = 0.5 and 1: the claim of normality for r < 1."""
+    """Power of the Shapiro–Wilk test at r = 0.5 and 1, by simulation: the paper's claim of normality for r < 1."""
     half, one = ([_power(r, n, i) for n in (i.n, i.n_simulated)] for r in (0.5, 1.0))
     holds, holds_at_half = all(map(_mostly_passes, one)), all(map(_mostly_passes, half))
     shares = [[power.rejected for power in powers] for powers in (half, one)]
@@ -391,7 +391,7 @@ def _simulate(r: float, n: int, alpha: float, samples: int, seed: int) -> Power:
 
 
 def _mostly_passes(power: Power) -> bool:
-    """Whether the rejection rate is compatible with at most twice the level of the test."""
+    """Whether the lower confidence bound of the rejection rate is at most twice the level of the test."""
     return power.low <= 2.0 * power.alpha
 
 
@@ -407,18 +407,18 @@ def _simulated(i: PaperInputs) -> str:
 
 
 def capability_at(covariance: Array, clearance: float) -> float:
-    """C_p by Eq 22 over the disc of diameter L and P = 2Φ(3 C_p) − 1."""
+    """Capability C_p with P = 2Φ(3 C_p) − 1, where P (Eq 22) is the probability within the disc of that diameter, m."""
     return float(capability(failing=failing_probability(covariance, clearance)))
 
 
 @lru_cache(maxsize=256)
 def warmed(sigma: tuple[float, float], shift: tuple[float, float], required: float, model: Model) -> tuple[float, ...]:
-    """Capability with a thermal error of ±shift beside standard deviations sigma, both along x and y, m.
+    """Capability lost to a thermal error ±shift added to standard deviations sigma, both along x and y, m.
 
-    Clearance, m, at which the capability without temperature is the required one; capability there with temperature;
-    its loss, and the growth of the clearance that makes up for it, as shares. ``"covariance"``: shift²/3 is added to
-    the variances, the paper's Λη. ``"uniform"``: the axes are uniform and independent, not replaced by normal ones.
-    ``"mean shift"``: the whole shift stands.
+    Returns the clearance, m, that has the required capability without thermal error; the capability there with it; its
+    loss, and the growth of the clearance that makes up for it, as shares. ``"covariance"``: shift²/3 is added to the
+    variances, the paper's Λη. ``"uniform"``: independent uniform errors along both axes. ``"mean shift"``: the whole
+    shift is added to the mean.
     """
     cold = np.diag(np.square(sigma))
     warm = cold + np.diag(np.square(shift)) / 3.0 if model == "covariance" else cold
@@ -430,20 +430,20 @@ def warmed(sigma: tuple[float, float], shift: tuple[float, float], required: flo
 
 
 def capability_at_clearance(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """C_p at the clearance of section 5."""
+    """Capability C_p at the clearance L of section 5, with its range over the rounding of the printed σ."""
     at, low, high = _capabilities(case["n"], i)
     return {"values": (at, low, high), "compared": at, "at": at, "low": low, "high": high}
 
 
 def lower_in_row_2(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Relative difference of the capabilities of rows 2 and 1, at one clearance."""
+    """Share 1 − C_p2/C_p1 by which the capability in row 2 is below that in row 1, at the clearance of section 5."""
     first, second = _capabilities(1, i), _capabilities(2, i)
     at, low, high = (1.0 - second[a] / first[b] for a, b in ((0, 0), (2, 1), (1, 2)))
     return {"values": (at, low, high), "compared": at, "at": at, "low": low, "high": high}
 
 
 def warmed_capability(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """C_p, loss and clearance with a thermal error of ± the measured shift."""
+    """Capability, its loss and the growth of the clearance with a thermal error of ± the sample mean of Table 2."""
     own, other = case["n"], 3 - case["n"]
     sigma, shift = _plane(i.experimental_sigma[own - 1]), _plane(i.sample_means[own - 1])
     covariance, uniform, moved = (
@@ -473,7 +473,7 @@ def warmed_capability(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def loss_from_printed(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Loss computed from the printed capabilities."""
+    """Relative loss of capability from 1.33 to the C_p that is printed for ±3 °C, over its rounding."""
     start, (end,), after = 1.33, Printed.of(case["after"]).values, case["after"]
     half = 0.5 * Printed.of(after).digits[0]
     found, low, high = (1.0 - (end + change) / start for change in (0.0, half, -half))
@@ -489,14 +489,14 @@ def loss_from_printed(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def _capabilities(row: int, i: PaperInputs) -> tuple[float, float, float]:
-    """Capability C_p, and its bounds over the rounding of σ, in which it decreases."""
+    """Capability C_p of a row at the clearance of section 5; lower and upper bound over the rounding of σ."""
     sigma = np.array(_plane(i.experimental_sigma[row - 1]))
     at, high, low = (capability_at(np.diag((sigma + change) ** 2), i.clearance) for change in (0.0, -_HALF, _HALF))
     return at, low, high
 
 
 def _range(row: int, model: Model, i: PaperInputs) -> tuple[Array, Array]:
-    """Bounds of C_p, loss and growth over the rounding of σ and shift."""
+    """Bounds (3,), (3,) of capability, loss and growth of clearance by :func:`warmed`, over rounding of σ and shift."""
     middle = np.array([*_plane(i.experimental_sigma[row - 1]), *_plane(i.sample_means[row - 1])])
     corners = [(middle + change).tolist() for change in product((-_HALF, _HALF), repeat=4)]
     found = [warmed((a, b), (c, d), i.capability, model)[1:] for a, b, c, d in corners]
@@ -512,7 +512,7 @@ def _plane(vector: ArrayLike) -> tuple[float, float]:
 
 
 def q3_of_row_1(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Two values of q3 in one pose: the tool's place, and the calculated displacement of Table 2."""
+    """Effect of the two printed values of q3 in row 1: distance of the tool points, change of the displacement."""
     robot, pose = rv_m2_with_hand(i.l5), i.poses[0]
     q = joints(*((pose[0], pose[1], q3, pose[3]) for q3 in figures.values))
     places, moved = tool_poses(robot, q)[:, :3, 3], displacement(robot, q, i.delta_l)
@@ -523,14 +523,14 @@ def q3_of_row_1(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def law_of_u(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Quantiles of N(0,1), the law of U, printed as N(1,0)."""
+    """Critical value of U under N(0,1), its distribution (printed as N(1,0)), and how many |U| exceed 1."""
     test = mean_shift_test(i.sample_means, i.static_displacements, i.experimental_sigma, n=i.n, alpha=i.alpha)
     beyond = int(np.sum(np.abs(test.u) > 1.0))
     return {"values": (test.critical, beyond, test.u), "right": test.critical, "beyond": beyond}
 
 
 def counts_of_eq_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Median condition of Eq 12 with five and with ten equations, and its rank as printed."""
+    """Median condition number of Eq 12 with five and with ten equations, and the rank of the system as printed."""
     five, _, ten = random_systems(i.pose_sets, i.seed)
     robot = rv_m2_with_hand()
     q = np.random.default_rng(i.seed).uniform(robot.lower, robot.upper, (5, robot.n))
@@ -540,7 +540,7 @@ def counts_of_eq_12(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def kinematic_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Correlation of x and y that the diagonal covariance of Eq 21 neglects."""
+    """Kinematic correlation of x and y, which the diagonal covariance of Eq 21 neglects, and its effect on C_p."""
     covariance = tool_covariance(rv_m2_with_hand(i.l5), joints(*i.poses), (*i.sigma_q, 0.0))
     rho = _correlations(covariance[:, :2, :2])
     change = np.empty(2)
@@ -551,7 +551,7 @@ def kinematic_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found
 
 
 def thermal_correlation(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Correlation of x and y in a thermal shift: the arm grows in its own vertical plane."""
+    """Thermal correlation of x and y, since the arm grows in its own vertical plane, and its effect on C_p."""
     robot, q = rv_m2_with_hand(), joints(*i.poses)
     flat = elongation_jacobian(robot, q)[:, :2]
     rho = _correlations((flat * np.array(i.delta_l) ** 2) @ np.swapaxes(flat, 1, 2) / 3.0)
