@@ -58,7 +58,7 @@ _WARMER = 1.0
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """One parameter of a model, in its own unit; its standard deviation is NaN where unknown."""
+    """Fitted value of one parameter of a model, in its own unit, with the standard deviation (NaN where unknown)."""
 
     effect: str
     parameter: str
@@ -74,7 +74,7 @@ class FittedParameter:
 
 @dataclass(frozen=True, eq=False)
 class Constant:
-    """Part of a model that is the same in all configurations, at one temperature.
+    """Part of a model that displaces the chain equally in all configurations and conditions, at one temperature.
 
     Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): unit response of
     each in the joints, the segments, the base and the tool; zero where it is not constant. ``temperature``, °C of the
@@ -97,10 +97,10 @@ class Constant:
 
 
 def constant(model: CorrectedModel, temperature: float | None = None) -> Constant:
-    """Constant part of a model: an effect at one place is constant as a whole, or not at all.
+    """Constant part of a model: parameters whose response in the chain is the same in all random test rows.
 
-    ``temperature``, °C, is the steady temperature of all links; by default that of the URDF's lengths. Laws of the
-    session or of the row's number count as at the end of the campaign.
+    ``temperature``, °C, is the steady temperature of all links; by default that of the URDF's lengths. An effect at one
+    place is constant as a whole or not at all. Laws of time count long after the campaign, of labels in a new session.
     """
     degrees = float(model.settings.reference_temperature if temperature is None else temperature)
     if not ABSOLUTE_ZERO <= degrees < np.inf:
@@ -128,9 +128,9 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
 
 
 def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, rows: int = ROWS) -> Observations:
-    """Test rows in which everything varies but, where given, a steady temperature.
+    """Random rows in which joints and all conditions vary, except a steady ``temperature`` of the links, if given, °C.
 
-    Joints and conditions are drawn from the measured range, or within the joints' limits where it is unknown.
+    They are drawn uniformly from the measured range, or within the joints' limits where it is unknown.
     """
     robot, rng = model.robot, np.random.default_rng(0)
     ranges = {} if model.spread is None else model.spread.ranges
@@ -190,14 +190,14 @@ def _deviations(model: CorrectedModel) -> Array:
 def determined(
     model: CorrectedModel, min_sigma: float, temperature: float | None = None
 ) -> tuple[CorrectedModel, tuple[FittedParameter, ...]]:
-    """Remove the constants that the data do not determine from a model.
+    """Set a model's insignificant constants to zero, the least significant first (backward elimination).
 
     Parameters
     ----------
     model
         The corrected model; what is not constant in it is kept, whatever is known of it.
     min_sigma
-        A constant is kept if it is so many standard deviations away from zero.
+        A constant is kept if it is so many standard deviations from zero, given those that are already removed.
     temperature
         °C, as for :func:`~thermal_robot.correction.constant.constant`.
 
@@ -255,7 +255,7 @@ def determined(
 
 
 def _known(state: Array, covariance: Array, k: int) -> tuple[Array, Array]:
-    """Conditional mean (K,) and covariance (K, K) of a normal distribution, given that one parameter is zero."""
+    """Conditional mean (K,) and covariance (K, K) of a normal distribution, given that parameter ``k`` is zero."""
     variance, along = covariance[k, k], covariance[:, k]
     share = along / variance if variance > 0.0 else np.zeros(len(along))
     mean, rest = state - share * state[k], covariance - np.outer(share, along)
@@ -274,7 +274,7 @@ TOLD, UNSEEN, NONE = "determined", "not determined", "not in the model"
 def zero_offsets(
     model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None, alone: bool = False
 ) -> pd.DataFrame:
-    """Joint zeros to enter in a controller.
+    """Joint zero offsets of a corrected model, to be added to commands or entered in a controller.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ class Zeros:
 def zeros_in(
     model: CorrectedModel, temperature: float | None = None, min_sigma: float | None = None, alone: bool = False
 ) -> Zeros:
-    """Zeros of a file: those of a model, without its weak parameters, or as they were fitted without anything else."""
+    """Joint zeros for a file: the model's, without insignificant parameters if asked; or those fitted ``alone``."""
     if not alone:
         return joint_zeros(model if min_sigma is None else determined(model, min_sigma, temperature)[0], temperature)
     known = constant(model, temperature)
@@ -354,7 +354,7 @@ def zeros_in(
 
 
 def fitted_alone(model: CorrectedModel, holds: str) -> Array:
-    """Displacement (n + 6 S) of joints and segments of a file that was fitted without the rest of the model."""
+    """Displacement (n + 6 S,) of joints and segments that was fitted without the rest of the model; else an error."""
     for gap in model.files:
         if gap.holds == holds and gap.alone:
             return np.array(gap.alone)
@@ -362,7 +362,7 @@ def fitted_alone(model: CorrectedModel, holds: str) -> Array:
 
 
 def joint_zeros(model: CorrectedModel, temperature: float | None = None) -> Zeros:
-    """Zeros of a model's joints, with those inside its geometry."""
+    """Joint zeros of a model's constant part, with those that its geometric parameters amount to; 0 if undetermined."""
     known = constant(model, temperature)
     used = np.flatnonzero(
         known.responses[:, :-12].any(axis=1) & np.array([t.value != 0.0 for t in known.parameters], dtype=bool)
@@ -395,7 +395,10 @@ def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
 
 
 def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]) -> tuple[Array, list[str]]:
-    """Joint zeros (n, U) per unit of each used parameter, and a status for each zero."""
+    """Express the used parameters as joint zeros, then errors of axes: zeros (n, U) per unit of each, and their status.
+
+    A zero whose effect the unknown base and tool can take up is not determined; SVD and pseudo-inverse of responses.
+    """
     robot, observations = model.robot, rows_of_every_kind(model, rows=_ROWS)
     own = [_acting(robot, known, int(k)) for k in used]
     zeros = [Parameter("zero", "", 1.0, "joint", name, (at_joint(j, 1.0),)) for j, name in enumerate(robot.joint_names)]
@@ -426,7 +429,7 @@ def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
 
 
 def _acting(robot: Robot, known: Constant, k: int) -> Parameter:
-    """Constant restricted to its response in joints and segments."""
+    """Response in joints and segments of constant ``k``, without base and tool, as a parameter."""
     joints, twists = known.responses[k, : robot.n], known.responses[k, robot.n : -12].reshape(-1, 6)
     turned = [at_joint(int(j), joints[j]) for j in np.flatnonzero(joints)]
     placed = [at_segment(int(s), twists[s]) for s in np.flatnonzero(twists.any(axis=1))]

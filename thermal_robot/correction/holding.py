@@ -31,7 +31,7 @@ WORTH = 2.0
 
 
 class Format(NamedTuple):
-    """A robot file: what it is called, what it holds, and what it cannot beside all that changes with the pose."""
+    """Kind of robot file: its name, what it holds, and what constant errors it cannot hold."""
 
     title: str
     holds: str
@@ -53,9 +53,9 @@ FORMATS = {
 
 @dataclass(frozen=True, eq=False)
 class Applied:
-    """What a file applies of P parameters: d = ``matrix`` (n + 6 S, P) θ, in whole multiples of ``step`` unless 0.
+    """Linear map of P fitted parameters θ to the displacement in a file: d = ``matrix`` (n + 6 S, P) θ.
 
-    ``left`` (P,) are those left out as too near to zero.
+    It is rounded to multiples of ``step`` unless 0. ``left`` (P,): parameters left out as insignificant.
     """
 
     matrix: Array
@@ -69,9 +69,9 @@ class Applied:
 
 
 def applied(model: CorrectedModel, min_sigma: float | None = None) -> dict[str, Applied]:
-    """Return what a file of placements, zeros or ticks applies of a model, at the temperature of its lengths.
+    """Linear map from a model's parameters to the displacement in a file, for placements, zeros and ticks each.
 
-    Empty where the model has no constant part then.
+    At the temperature of the URDF's lengths; empty where the model has no constant part then.
     """
     kept, gone = (model, ()) if min_sigma is None else determined(model, min_sigma)
     known = constant(kept)
@@ -94,7 +94,7 @@ def applied(model: CorrectedModel, min_sigma: float | None = None) -> dict[str, 
 
 
 def expectation(gaps: Sequence[FileGap], name: str, min_sigma: float | None, alone: bool = False) -> list[str]:
-    """Sentences on how far a file alone shrinks the gap on rows held out; empty where nothing is known of it."""
+    """Sentences on the rms error of held-out rows before and after a file is applied; empty where it is unknown."""
     of_kind = {(gap.min_sigma, bool(gap.alone)): gap for gap in gaps if gap.holds == FORMATS[name].holds}
     asked = (None, True) if alone else (min_sigma, False)
     own = of_kind.pop(asked, None)

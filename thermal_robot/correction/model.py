@@ -64,17 +64,17 @@ lies at a singular pose, or is another posture, whose way there nobody has looke
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Corrected commands, and the residual that they leave.
+    """Corrected joint commands, with the uncertainty and the error of direction that remain.
 
     Attributes
     ----------
     q
         (N, n) rad or m, in the chain's order, within the joints' limits.
     std
-        (N, 3) one standard deviation per axis of where the target will be, measurement frame, m; NaN where the model
-        does not tell.
+        (N, 3) one standard deviation per axis of where the target will be, measurement frame, m; NaN for a model
+        without :attr:`CorrectedModel.spread`.
     outside
-        Per row: the joints and columns in which it leaves what was measured.
+        Per row: names of the joints and columns whose values are outside the measured range.
     direction
         (N,) rad by which the direction of the target is missed: 0 but for rounding, unless the arm has fewer than six
         joints, or stands at a singular pose or at a limit.
@@ -116,7 +116,7 @@ def _nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
 
 
 def _require_within_limits(samples: Campaign, q: Array) -> None:
-    """Refuse rows whose commands (N, n) are beyond a joint limit, which no correction brings back."""
+    """Raise ``CampaignError`` for the first row whose solved commands (N, n) lie beyond a joint limit."""
     robot = samples.robot
     wrong = np.argwhere(np.maximum(robot.lower - q, q - robot.upper) > ROUNDED)
     if len(wrong):
@@ -219,10 +219,10 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If a column that the model needs is missing or has an empty cell, which the error names; if what it says
-            is so large that no finite position follows.
+            If a column that the model needs is missing or has an empty cell, which the error names; if a value is so
+            large that no finite position follows.
         EffectError
-            If an effect of the model cannot be told in these rows.
+            If an effect of the model cannot be evaluated in these rows.
 
         Examples
         --------
@@ -273,7 +273,7 @@ class CorrectedModel:
         return with_prediction(samples, self.robot, *prediction, self.settings.units)
 
     def prediction(self, samples: Campaign | str | Path | pd.DataFrame, *, noise: bool = False) -> Prediction:
-        """Predict the measurement with its standard deviation.
+        """Predict measured positions (and orientations) with standard deviations, as arrays in SI.
 
         Parameters
         ----------
@@ -315,7 +315,7 @@ class CorrectedModel:
         poses: Campaign | str | Path | pd.DataFrame | ArrayLike,
         conditions: Mapping[str, ArrayLike] | None = None,
     ) -> Commands:
-        """Commands that bring the real target to nominal poses.
+        """Joint positions at which the corrected model brings the target to the nominal poses (inverse kinematics).
 
         Parameters
         ----------
@@ -378,7 +378,7 @@ class CorrectedModel:
         return with_commands(samples, self.robot, q, std, outside, missed, self.settings.units)
 
     def _commands(self, samples: Campaign) -> Commands:
-        """Solve for the commands; joint limits and unreachable poses are errors with the row."""
+        """Solve the inverse kinematics of the displaced robot; ``CampaignError`` for limits and unreachable poses."""
         robot, frames, effects = samples.robot, self.frames, self.effects
         farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
         # a row beyond a limit is solved as it stands; the correction may bring it back
@@ -424,7 +424,7 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If an array does not fit, or a value is none; if nothing knows a condition's name.
+            If an array does not fit or is not one of numbers; if the name of a condition is unknown.
 
         Examples
         --------
@@ -450,7 +450,7 @@ class CorrectedModel:
         return Campaign(name=_NAME, robot=self.robot, q=rows, covariates=given, **self.settings.of_rows())
 
     def _ready(self, samples: Any) -> Campaign:
-        """Return the samples with only the columns that the model reads."""
+        """Read samples, require the columns that the model needs, and drop those that it does not read."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
         rows: Campaign = read_alike(samples, self.robot, self.settings.turned)
@@ -504,7 +504,7 @@ class CorrectedModel:
         return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
 
     def follows_rows(self, samples: Campaign) -> bool:
-        """Whether a law follows the order of the campaign's rows, and samples without ``order`` come after them.
+        """Whether a discovered law depends on ``order``, which the samples lack: they count as after the campaign.
 
         Examples
         --------
@@ -533,7 +533,7 @@ class CorrectedModel:
         return replace(samples, name=table.file) if isinstance(table, Table) else samples
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, the URDF's text and a checksum included.
+        """Return the model as plain values for JSON, with the URDF's text and a checksum.
 
         Examples
         --------
@@ -546,7 +546,7 @@ class CorrectedModel:
     def from_dict(
         cls, plain: dict[str, Any], effects: Sequence[Effect] = (), *, file: str = "<model>"
     ) -> CorrectedModel:
-        """Model from the output of :meth:`to_dict`; ``effects`` are your own effects that it may hold.
+        """Build a model from the output of :meth:`to_dict`; ``effects`` are your own effects that it may hold.
 
         Raises
         ------

@@ -39,7 +39,7 @@ def mujoco_or_error() -> Any:
 
 
 def compiled(mjcf: str | Path) -> tuple[str, Any, Path | None]:
-    """Name of an MJCF, given by its path or as its text, its ``mujoco.MjModel``, and its file if it has one."""
+    """Compile an MJCF, a path or a text: its name for messages, its ``mujoco.MjModel``, and its path or ``None``."""
     mujoco = mujoco_or_error()
     path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
     name, model = str(path or "the MJCF"), mujoco.MjModel
@@ -109,7 +109,7 @@ def digits(values: Any) -> str:
 
 
 def moved(model: Any, data: Any, positions: Mapping[str, float]) -> None:
-    """Set joints of a ``mujoco.MjData`` to positions (rad or m) by name; the others stay."""
+    """Set joints of a ``mujoco.MjData`` to positions (rad or m) by name and update its kinematics; the others stay."""
     for name, position in positions.items():
         data.qpos[model.joint(name).qposadr[0]] = position
     mujoco_or_error().mj_kinematics(model, data)
@@ -142,7 +142,7 @@ _BEYOND = (
 
 
 def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
-    """MJCF of the calibrated robot.
+    """Write the calibrated robot as MJCF.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Patched:
-    """User's MJCF model to be calibrated beside the robot, both with all joints at zero.
+    """User's MJCF model and the calibrated robot to be written into it, both with all joints at zero.
 
     ``root`` is the root element of its ``text``; ``base`` (4, 4) the pose of the robot's root frame in its world.
     """
@@ -211,7 +211,7 @@ class _Patched:
         return cls(robot, name, text, tree(text), model, data, np.eye(4) if base is None else pose_of(data.body(base)))
 
     def place(self) -> None:
-        """Set the poses of joint bodies and tool frame, and add the target."""
+        """Write the calibrated poses of the joints' bodies and the tool frame to the XML, and the target as a site."""
         chain, placed = self.robot.robot.chain, self.robot.placements
         nominal = chain.placements
         at, before, after, last = self.base, np.eye(4), np.eye(4), 0
@@ -241,7 +241,7 @@ class _Patched:
         self._set_target(last, np.linalg.inv(pose_of(self.data.body(last))) @ stands @ change @ target)
 
     def _carrier(self, joint: str, at: Array, k: int) -> int:
-        """Body of a joint, after a check that its axis is that of the robot."""
+        """Index of a joint's body; ``CampaignError`` if its axis is over 20 mm or 0.05 rad away from the URDF's."""
         number = int(known(self.model, "joint", joint) or 0)
         chain, there = self.robot.robot.chain, self.data.joint(number)
         axis = at[:3, :3] @ chain.axes[k]
@@ -266,7 +266,7 @@ class _Patched:
         _set_pose(self._tag(joint, body), inside @ change @ np.linalg.inv(inside) @ own)
 
     def _tag(self, joint: str, body: int) -> Any:
-        """XML element of a body, by its name or by the joint in it."""
+        """XML element of a body, by its name or by the joint in it; ``CampaignError`` where the text has none."""
         name = self.model.body(body).name
         found = self.root.xpath(
             "(//worldbody//joint[$joint and @name=$joint]/.. | //body[$name and @name=$name])"
@@ -284,7 +284,7 @@ class _Patched:
         return found[0]
 
     def _set_target(self, body: int, pose: Array) -> None:
-        """Add the target as a site of the last joint's body."""
+        """Add the target as a site to the last joint's body, or move it there; ``CampaignError`` if it is elsewhere."""
         joint, tool = _moving(self.robot.robot)[-1], target_link(self.robot.robot.tool_frame)
         carrier = self._tag(joint, body)
         for site in self.root.xpath("(//site[@name=$tool])[1]", tool=tool):
@@ -299,7 +299,10 @@ class _Patched:
 
 
 def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
-    """Pose change (4, 4), X = C⁻¹ R⁻¹ R' C, of a body held by a joint's frame, in its own frame, as R becomes R'."""
+    """Change (4, 4) of a body's pose, in the body's frame, as its joint's frame moves from ``before`` to ``after``.
+
+    X = C⁻¹ before⁻¹ after C, where C = at⁻¹ held is the body's pose in the joint's frame.
+    """
     if np.array_equal(before, after):
         return np.eye(4)
     behind = np.linalg.inv(at) @ held
@@ -320,7 +323,7 @@ def _moving(robot: Robot) -> list[str]:
 
 
 def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
-    """Name of an MJCF, its ``mujoco.MjModel`` and its file; it must have the robot's joints."""
+    """Compile an MJCF (see :func:`compiled`); ``CampaignError`` if a moving joint of the robot's chain is missing."""
     name, model, path = compiled(mjcf)
     for joint in _moving(robot):
         if known(model, "joint", joint) is None:
@@ -330,7 +333,7 @@ def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
 
 
 def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
-    """Campaign with a MuJoCo model's prediction of the target as ``sim.*`` columns.
+    """Add a MuJoCo model's prediction of the target's pose to a campaign, as ``sim.*`` columns.
 
     The model's joints are put where they were commanded, and those that mimic another where that one takes them; no
     motor and no gravity is at work. A diagnosis then compares the robot with this simulator, not with the URDF, and

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """Robot with the constant part of a corrected model, at one temperature.
+    """Nominal robot displaced by the constant part of a corrected model, at one temperature.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ def calibrated(
     min_sigma: float | None = None,
     alone: bool = False,
 ) -> Calibrated:
-    """Calibrated robot of a corrected model.
+    """Apply the constant part of a corrected model to the nominal robot.
 
     Parameters
     ----------
@@ -183,8 +183,8 @@ def calibrated(
     Raises
     ------
     CampaignError
-        If the temperature is none, or one is given and the model does not tell how the robot grows; or if it does not
-        say what is determined.
+        If the temperature is impossible, or one is given and the model does not tell how the robot grows; or if
+        ``min_sigma`` is given and the model has no standard deviations.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def calibrated(
 
 
 def _beyond(model: CorrectedModel, temperature: float) -> str:
-    """Warning where a temperature is outside the measured range."""
+    """Warning where a temperature is outside the measured range by more than a margin; else empty."""
     ranges = {} if model.spread is None else model.spread.ranges
     known = [ends for column, ends in ranges.items() if split_name(column)[0] in PER_LINK]
     low, high = min((low for low, _ in known), default=-np.inf), max((high for _, high in known), default=np.inf)
@@ -243,7 +243,7 @@ def target_link(tool_frame: str) -> str:
 
 
 def calibrated_urdf(robot: Calibrated) -> str:
-    """URDF of the calibrated robot.
+    """Write the calibrated robot as URDF.
 
     Zeros and placements are put into the origins of the joints between root and tool frame, by which all that follows
     moves with them. The measured target becomes a link of its own, ``<tool_frame>_target``, where it is not the tool
@@ -296,7 +296,7 @@ def ur_kinematics(robot: Calibrated) -> str:
     Raises
     ------
     CampaignError
-        A robot of others, or of other frames.
+        If the robot is not one of Universal Robots with the frames of ur_description.
 
     Examples
     --------
@@ -497,7 +497,7 @@ def _turned(axis: int, angle: float) -> Array:
 
 
 def _first(point: Array, axis: Array) -> Array:
-    """Frame (4, 4) on the first axis, z along it, at the point nearest to the root frame's origin."""
+    """Frame (4, 4) of the first axis: z along it, origin nearest to the root's, x by projection of a root axis."""
     along = np.eye(3)[0] if abs(axis[0]) < 1.0 - NEARLY_PARALLEL else np.eye(3)[1]
     x = along - (along @ axis) * axis
     x /= np.linalg.norm(x)
@@ -505,7 +505,10 @@ def _first(point: Array, axis: Array) -> Array:
 
 
 def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
-    """Parameters (5,) θ, d, a, α, β from a frame on one axis to the next axis, a point and a direction."""
+    """Denavit-Hartenberg (nearly parallel: Hayati) parameters (5,) θ, d, a, α, β from a frame to the next axis.
+
+    ``line``: a point of that axis and its direction.
+    """
     origin = frame[:3, :3].T @ (line[0] - frame[:3, 3])
     axis = frame[:3, :3].T @ line[1]
     across = float(np.hypot(axis[0], axis[1]))
@@ -530,7 +533,7 @@ def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
 
 
 def _last(frame: Array, end: Array) -> Array:
-    """Parameters (5,), θ and d, of the last joint, to the foot of the target with the target's x direction."""
+    """Parameters (5,) of the last joint: d to the target's foot on the axis, θ to its x direction; the others zero."""
     seen = np.linalg.inv(frame) @ end
     across = seen[:2, 0] if np.linalg.norm(seen[:2, 0]) > NEARLY_PARALLEL else seen[:2, 1]
     return np.array([float(np.arctan2(across[1], across[0])), seen[2, 3], 0.0, 0.0, 0.0])

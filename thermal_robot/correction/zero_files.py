@@ -175,7 +175,7 @@ def _mapping(own: str | Path | None, value: Any, key: str = "") -> dict[str, Any
 
 
 def _section(own: str | Path | None, held: dict[str, Any], key: str) -> dict[str, Any]:
-    """Section of a file, added where it is not there."""
+    """Return the section ``key`` of a file, added empty where it is missing; ``CampaignError`` if it is no mapping."""
     return _mapping(own, held.setdefault(key, {}), key)
 
 
