@@ -73,7 +73,7 @@ def tidy(axes: Axes, grid: Literal["x", "y", "both", ""] = "y") -> None:
 
 
 def panels(count: int, across: int, width: float, above: float, each: float, **shared: Any) -> tuple[Drawing, Any]:
-    """Return a figure and its panels, so many beside each other; places that are left over stay empty.
+    """Return a figure with ``count`` panels, ``across`` of them beside each other; places left over stay empty.
 
     ``width``, the height ``above`` the panels and that of ``each`` line of them are in inches.
     """
@@ -92,7 +92,7 @@ def key_below(figure: Figure, axes: Axes, columns: int = 2, **look: Any) -> Lege
 
 
 def title(axes: Axes, text: str, size: float = LARGE, pad: float = 10.0) -> None:
-    """Write the heading of a panel, so many points high and above it."""
+    """Write the heading of a panel, with letters of ``size`` points, ``pad`` points above it."""
     axes.set_title(plain(text), loc="left", fontsize=size, color=INK, fontweight="bold", pad=pad)
 
 

@@ -52,14 +52,14 @@ def _wordings(d: MotionDiagnosis) -> Iterator[str]:
 
 
 def _model(d: MotionDiagnosis) -> str:
-    """Return the reference of the joints, without its article."""
+    """Name what the joints are compared with: command, simulated servos, or torques of their masses."""
     if d.unit == "N·m":
         return "torques of their masses"
     return "simulated servos" if d.stated else "command"
 
 
 def _causes(d: MotionDiagnosis, named: Sequence[Finding], places: bool, rivals: bool, count: int) -> str:
-    """Name some of so many causes, each with its joint and what the data cannot tell it from, and count the others."""
+    """Join the names of causes, with main joint (``places``) and confounded ``rivals``; tell how many more there are."""
     told = [(d.title(f.name, main_joint(f) if places else ""), [*map(d.title, f.confounded_with)]) for f in named]
     return words.causes_in_words(told, rivals, count - len(named))
 
@@ -110,7 +110,7 @@ def details(d: MotionDiagnosis) -> Iterator[str]:
 
 
 def always(d: MotionDiagnosis) -> Iterator[str]:
-    """Yield what no log of this kind can tell apart, of the effects that were found."""
+    """Yield a sentence for each found effect that no log of this kind can tell from another cause."""
     named = {one.name for one in d.shown}
     torque = any(motion.torque is not None for motion in d.log.motions)
     if "lag" in named and not torque:
@@ -139,7 +139,7 @@ def refused(d: MotionDiagnosis) -> list[str]:
 
 
 def sentences(d: MotionDiagnosis) -> Iterator[str]:
-    """Say in plain words what the explanation leaves."""
+    """Yield sentences on the remainder of the gap that the effects do not explain."""
     left = d.unexplained
     if not left.flagged:
         yield "What remains follows neither position, velocity, load nor time in motions held out."
@@ -284,7 +284,7 @@ def gaps(d: MotionDiagnosis) -> tuple[tuple[str, ...], list[list[str]]]:
 
 
 def motion_text(diagnosis: MotionDiagnosis) -> str:
-    """Write a diagnosis of motion for the person who recorded the log.
+    """Write a diagnosis of motion as plain text.
 
     Parameters
     ----------

@@ -54,14 +54,14 @@ def render(
     files: Mapping[str, str] | None = None,
     script: str = "",
 ) -> str:
-    """Render a template of this room with a strict Content-Security-Policy.
+    """Render a Jinja2 template as an HTML page, or a piece for a notebook, with a strict Content-Security-Policy.
 
     Parameters
     ----------
     template
         Name of a file that extends ``base.html``.
     shown
-        What it names.
+        Variables of the template by name.
     title
         For the browser's bar; a piece for a notebook, not a page, where empty.
     generated
@@ -117,7 +117,7 @@ def _with_styled_cells(piece: str) -> str:
 
 
 def signature(generated: str | None) -> str:
-    """Footer of a page: program, libraries, time."""
+    """Text of a page's footer: versions of the program and its libraries, and when it was made, if given."""
     made_by = []
     for package in ("thermal-robot", "pin", "numpy", "scipy"):
         try:
@@ -131,7 +131,7 @@ _PIXELS = 106.0  # per inch at most, so that letters are equally large in all fi
 
 
 def svg(figure: Figure, label: str) -> Markup:
-    """Inline SVG (Scalable Vector Graphics) of a figure, reproducible.
+    """Convert a Matplotlib figure to inline SVG (Scalable Vector Graphics), byte for byte reproducible.
 
     Its colours are those of the page, and its identifiers clash with no other figure's. ``label`` says what it shows,
     for those who cannot see it. Where panels stand beside each other, views of the same drawing follow, a column each,
@@ -164,7 +164,7 @@ _EDGE = 0.04  # inches about what a view shows
 
 
 def _columns(figure: Figure) -> list[tuple[float, float, float, float]]:
-    """Left, top, width and height, points, of each column of panels and of what stands beyond; none of a single one."""
+    """Left, top, width and height (points) of title, columns of panels, legends; empty with fewer than two columns."""
     beside: dict[int, list[Any]] = {}
     for axes in figure.axes:
         place = axes.get_subplotspec()
@@ -248,9 +248,9 @@ _DECIMALS = 4  # of m: a tenth of a millimetre is less than a pixel
 
 
 def arm_drawing(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Return data of the page's three-dimensional drawing: links, joints, their shares, and the postures of the rows.
+    """Return data of the page's three-dimensional drawing: links, joints, their shares of the gap, poses of the rows.
 
-    ``None`` where nothing is known of places, or no two places with a gap are left.
+    ``None`` where the shares of places are unknown, or no rows with a gap at different positions are left.
     """
     shown = plots.mapped(diagnosis)
     factor = plots.exaggeration(diagnosis, shown, _LONGEST)
@@ -359,6 +359,6 @@ def wear_fragment(wear: Wear) -> str:
 
 
 def _firm(sentence: str) -> str:
-    """Keep values with their deviations and units, and dates, on one line."""
+    """Bind values to their deviations and units, and the parts of dates, by non-breaking characters."""
     whole = re.sub(r" ± ", f"{words.NO_BREAK}±{words.NO_BREAK}", words.bound(sentence))
     return re.sub(r"(?<=\d)-(?=\d)", "-\u2060", whole)

@@ -13,7 +13,9 @@ _ON_PAPER = ".tr-arm { display: none; }"  # what a script would draw
 
 
 def write_page(path: str | Path, page: str, target: str | Path | None = None) -> None:
-    """Write a page that :func:`~thermal_robot.report.page.render` made, as PDF where the ``target`` is one by its name.
+    """Write an HTML page that :func:`~thermal_robot.report.page.render` made; as PDF where ``target`` ends in .pdf.
+
+    The ``target`` is the ``path`` itself where absent.
 
     Raises
     ------

@@ -21,7 +21,7 @@ _NAME = 26
 
 
 def text(diagnosis: Diagnosis) -> str:
-    """Plain text of a diagnosis.
+    """Write a diagnosis as plain text.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def by_heading(effects: Sequence[Finding], told: Callable[[Finding, str], Iterable[str]]) -> Iterator[str]:
-    """Yield what is told of each effect of a status, below its heading."""
+    """Yield lines on the effects, grouped by displayed status below headings; ``told`` gives those of one effect."""
     for status, heading in words.STATUS.items():
         group = [one for one in effects if words.displayed_status(one) == status]
         if group:
@@ -149,7 +149,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: int = 7) -> Iterator[str]:
-    """Bar chart of shares in characters, full at one; nothing for what is not above zero."""
+    """Bar chart of shares in characters: the ``most`` largest from 0.5 % on, or unsorted without that bound."""
     if not shares:
         return
     ordered = sorted(shares.items(), key=lambda item: -item[1]) if ranked else list(shares.items())
@@ -258,7 +258,7 @@ _SHOWN = 6
 
 
 def crash_headline(crash: Crash) -> str:
-    """One sentence: what moved."""
+    """Say in one sentence what a crash moved: the zero of a joint, a link, both or nothing; or why it is not told."""
     named = crash.named
     if crash.misfit is not None:
         return f"Not the crash: {next(iter(words.misfit_sentences(crash.misfit, crash.reach)))}"
@@ -277,7 +277,7 @@ def crash_headline(crash: Crash) -> str:
 
 
 def crash_text(crash: Crash) -> str:
-    """Plain text of the result: what moved, the probability of each candidate, what cannot be told, what to do."""
+    """Plain text on a crash: what moved, the probability of each candidate, what cannot be told, what to do."""
     return "\n".join([wrap(crash_headline(crash), ""), *_of_crash(crash)])
 
 
@@ -310,7 +310,7 @@ _ADVICE = {
 
 
 def _first(one: Moved) -> str:
-    """Largest move of a candidate, with one standard deviation."""
+    """Largest move of a candidate beyond two standard deviations, with one; a shift goes before a turn."""
     known = [k for k, (value, std) in enumerate(zip(one.values, one.stds, strict=True)) if abs(value) >= 2.0 * std]
     # of a link its shift says most; a turn where it only turned
     k = max(known or [0], key=lambda k: (one.units[k] == "m", abs(one.values[k])))

@@ -61,7 +61,7 @@ _ROOM = 1.08  # beside the outermost bins, as a factor
 
 
 def plot_how_far(diagnosis: Diagnosis) -> Figure:
-    """Draw histograms of the distance |gap|: before, after, and after while the row was held out.
+    """Draw histograms of the distance measured to predicted: before and after correction, and after on held-out rows.
 
     Returns
     -------
@@ -143,7 +143,7 @@ _FURTHEST_BELOW_ZERO, _FURTHEST = -0.25, 1.5
 
 
 def plot_which(diagnosis: Diagnosis) -> Figure:
-    """Draw the held-out share of every candidate with its 95 % interval, and its probability.
+    """Draw the share of the gap's mean square that each effect explains on held-out rows (95 %), and its probability.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
 
 
 def _draw_which(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw the candidates into a panel."""
+    """Draw the shares with 95 % intervals, and the probabilities, of all candidate effects into a panel."""
     ordered = by_status(diagnosis)
     if not ordered:
         note(axes, "No effect was tried.")
@@ -201,7 +201,7 @@ _BETWEEN = 0.6  # lines
 
 
 def plot_where(diagnosis: Diagnosis) -> Figure:
-    """Draw the shares of the gap's mean square: places of the arm and beyond it, axes, quantities."""
+    """Draw the shares of the gap's mean square by joint, link and place beyond, by axis, and by recorded quantity."""
     chain, other = _chain(diagnosis), _other(diagnosis)
     right = _lines(other)
     left = _lines(chain) if _placed(chain) else min(right, 4.0)
@@ -326,7 +326,7 @@ def _arrows(diagnosis: Diagnosis, plane: tuple[int, int]) -> tuple[Array, Array,
 
 
 def _extent(start: Array, before: Array, after: Array) -> tuple[Array, Array, float]:
-    """Centre and size, (2,) m each with a margin, of the arrows, in the aspect ratio of a panel."""
+    """Centre (2,) and size (2,) of the box about all arrows, m, with a margin, and the panel's width to height."""
     ends = np.vstack([start, start + before, start + after])
     low, high = ends.min(axis=0), ends.max(axis=0)
     size = 1.06 * np.maximum(high - low, 1e-6)
@@ -375,7 +375,7 @@ def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
 
 
 def mapped(diagnosis: Diagnosis) -> NDArray[np.int64]:
-    """Mask of the diagnosis' rows that can be mapped: not set aside, and with a position."""
+    """Return the indices of the diagnosis' rows that can be mapped: not set aside, with a finite position."""
     rows = diagnosis.rows
     return np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
 
@@ -406,7 +406,7 @@ _WITHOUT_UNIT = {"speed": "share of the maximum", "approach": "−1, 0, 1", "ord
 
 
 def plot_remainder(diagnosis: Diagnosis) -> Figure:
-    """Draw the residual's x, y and z in the root frame.
+    """Draw the x, y and z of the residual after correction, in the root frame.
 
     Returns
     -------
@@ -529,7 +529,7 @@ def explain_figure(explained: Explained) -> Figure:
 
 
 def _seen(place: Place) -> NDArray[np.bool_]:
-    """Mask (n,) of rows whose noise does not hide the error."""
+    """Mask (n,) of rows whose error at the place has at most five times the median standard deviation."""
     return np.asarray(place.spread <= _UNSEEN * np.median(place.spread))
 
 
@@ -696,7 +696,7 @@ def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
 
 
 def _as_told(times: Array, worn: Worn) -> tuple[Array, Array]:
-    """Return times and values of the line; a jump stands upright between the campaigns beside it."""
+    """Return times and fitted values of a parameter's line; a jump stands upright midway between two campaigns."""
     fitted, jump = np.array(worn.fitted), worn.jump
     if jump is None:
         return times, fitted
@@ -783,7 +783,7 @@ def _draw_motion(above: Axes, below: Axes, d: MotionDiagnosis, joint: str) -> No
 
 
 def _window(one: pd.DataFrame) -> pd.DataFrame:
-    """Return the stretch of a long motion in which the gap is largest, by its mean square."""
+    """Return the twelve seconds of a longer motion in which the sum of the squared gap is largest."""
     time, square = np.asarray(one["time"]), np.asarray(one["measured"] - one["nominal"]) ** 2
     if time[-1] - time[0] <= _WINDOW:
         return one
@@ -800,7 +800,7 @@ def _label(d: MotionDiagnosis, motion: int) -> str:
 
 
 def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
-    """Draw the gap of each joint before and after against its velocity, its load and its position, with the middles."""
+    """Draw each joint's gap before and after against velocity, load and position, with medians in bins."""
     figure, drawn = panels(3 * len(diagnosis.joints), 3, BROAD, 0.8, 2.35, sharey="row")
     for line, joint in zip(drawn.reshape(-1, 3), diagnosis.joints, strict=True):
         curves = diagnosis.curves[joint]
@@ -825,7 +825,7 @@ def plot_gap_against(diagnosis: MotionDiagnosis) -> Figure:
 
 
 def velocity(curves: pd.DataFrame, of: str = "command") -> Array:
-    """Return the velocity (N,) of one of the curves, motion by motion, SI."""
+    """Differentiate one of the curves by time, motion by motion, by finite differences: velocity (N,), SI."""
     found = np.zeros(len(curves))
     number, time, values = (np.asarray(curves[name]) for name in ("motion", "time", of))
     for motion in np.unique(number):
@@ -855,7 +855,7 @@ def _draw_against(axes: Axes, along: Array, gaps: list[Array]) -> None:
 
 
 def _middles(along: Array, gap: Array) -> list[Array]:
-    """Medians of a quantity and of a gap in levels of the quantity that are equally wide."""
+    """Medians of a quantity and of a gap in sixteen equally wide bins of the quantity that hold five readings."""
     low, high = np.quantile(along, _RANGE)
     edges = np.linspace(low, high, _CLASSES + 1)
     level = np.digitize(along, edges)
@@ -900,7 +900,7 @@ def _draw_loop(axes: Axes, d: MotionDiagnosis, joint: str) -> None:
 
 
 def plot_shares(diagnosis: MotionDiagnosis) -> Figure:
-    """Draw the gap of each joint before, and in motions held out, as bars, with the noise of its reading."""
+    """Draw the rms gap of each joint before, and after in held-out motions, as bars, with the noise of a reading."""
     joints = list(diagnosis.joints)
     figure = Drawing(NARROW, 1.4 + 0.62 * len(joints))
     axes = figure.subplots()

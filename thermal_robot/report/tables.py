@@ -114,7 +114,7 @@ def motion_gaps(diagnosis: MotionDiagnosis) -> Table:
 
 
 def extremes(diagnosis: Diagnosis) -> Table:
-    """Rms, 95 % quantile and maximum of the distance, and rms along each axis, before and after.
+    """Table of the distance measured to predicted, before and after: rms, 95 % quantile, maximum, rms along each axis.
 
     Rows set aside are left out. Of rows held out a diagnosis has distances alone.
     """
@@ -145,7 +145,7 @@ def _sizes(distance: Array) -> tuple[float, ...]:
 
 
 def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
-    """Distances of the outliers, before and after, and the number of those not listed."""
+    """Table of the outliers' distances before and after correction, and the number of those that it does not list."""
     rows = diagnosis.rows
     chosen = np.isin(rows.rows, diagnosis.outliers)
     before, after = (np.linalg.norm(part[chosen, :3], axis=1) for part in (rows.gap, rows.remainder))
@@ -190,7 +190,7 @@ def files(diagnosis: Diagnosis) -> Table:
 
 
 def frames(diagnosis: Diagnosis) -> Table:
-    """Poses of base and target: mm, and roll, pitch and yaw in degrees."""
+    """Table of the fitted poses of base and target: mm, and roll, pitch and yaw in degrees."""
     rows = []
     for name, pose in diagnosis.frames.iterrows():
         turns = pose[["roll", "pitch", "yaw"]]
@@ -207,7 +207,7 @@ def _fixed(value: float, digits: int) -> str:
 
 
 def correlations(diagnosis: Diagnosis) -> tuple[Table, str]:
-    """Ten strongest correlations between parameters, and the number of those not shown."""
+    """Table of the ten strongest correlations of parameters beyond ±0.5, and a sentence on those not shown."""
     covariance = diagnosis.covariance
     std = np.sqrt(covariance.to_numpy().diagonal())
     first, second = np.triu_indices(len(std), 1)

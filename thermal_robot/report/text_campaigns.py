@@ -79,7 +79,7 @@ def _in_short(change: Plain) -> str:
 
 
 def _chance(p_value: float | None) -> str:
-    """Format a p-value."""
+    """Format a p-value in per cent."""
     if p_value is None:
         return units.MISSING
     if p_value < 1e-5:
@@ -342,7 +342,7 @@ def _figures(worn: Worn) -> Line:
 
 
 def wear_visits(wear: Wear) -> list[Line]:
-    """Table of the campaigns in the order of time; what is said about them only where something is."""
+    """Table of the campaigns in the order of time, with a column ``about`` only where the user stated anything."""
     told = any(visit.about for visit in wear.campaigns)
     lines: list[Line] = [("campaign", "date", "about", "rows used")]
     lines += [(v.name, v.date, about_in_line(v.about), str(v.rows)) for v in wear.campaigns]
@@ -358,7 +358,7 @@ def wear_headline(wear: Wear) -> str:
 
 
 def wear_text(wear: Wear) -> str:
-    """Plain text of one robot over time: alarms with their kinds, what stays, what cannot be compared."""
+    """Plain text of one robot over time: parameters with alarms by kind of change, those that stay, and the others."""
     return "\n".join(_wear_lines(wear))
 
 

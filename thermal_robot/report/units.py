@@ -32,7 +32,7 @@ class Scale:
 
 
 def scale(unit: str, size: float) -> Scale:
-    """Display unit for values of about ``size`` (SI)."""
+    """Choose the display unit, such as µm, mm or m, and its factor for values of about ``size`` in an SI ``unit``."""
     if unit in _LADDERS:
         lead, rest = unit, ""
     else:
@@ -53,7 +53,7 @@ def _decimals(value: float, digits: int) -> int:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Format with significant digits, in exponent form only far from one."""
+    """Format a number with so many significant digits, in exponent form below 1e-4 and from 1e6 on."""
     if not isfinite(value):
         return MISSING
     if value != 0.0 and not 1e-4 <= abs(value) < 1e6:
@@ -86,7 +86,7 @@ def together(values: Iterable[float | None], unit: str) -> list[str]:
 
 
 def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
-    """Format a parameter with its standard deviation, in the unit of its neighbours.
+    """Format a parameter with its standard deviation, in the display unit that suits it and those ``beside`` it.
 
     What the data do not determine is never written as a number.
     """
@@ -131,7 +131,7 @@ def probability(value: float | None) -> str:
 
 
 def p_value(value: float) -> str:
-    """Format ``p = 0.012``, ``p = 3e-7``."""
+    """Format a p-value: ``p = 0.012``, ``p = 3e-7``, and ``p < 1e-12`` for what is smaller."""
     if not isfinite(value):
         return "p unknown"
     if value < 1e-12:

@@ -52,7 +52,7 @@ def fitting(wordings: Iterable[str]) -> str:
 
 
 def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the sentence in all wordings, the fullest first."""
+    """Yield the headline's sentence in all wordings, the fullest first."""
     size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
     if diagnosis.misfit is not None:
@@ -88,17 +88,20 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def explanation(diagnosis: Diagnosis | MotionDiagnosis) -> list[Finding]:
-    """Return the findings of the explanation, the largest share first."""
+    """Return the findings of the effects that the verdict names, the largest share first."""
     return [diagnosis.finding(name) for name in diagnosis.verdict]
 
 
 def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
-    """Found effects that a correction removes, else the random ones; the largest share first."""
+    """Effects of the verdict that a correction removes, or those that scatter if ``random``; largest share first."""
     return [f for f in explanation(diagnosis) if f.random is random]
 
 
 def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
-    """Causes that a headline names: the fewest that hold most of the explained share."""
+    """Causes that a headline names: the fewest, at most ``most``, that hold 95 % of the explained share.
+
+    Causes whose size the data do not determine are passed over, unless there are no others.
+    """
     known = sorted(filter(sized, found), key=lambda f: -(f.shrinkage or 0.0)) or list(found)
     held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known] or [0.0])
     return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
@@ -119,7 +122,7 @@ def unnamed(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def _worse(diagnosis: Diagnosis) -> str:
-    """Begin the headline with harm to other sessions or regions."""
+    """Beginning of the headline where correcting harms rows held out by a cross-validation scheme; else empty."""
     scheme = diagnosis.gap.worse
     if scheme is None:
         return ""
@@ -179,9 +182,9 @@ def sure(probability: float) -> str:
 
 
 def causes_in_words(named: Iterable[tuple[str, Sequence[str]]], beside: bool, fewer: int) -> str:
-    """Name causes, each with its confounded alternatives or, unless they stand ``beside`` it, as in doubt; count fewer.
+    """Join the names of causes, each with its confounded alternatives in brackets, or ``in doubt`` unless ``beside``.
 
-    ``fewer`` are the smaller ones that are not named.
+    The number of smaller causes without a name, ``fewer``, follows.
     """
     names = []
     for name, rivals in named:
@@ -256,7 +259,7 @@ def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_a
 
 
 def length(metres: float) -> str:
-    """Format a length; below an instrument's resolution without a figure."""
+    """Format a length in m, mm or µm with three digits; what rounds to no nanometre as ``less than 1 nm``."""
     if metres < _NOTHING:
         return "less than 1 nm"
     factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
@@ -383,7 +386,7 @@ def about(stated: Mapping[str, str]) -> dict[str, str]:
 
 
 def about_in_line(stated: Mapping[str, str]) -> str:
-    """Return the same in one line."""
+    """Return names and values that the user stated of the measurements, such as serial numbers, in one line."""
     return ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in stated.items())
 
 
@@ -418,7 +421,7 @@ def more(count: int, largest: float) -> str:
 
 
 def turned(diagnosis: Diagnosis) -> list[str]:
-    """Quantities that were read with the opposite sign."""
+    """Return the warnings of quantities that were read with the opposite sign, as notes."""
     return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
@@ -505,18 +508,18 @@ def _left_out(diagnosis: Diagnosis) -> str:
 
 
 def one_sigma(diagnosis: Diagnosis | MotionDiagnosis) -> str:
-    """Say what ± means; empty where it does not stand anywhere."""
+    """Say that ± is one standard deviation; empty where the report shows none."""
     told = any(f.size or any(p.identified and p.std for p in f.parameters) for f in diagnosis.effects)
     return "± is one standard deviation (1 sigma)." if told else ""
 
 
 def laws(diagnosis: Diagnosis) -> list[Finding]:
-    """Discovered laws in the explanation."""
+    """Effects of the verdict that are laws discovered in the data, not known effects."""
     return [f for f in explanation(diagnosis) if f.quantity is not None]
 
 
 def sentences(diagnosis: Diagnosis) -> Iterator[str]:
-    """Unexplained residual in plain sentences."""
+    """Yield sentences on the residual that no effect explains: size, significance, place, and what it depends on."""
     left = diagnosis.unexplained
     if not left.flagged:
         chance = units.p_value(left.p_value)
@@ -572,7 +575,7 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _beside(diagnosis: Diagnosis) -> Iterator[str]:
-    """Effects that are more probable alone than the set without them."""
+    """Yield a sentence where the whole explanation is less probable than each of its effects, naming likely others."""
     joint, own = diagnosis.probability, [f.probability or 0.0 for f in explanation(diagnosis)]
     if not own or min(own) - joint < _SURER:
         return
@@ -585,7 +588,7 @@ def _beside(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def capitalised(words: str) -> str:
-    """Capitalise a sentence."""
+    """Capitalise the first letter."""
     return words[:1].upper() + words[1:]
 
 

@@ -71,12 +71,12 @@ class Scene:
 
     @property
     def size(self) -> float:
-        """Diagonal of the box about all poses."""
+        """Diagonal, m, of the box about the root, the joints and the measured points in up to 500 rows."""
         return float(np.linalg.norm(self._box[1] - self._box[0]))
 
     @property
     def centre(self) -> Array:
-        """(3,) middle of the box about all poses."""
+        """(3,) m, middle of the box whose diagonal is `size`."""
         return np.asarray(0.5 * (self._box[0] + self._box[1]))
 
     @property
@@ -87,7 +87,7 @@ class Scene:
 
     @property
     def eye(self) -> Array:
-        """Viewpoint (3,), across the arm."""
+        """Camera position (3,), m: beside the direction in which the arm reaches, and above."""
         up, mean = self.up, self.predicted.mean(axis=0)
         ahead = mean - (mean @ up) * up
         reach = np.linalg.norm(ahead)
@@ -110,7 +110,7 @@ class Scene:
 
 
 def scene_of_campaign(campaign: Campaign) -> Scene:
-    """Scene of a campaign's gap after registration.
+    """Scene of a campaign that is not diagnosed: its gap after the unknown frames are fitted (registration).
 
     Raises
     ------
@@ -180,9 +180,9 @@ def unit_arrow() -> Any:
 
 
 def readable(displacements: Array, size: float) -> float:
-    """Magnification, 1, 2 or 5 times a power of ten, that gives large arrows the chosen length.
+    """Largest magnification, 1, 2 or 5 times a power of ten, that draws the gaps' 90 % quantile at most 0.08 ``size``.
 
-    Displacements (N, 3) and the size of the scene are in m.
+    At least 1. Displacements (N, 3) and the ``size`` of the scene are in m.
     """
     lengths = np.linalg.norm(displacements, axis=1)
     large = float(np.quantile(lengths, settings.LARGE_GAP)) if len(lengths) else 0.0

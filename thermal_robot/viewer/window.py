@@ -52,7 +52,7 @@ def of_row(scene: Scene, row: int, magnification: float) -> str:
 
 
 def of_places(scene: Scene) -> str:
-    """HTML legend of the places with colours and shares, largest first."""
+    """HTML legend of the places with colours and shares of the gap, from 0.5 % on, largest first."""
     lines = [
         f"{_mark(colour)}{escape(in_words(*place))}<span style='float:right'>{percent(scene.shares[place])}</span>"
         for place, colour in colours(scene.shares).items()
@@ -73,7 +73,7 @@ def of_arrows(scene: Scene) -> str:
 
 
 def names_of_places(scene: Scene) -> dict[tuple[str, str], str]:
-    """Labels of the places: ``joint_3 37.7 %``."""
+    """Labels of the places with a share of the gap of at least 0.5 %: ``joint_3 37.7 %``."""
     return {place: f"{in_words(*place)} {percent(s)}" for place, s in scene.shares.items() if s >= settings.TOLD}
 
 
@@ -162,7 +162,7 @@ class Puppet:
         self._names = [self._name(*place, text) for place, text in names_of_places(scene).items()]
 
     def pose(self, row: int) -> None:
-        """Set the pose of a row, 0..N − 1."""
+        """Set links and joint rings to the pose of a row, 0..N − 1."""
         poses = self._scene.links(row)
         origins, axes = self._scene.joints(row)
         for node, position, rotation in zip(
@@ -210,7 +210,7 @@ class Cloud:
         self._node: Any = None
 
     def show(self, rows: NDArray[np.intp], magnification: float, visible: bool) -> None:
-        """Draw the arrows of k rows, always the same number, or hide them."""
+        """Draw the arrows of ``rows``, of which there are the same number at each call, or hide them."""
         scene = self._scene
         turns, stretches = arrows(self._vectors[rows], magnification, scene.size, self._thicker)
         drawn: dict[str, Any] = {"batched_positions": scene.predicted[rows], "batched_wxyzs": turns}
@@ -256,7 +256,7 @@ class Window:
             self._server.stop()
 
     def _look(self) -> None:
-        """Set the camera to the whole robot from a little above."""
+        """Set up direction, initial camera, light and floor grid."""
         scene, nodes = self.scene, self._server.scene
         nodes.set_up_direction(tuple(scene.up))
         camera = self._server.initial_camera
