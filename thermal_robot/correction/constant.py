@@ -90,7 +90,7 @@ class Constant:
 
     @property
     def displacement(self) -> Displacement:
-        """Displacement of each channel by all constants, one row."""
+        """Displacement of joints, segments, base and tool by all constants together, one row."""
         moved = np.array([told.value for told in self.parameters]) @ self.responses
         joint, segment, base, tool = np.split(moved, [self.joints, -12, -6])
         return Displacement(joint, segment.reshape(-1, 6), base, tool)
@@ -100,7 +100,7 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
     """Constant part of a model: parameters whose response in the chain is the same in all random test rows.
 
     ``temperature``, °C, is the steady temperature of all links; by default that of the URDF's lengths. An effect at one
-    place is constant as a whole or not at all. Laws of time count long after the campaign, of labels in a new session.
+    place is constant as a whole or not at all. Laws of session, time or row number count as after the campaign's end.
     """
     degrees = float(model.settings.reference_temperature if temperature is None else temperature)
     if not ABSOLUTE_ZERO <= degrees < np.inf:
@@ -328,9 +328,9 @@ def zero_offsets(
 class Zeros:
     """Zeros of a model's joints: q_actual = q_command + zero.
 
-    ``matrix`` (n, P): zero of each joint per unit of each parameter, 0 where it is not told; ``values``, ``std`` (n,)
-    rad or m, the latter NaN where unknown or not told; ``said`` a word for each of :data:`TOLD`, :data:`UNSEEN`,
-    :data:`NONE`.
+    ``matrix`` (n, P): zero of each joint per unit of each parameter, 0 unless determined; ``values``, ``std`` (n,) rad
+    or m, the latter NaN where unknown or undetermined; ``said``: status of each joint, one of :data:`TOLD`,
+    :data:`UNSEEN`, :data:`NONE`.
     """
 
     matrix: Array
@@ -395,9 +395,9 @@ def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
 
 
 def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]) -> tuple[Array, list[str]]:
-    """Express the used parameters as joint zeros, then errors of axes: zeros (n, U) per unit of each, and their status.
+    """Express the U ``used`` constants as joint zeros where possible: zeros (n, U) per unit of each, status of zeros.
 
-    A zero whose effect the unknown base and tool can take up is not determined; SVD and pseudo-inverse of responses.
+    A zero is not determined if the unknown base and tool can take up its response. Solved by SVD and pseudo-inverse.
     """
     robot, observations = model.robot, rows_of_every_kind(model, rows=_ROWS)
     own = [_acting(robot, known, int(k)) for k in used]

@@ -154,7 +154,7 @@ def _depends(effect: Effect, seen: Observations, column: str) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CorrectedModel:
-    """Corrected model: nominal robot, fitted frames, and effects with parameter values.
+    """Fitted error model of a robot: nominal robot, fitted base and tool frames, and effects with parameter values.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class CorrectedModel:
         samples: Campaign | str | Path | pd.DataFrame | ArrayLike,
         conditions: Mapping[str, ArrayLike] | None = None,
     ) -> pd.DataFrame:
-        """Predict the measurement: one data frame, whatever the samples are; :meth:`prediction` returns arrays in SI.
+        """Predict measured poses as a data frame, whatever the samples are; :meth:`prediction` returns arrays in SI.
 
         Parameters
         ----------
@@ -462,7 +462,7 @@ class CorrectedModel:
         return replace(rows, covariates=read)
 
     def _require_needed(self, samples: Campaign) -> None:
-        """Refuse samples that lack a column, or a cell of it, naming column and row."""
+        """Raise ``CampaignError``, naming column and row, if samples lack a column that the model needs or a cell."""
         for column in self.needs:
             gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
             if column in samples.covariates and not gaps.size:

@@ -128,7 +128,7 @@ def known(model: Any, kind: str, name: str) -> int | None:
 
 
 def set_damping(joint: Any, damping: float) -> None:
-    """Set the viscous damping of a ``mujoco.MjsJoint``, N·m·s/rad; newer versions have a polynomial."""
+    """Set the viscous damping of a ``mujoco.MjsJoint``, N·m·s/rad; as a polynomial where MuJoCo's version has one."""
     joint.damping = damping if np.ndim(joint.damping) == 0 else [damping, 0.0, 0.0]
 
 
@@ -254,7 +254,7 @@ class _Patched:
         return int(self.model.jnt_bodyid[number])
 
     def _move(self, joint: str, body: int, change: Array) -> None:
-        """Set the pose of a body: N X N⁻¹ L replaces L.
+        """Write a body's changed pose to the XML: N X N⁻¹ L replaces L, where X is the ``change`` in the body's frame.
 
         N is the body's pose in its parent while its joint is at zero, which is L only where the joint has no ``ref``.
         """

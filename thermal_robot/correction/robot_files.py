@@ -101,7 +101,7 @@ class Calibrated:
 
     @property
     def placements(self) -> Array:
-        """Poses (K, 4, 4) of the chain's elements in their parent links: P exp(ξ) exp(axis · zero offset)."""
+        """Calibrated poses (K, 4, 4) of the chain's joints in their parent links: nominal · exp(ξ) exp(axis · zero)."""
         chain, segments = self.robot.chain, np.asarray(self.displacement.segment)
         placed = chain.placements
         for s, k in enumerate(chain.placed):
@@ -122,7 +122,7 @@ class Calibrated:
 
     @property
     def links(self) -> Mapping[str, tuple[str, Array]]:
-        """Link of the target where it is not the tool frame: its parent, and its pose there."""
+        """Link of the target by name: its parent, the tool frame, and its pose there; empty where they coincide."""
         tool = self.robot.tool_frame
         return {target_link(tool): (tool, self.target)} if (self.target != np.eye(4)).any() else {}
 
@@ -277,7 +277,7 @@ def calibrated_urdf(robot: Calibrated) -> str:
 
 
 def ur_kinematics(robot: Calibrated) -> str:
-    """Calibration of a Universal Robots arm as kinematics.yaml; all is in its six joint origins.
+    """Write a calibrated Universal Robots arm as kinematics.yaml: all errors go into its six joint origins.
 
     A fixed frame before a joint that is displaced counts to that joint's origin. Where the frames behind the last joint
     are displaced, or the target sits elsewhere, the file cannot hold it: the controller's tool does.

@@ -40,7 +40,7 @@ _JOINT = re.compile(r"(arm_(left_|right_)?|head_)\d_joint")
 def pal_calibration(
     model: CorrectedModel, own: str | Path | None = None, *, min_sigma: float | None = None, alone: bool = False
 ) -> str:
-    """Joint zeros for robots of PAL Robotics (TIAGo, TIAGo Pro) as master_calibration.yaml.
+    """Write joint zeros as master_calibration.yaml of PAL Robotics' robots (TIAGo, TIAGo Pro).
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def lerobot_calibration(
     min_sigma: float | None = None,
     alone: bool = False,
 ) -> str:
-    """Joint zeros for a LeRobot arm: its calibration file with other homing offsets.
+    """Write joint zeros to a LeRobot arm's calibration file, as changed homing offsets of its motors.
 
     Parameters
     ----------

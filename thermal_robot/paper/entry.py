@@ -54,7 +54,7 @@ class Printed:
 
 @dataclass(frozen=True)
 class Entry:
-    """One row of the ledger.
+    """One row of the ledger: a printed figure of the paper, the recomputed one, and the verdict.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def judge(
     low: ArrayLike | None = None,
     high: ArrayLike | None = None,
 ) -> str:
-    """Verdict on printed numbers against computed ones, SI.
+    """Verdict on printed numbers against computed ones, SI: rounding, else truncation, else ``otherwise``.
 
     ``otherwise`` where neither rounding nor truncation leads to them: ``"erratum"`` where the paper's own numbers
     determine the figure, ``"not reproducible"`` where they do not. ``low``, ``high``: range of each computed number

@@ -131,7 +131,7 @@ class Ledger:
         return markdown(self.entries, self.counts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data of inputs, entries and counts; a non-finite number is ``None``."""
+        """Return inputs, entries and counts as plain values for JSON; a number that is not finite is ``None``."""
         return {
             "inputs": {field.name: _plain(getattr(self.inputs, field.name)) for field in fields(self.inputs)},
             "entries": [{f.name: _plain(getattr(entry, f.name)) for f in fields(entry)} for entry in self.entries],

@@ -195,7 +195,7 @@ def calculated(i: PaperInputs, figures: Printed, case: Case) -> Found:
 
 
 def u_of_eq_13(i: PaperInputs, figures: Printed, case: Case) -> Found:
-    """Two-sided z test (statistic U, Eq 13) of the sample mean after stabilisation against the static displacement."""
+    """Two-sided z test (statistic U, Eq 13) of Table 2's sample means against the static displacements."""
     row = case["n"] - 1
     sigma = i.experimental_sigma[row]
     test = mean_shift_test(i.sample_means[row], i.static_displacements[row], sigma, n=i.n, alpha=i.alpha)

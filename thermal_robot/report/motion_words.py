@@ -59,7 +59,7 @@ def _model(d: MotionDiagnosis) -> str:
 
 
 def _causes(d: MotionDiagnosis, named: Sequence[Finding], places: bool, rivals: bool, count: int) -> str:
-    """Join the names of causes, with main joint (``places``) and confounded ``rivals``; tell how many more there are."""
+    """Join the names of causes, with main joint (``places``) and confounded ``rivals``; say how many more there are."""
     told = [(d.title(f.name, main_joint(f) if places else ""), [*map(d.title, f.confounded_with)]) for f in named]
     return words.causes_in_words(told, rivals, count - len(named))
 
@@ -246,7 +246,7 @@ def places(d: MotionDiagnosis, effect: str) -> str:
 
 
 def facts(d: MotionDiagnosis) -> dict[str, str]:
-    """Return what stands above all else, by its heading: verdict, motion, and which effects count."""
+    """Return the first facts of a report by heading: verdict, size of the log, effects left out."""
     readings = max((len(one) for one in d.curves.values()), default=0)
     seconds = sum(float(m.position.time[-1] - m.position.time[0]) for m in d.log.motions)
     name = f"{d.log.name}: " if d.log.name else ""
@@ -261,7 +261,7 @@ def facts(d: MotionDiagnosis) -> dict[str, str]:
 
 
 def how_measured(d: MotionDiagnosis) -> str:
-    """Say what the gap is, and what held out means."""
+    """Say how the gap is defined (measured less simulated, or torques), and what held out means."""
     held = d.held_out
     out = f"Held out means that a motion was not used for the fit ({held.folds} parts of the motions in turn)"
     if d.unit == "N·m":

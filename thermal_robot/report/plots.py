@@ -529,7 +529,7 @@ def explain_figure(explained: Explained) -> Figure:
 
 
 def _seen(place: Place) -> NDArray[np.bool_]:
-    """Mask (n,) of rows whose error at the place has at most five times the median standard deviation."""
+    """Mask (n,) of rows whose noise at the place (one sigma) is at most five times the median."""
     return np.asarray(place.spread <= _UNSEEN * np.median(place.spread))
 
 
@@ -601,7 +601,7 @@ _LEADING = 12
 
 
 def plot_differences(comparison: Mapping[str, Any]) -> Figure:
-    """Draw the difference of each parameter of a comparison in standard deviations, the largest first."""
+    """Draw the 24 largest differences of parameters between campaigns, in standard deviations, as bars."""
     known = [p for effect in comparison["effects"] for p in effect["parameters"] if p["std"]]
     told = sorted(((p["name"], p["difference"] / p["std"]) for p in known), key=lambda one: -abs(one[1]))
     told = told[:_MOST_DIFFERENCES]
@@ -645,7 +645,7 @@ _FARTHEST = 4.0  # times what is drawn: of a given limit farther away it is said
 
 
 def plot_wear(wear: Wear) -> Figure:
-    """Draw a control chart of each parameter, alarms first: values with their standard deviations, and limits.
+    """Draw a Shewhart control chart of up to twelve parameters over time: values, deviations, limits, fitted line.
 
     Returns
     -------

@@ -34,7 +34,7 @@ _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Verdict in one sentence of at most 45 words.
+    """Verdict of a diagnosis in one sentence of at most 45 words: size of the gap, causes, certainty, correction.
 
     It names at most three causes, the largest shares first, and counts the others. The fullest wording that fits is
     taken; the rest is left to :mod:`thermal_robot.report.words`.
@@ -204,7 +204,7 @@ def _name(diagnosis: Diagnosis, finding: Finding) -> str:
 
 
 def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
-    """Yield the effect of the correction, the fullest wording first; harm is always reported."""
+    """Yield how far the correction shrinks the held-out gap, the fullest wording first; harm is always reported."""
     gap, held = diagnosis.gap, diagnosis.gap.held_out
     it = "them" if several else "it"
     if held.shrinkage < 0.0:
@@ -364,7 +364,7 @@ def _rows(rows: Sequence[int]) -> str:
 
 
 def facts(diagnosis: Diagnosis) -> dict[str, str]:
-    """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
+    """Return the first facts of a report by heading: verdict, campaign, outliers, rows used, effects left out."""
     what = diagnosis.says or ("position and orientation" if diagnosis.measures == "pose" else "position")
     name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
     rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
@@ -381,7 +381,7 @@ def facts(diagnosis: Diagnosis) -> dict[str, str]:
 
 
 def about(stated: Mapping[str, str]) -> dict[str, str]:
-    """Return whose measurements they are, by the names that the user gave: serial numbers, operator, date."""
+    """Return what the user stated of the measurements, such as serial numbers, operator, date, by readable name."""
     return {capitalised(name.replace("_", " ")): said for name, said in stated.items()}
 
 
@@ -477,7 +477,7 @@ def _law(finding: Finding) -> str:
 
 
 def _in_joints(finding: Finding) -> str:
-    """Size of a known effect in each joint, the largest first; empty where its parameters say it."""
+    """Size of a known effect in each joint, the largest first; empty for discovered laws or without such sizes."""
     if finding.quantity or not finding.size:
         return ""
     told = [f"{s.place} {units.measured(s.value, s.std, s.unit)}" for s in finding.size]
@@ -551,7 +551,7 @@ _TOLD, _MOST_OTHERS = 0.01, 3  # probability from which another effect is told t
 
 
 def details(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield a sentence for each fact that neither the headline nor a table says."""
+    """Yield sentences for what headline and tables leave out: smaller causes, confounding, scatter, harm elsewhere."""
     if not diagnosis.usable:
         return
     found, chance = causes(diagnosis), causes(diagnosis, random=True)
@@ -593,7 +593,7 @@ def capitalised(words: str) -> str:
 
 
 def _elsewhere(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the cross-validation schemes in which the correction does harm."""
+    """Yield a sentence for each cross-validation scheme in which the correction enlarges the gap."""
     for scheme in diagnosis.gap.schemes if diagnosis.verdict else ():
         if scheme.shrinkage < 0.0:
             before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
@@ -604,7 +604,7 @@ _MOST_UNTESTED = 2  # effects that are named with the column that they need
 
 
 def advice(diagnosis: Diagnosis) -> str:
-    """Next measurement or action in one sentence; empty where none is needed."""
+    """Say in one sentence what to measure or mend next; empty where nothing is needed."""
     wanted = diagnosis.wanted
     if diagnosis.misfit is not None:
         fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
@@ -640,7 +640,7 @@ _TO_DO = {
 
 
 def _why(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    """Place and quantity of a residual, and what a column would show of it."""
+    """Say where a residual enters and what it follows, and what recording the wanted column would show."""
     own = wanted.follows and wanted.place.endswith(wanted.follows)
     enters = f" enters at {wanted.place}" if wanted.place else ""
     follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""

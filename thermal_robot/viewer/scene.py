@@ -24,7 +24,7 @@ from thermal_robot.viewer import settings
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Scene of N rows of a campaign; m, root frame.
+    """Data of the three-dimensional view of a campaign's N rows; m, root frame.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Scene:
 
     @property
     def size(self) -> float:
-        """Diagonal, m, of the box about the root, the joints and the measured points in up to 500 rows."""
+        """Diagonal, m, of the box about the root, the joints and the predicted points in up to 500 rows."""
         return float(np.linalg.norm(self._box[1] - self._box[0]))
 
     @property
@@ -190,7 +190,7 @@ def readable(displacements: Array, size: float) -> float:
 
 
 def turned_along(directions: Array) -> Array:
-    """Rotations (N, 3, 3) from the z axis to each of N directions; identity for a zero vector."""
+    """Rotations (N, 3, 3) that turn the z axis to each of N directions; a zero vector counts as the z direction."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)
     z = np.where(lengths > 0.0, directions / np.where(lengths > 0.0, lengths, 1.0), [0.0, 0.0, 1.0])
     # the axis of the root frame that lies farthest from it, made perpendicular

@@ -34,7 +34,7 @@ def of_campaign(scene: Scene) -> str:
 
 
 def of_row(scene: Scene, row: int, magnification: float) -> str:
-    """HTML of the measurement in one row, 0..N − 1."""
+    """HTML of one row, 0..N − 1: its gap, along the axes, after correction, and the magnification of the arrows."""
     gap, cut = scene.gap[row], settings.LONGEST_ARROW * scene.size
     size = float(np.linalg.norm(gap))
     along = ", ".join(f"{axis} {quantity(part, 'm')}" for axis, part in zip("xyz", gap.tolist(), strict=True))
@@ -227,7 +227,7 @@ BACK, ON, WORST = "previous", "next", "largest gap"
 
 
 class Window:
-    """Scene served on the loopback address until closed.
+    """Server of a scene's browser view on the loopback address, with controls, until closed.
 
     Shapes of links are as :func:`solids` returns them. The next free port is taken where ``port`` is; 0 asks for any.
     """
