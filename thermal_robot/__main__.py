@@ -1,4 +1,4 @@
-"""``python -m thermal_robot`` is ``thermal-robot``."""
+"""Entry point of ``python -m thermal_robot``, the same as the command ``thermal-robot``."""
 
 import sys
 

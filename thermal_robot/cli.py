@@ -1,4 +1,4 @@
-"""The command line: arguments in, exit status out."""
+"""Command-line interface: parse the arguments, run one command, return the exit status."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _CHOICE = re.compile(r"invalid choice: '(?P<found>[^']*)' \(choose from (?P<know
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser with one-line errors that suggest what was meant."""
+    """Argument parser whose errors are one line, with the choice that was probably meant."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
@@ -43,13 +43,13 @@ class Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: {message}{meant_by}; see {self.prog} --help\n")
 
     def bare(self, commands: Iterable[str]) -> NoReturn:
-        """Answer an empty command line."""
+        """Exit with status 2 and a list of the ``commands``, where the command line names none."""
         usage = f"usage: {self.prog} COMMAND ...\nCOMMAND is one of {', '.join(commands)}.\n"
         self.exit(BAD_INPUT, f"{usage}Begin with `{self.prog} demo`; `{self.prog} --help` says more.\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command.
+    """Parse a command line, run its command, and return the exit status.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _complain(sentence: str, status: int) -> int:
 
 
 def _let_go() -> None:
-    """Close standard output quietly after a broken pipe or a full disk."""
+    """Redirect standard output to the null device after a broken pipe or a full disk, so that no later flush fails."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

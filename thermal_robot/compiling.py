@@ -20,10 +20,10 @@ MOST_UNKEPT = 50
 
 
 def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"})) -> Any:
-    """Compile a function on its first call, and cache it on disk where possible.
+    """Return a function that Numba compiles at its first call (``nogil``); cached on disk where possible.
 
-    Products and sums may be contracted to one rounding, unless more or less is ``loosened``; in any case what is no
-    number stays none.
+    ``loosened``: LLVM's fast-math flags; by default only ``contract``, a product and a sum rounded once, so that NaN
+    stays NaN.
     """
     import numba
 
@@ -54,7 +54,7 @@ def loads(kernels: str) -> bool:
 
 
 def threads() -> int:
-    """Return the number of threads for a batch."""
+    """Return the number of threads for a batch: ``THREADS``, or if 0 the processors that this process may use."""
     if THREADS:
         return THREADS
     allowed = getattr(os, "sched_getaffinity", None)
@@ -67,7 +67,7 @@ def rows_at_once() -> int:
 
 
 def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Any, ...]) -> None:
-    """Run a kernel over slices of rows in threads, with its constants, first and last row, and output array."""
+    """Call ``kernel(*constants, first, last, *out)`` for each slice of about ``PIECE`` of the ``rows``, in threads."""
     count = max(1, rows // PIECE)
     workers = min(threads(), count)
     count = -(-count // workers) * workers  # as many for each, so that none waits for another

@@ -22,7 +22,7 @@ _SILENCE = 300.0
 """s after which counted work says how far it is, between tenths: a fleet may take days."""
 
 Counted = Callable[[str, int, int], None]
-"""Takes a stage, how much of it is done, and how much there is."""
+"""Callback of a progress display: name of a stage, number of parts done, and number of all parts."""
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: str) -> None:
@@ -35,14 +35,14 @@ def add_loudness(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def note(text: str, loudness: str) -> None:
-    """Print a note in one line."""
+    """Print a note in one line on stderr, unless ``loudness`` is quiet."""
     if loudness != QUIET:
         print(f"thermal-robot: note: {' '.join(text.split())}", file=sys.stderr, flush=True)
 
 
 @contextmanager
 def warnings_as_notes(loudness: str) -> Iterator[None]:
-    """Print warnings as notes: the program's own, each once; those of libraries only if asked for."""
+    """Print warnings as notes on stderr, each text once: the program's own, and those of libraries only if verbose."""
     told = set()
 
     def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -67,7 +67,7 @@ def warnings_as_notes(loudness: str) -> Iterator[None]:
 def stages(loudness: str) -> Iterator[Callable[[str], None]]:
     """Progress display of stages of unknown length.
 
-    A terminal shows stage and time once it has lasted, without a bar. Where it is asked for, each stage is a line.
+    A terminal shows stage and elapsed time after two seconds; if verbose, each stage is a line of its own instead.
 
     Yields
     ------
@@ -103,7 +103,7 @@ def stages(loudness: str) -> Iterator[Callable[[str], None]]:
 def counted(loudness: str) -> Iterator[Counted]:
     """Progress display of counted parts, with the remaining time.
 
-    Bars on a terminal, elsewhere a line for every tenth.
+    Bars on a terminal; elsewhere, or if verbose, a line for every tenth, or after five minutes. Nothing if quiet.
 
     Yields
     ------

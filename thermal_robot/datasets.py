@@ -8,7 +8,7 @@ from thermal_robot.campaign import Campaign, read_campaign
 
 
 def demo_directory() -> Path:
-    """Folder of the demo's campaign; its answer is beside it in ``truth.json``."""
+    """Folder of the demo's campaign; its ``truth.json`` holds the effects that were simulated."""
     return Path(__file__).parent / "data" / "demo"
 
 

@@ -1,4 +1,4 @@
-"""One verb for poses and motions: what is given is told apart in one place, read, and diagnosed."""
+"""Diagnosis and comparison of campaigns of poses and of motion logs, dispatched on the kind of what is given."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Progress = Callable[[str], None]
 
 
 def read(path: str | Path, *, folder: str | Path | None = None) -> Campaign | MotionLog:
-    """Read a campaign of poses, or a log of motion where the file holds a section ``[motion]``.
+    """Read a campaign of poses, or a motion log where the file holds a section ``[motion]``.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def compare(
     effects: Sequence[Effect] = (),
     progress: Progress = lambda _: None,
 ) -> Comparison | Any:
-    """Say what campaigns or logs of one robot share, and what changed between them.
+    """Compare campaigns or motion logs of one robot: which effects they share, and which changed between them.
 
     Parameters
     ----------
@@ -175,6 +175,6 @@ def compare(
 
 
 def is_motion(given: Any) -> bool:
-    """Tell whether what is given is of motion: a log, its diagnosis, or the path of a motion.toml."""
+    """Whether an argument concerns motion: it is a motion log, its diagnosis, or the path of a motion.toml."""
     path = isinstance(given, (str, os.PathLike)) and declares_motion(Path(given))
     return path or isinstance(given, (MotionLog, MotionDiagnosis))

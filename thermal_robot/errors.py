@@ -41,7 +41,7 @@ def _again(kind: type[ThermalRobotError], args: tuple[object, ...], fields: dict
 
 
 class RobotError(ThermalRobotError):
-    """A robot description that cannot be used.
+    """Error: a robot description, or an argument that refers to it, cannot be used.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class CampaignError(ThermalRobotError):
 
 
 class EffectError(ThermalRobotError):
-    """An effect that breaks its contract, or a name that no effect has.
+    """Error: an effect breaks the contract of :class:`~thermal_robot.Effect`, or no effect has the name asked for.
 
     Examples
     --------
@@ -139,11 +139,11 @@ class OwnEffectError(EffectError):
 
 
 class UnknownEffectError(EffectError, KeyError):
-    """A name that no effect of an answer has."""
+    """Error, a ``KeyError`` too: no candidate effect of a diagnosis has the name asked for."""
 
 
 class EstimationError(ThermalRobotError):
-    """Data that do not determine the estimate.
+    """Error: the data do not determine the estimate, as with too few poses.
 
     Examples
     --------
@@ -157,7 +157,7 @@ class EstimationError(ThermalRobotError):
 
 
 def ours(what: str) -> str:
-    """Message on a fault of the program itself, and what helps to fix it."""
+    """Message that ``what`` is a fault of the program itself, with its version and what to send to its authors."""
     from importlib.metadata import version
 
     program = f"thermal_robot {version('thermal-robot')}"
@@ -168,7 +168,7 @@ def ours(what: str) -> str:
 
 
 class SealError(ThermalRobotError):
-    """Sealed answers that do not match their commitment."""
+    """Error: the sealed answers of a blind trial cannot be read or do not match the hash published beforehand."""
 
 
 class Note(UserWarning):
@@ -176,7 +176,7 @@ class Note(UserWarning):
 
 
 def require(call: str, given: object, kinds: tuple[Any, ...], expected: str) -> None:
-    """Refuse an argument of a wrong type, naming the expected one.
+    """Raise an error if an argument is not an instance of one of the ``kinds``, naming what is expected.
 
     Raises
     ------

@@ -72,21 +72,21 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether the file exists; a name that is too long, or holds a NUL, does not."""
+    """Whether a regular file exists there; False where the name is invalid or the system refuses to look."""
     with suppress(OSError, ValueError):
         return path.is_file()
     return False
 
 
 def is_folder(path: Path) -> bool:
-    """Whether the folder exists, as :func:`is_file`."""
+    """Whether a folder exists there; False where the name is invalid or the system refuses, as in :func:`is_file`."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
 
 
 def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = ()) -> None:
-    """Refuse beforehand an output that cannot be written, that is also an input, or that is named twice.
+    """Refuse, before writing, an output that is a folder or in none that exists, is also an input, or is named twice.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = (
 
 
 def written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> dict[str, str]:
-    """Write all requested outputs even if some fail; return the errors by file."""
+    """Write all outputs (path, writer) even if some fail; return the system's error messages by path."""
     failed = {}
     for target, write in outputs:
         try:

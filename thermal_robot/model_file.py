@@ -68,9 +68,9 @@ class Part:
     Attributes
     ----------
     kind
-        What may stand there, and how a model has it.
+        Validator that converts the value in the file into the field of a model.
     write
-        From what a model has to what stands there.
+        Function from the field of a model to the value in the file.
     optional
         Whether the key is left out where the model has ``None``.
     """
@@ -81,7 +81,7 @@ class Part:
 
 
 def _pose(value: Any, path: str) -> Array:
-    """Validate a homogeneous matrix with a proper rotation."""
+    """Validate a homogeneous matrix (4, 4): last row 0 0 0 1, a proper rotation, translations within ``_FARTHEST``."""
     pose: Array = matrix((4, 4))(value, path)
     turn = pose[:3, :3]
     if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
@@ -138,7 +138,7 @@ def _covariance(value: Any, path: str) -> Array:
 
 
 def _spread(value: Any, path: str) -> Spread:
-    """Validate the predictive uncertainty."""
+    """Validate the predictive uncertainty of a model file and convert it to a :class:`Spread`."""
     three = listed(NOT_NEGATIVE, 3, "three standard deviations")
     known = {"covariance": _covariance, "beyond": three, "noise": three, "ranges": mapping(_ends)}
     more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE), "between": three}
@@ -193,7 +193,7 @@ PARTS: dict[str, Part] = {
 
 
 def written(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a model as plain values, with version and checksum."""
+    """Convert the fields of a model to plain values for JSON, with the version of the format and a checksum."""
     kept = {key: part for key, part in PARTS.items() if not (part.optional and fields[key] in (None, ()))}
     body = {key: part.write(fields[key]) for key, part in kept.items()}
     found = {"schema": f"{SCHEMA}{VERSION}", **body}
@@ -207,7 +207,7 @@ def checksum(document: Mapping[str, Any]) -> str:
 
 
 def _spelt(value: Any) -> Any:
-    """Plain values with all numbers as floats, so that 1 and 1.0 have one checksum."""
+    """Convert all numbers in plain values to floats, and −0.0 to 0.0, so that 1 and 1.0 have one checksum."""
     if isinstance(value, Mapping):
         return {key: _spelt(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
@@ -217,7 +217,7 @@ def _spelt(value: Any) -> Any:
 
 
 def fields_of(document: Any, own: Sequence[Effect], file: str) -> dict[str, Any]:
-    """Fields of a model from the output of :func:`written`.
+    """Validate the document of a model file and convert it to the fields of a model; the inverse of :func:`written`.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def fields_of(document: Any, own: Sequence[Effect], file: str) -> dict[str, Any]
     Raises
     ------
     CampaignError
-        Naming the place of what is wrong; or where all is right, but not what was written.
+        Naming the place of a value that is wrong; or if all are possible, but the checksum differs.
     EffectError
         If it holds an effect that is not installed.
     """
@@ -266,7 +266,7 @@ def _version(document: Any, file: str) -> int:
 
 
 def _restored(entries: Sequence[dict[str, Any]], own: Sequence[Effect], file: str) -> tuple[tuple[Effect, Array], ...]:
-    """Effects of a file with their values."""
+    """Build the effects of a file from name and arguments, with their (P,) values; an error for one not installed."""
     known = {**library(), **{effect.name: effect for effect in own}}
     held = []
     for k, entry in enumerate(entries):
@@ -282,7 +282,7 @@ def _restored(entries: Sequence[dict[str, Any]], own: Sequence[Effect], file: st
 
 
 def _require_fit(fields: Mapping[str, Any], file: str) -> None:
-    """Refuse values that match the schema but not each other."""
+    """Refuse values that fit the schema but not each other: unknown joints, wrong parameter counts, missing columns."""
     robot, settings = fields["robot"], fields["settings"]
     for joint in settings.gears:
         if joint not in robot.joint_names:
@@ -338,7 +338,7 @@ def _any_rows(fields: Mapping[str, Any]) -> Campaign:
 
 
 def read(path: Path) -> Any:
-    """JSON of a file.
+    """Read and parse the JSON of a model file.
 
     Raises
     ------
@@ -370,7 +370,7 @@ def read(path: Path) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Object without duplicate keys."""
+    """Make a dictionary of the pairs of a JSON object; :class:`MisfitError` if a key stands twice."""
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
@@ -380,5 +380,5 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _whole(digits: str) -> float:
-    """Whole number; one of hundreds of digits is refused later, with its path."""
+    """Parse a whole number of JSON; 300 digits or more become a float, which validation refuses later."""
     return int(digits) if len(digits) < 300 else float(digits)

@@ -47,7 +47,7 @@ class Frames:
     tool
         (4, 4) pose of the target in the tool frame.
     artefacts
-        What rows share beside the robot, by name, such as where a stand has its sockets.
+        Unknowns of the instrument that rows share, by name, such as the places of a stand's sockets.
     """
 
     base: Array
@@ -84,9 +84,9 @@ class Observations:
     instrument
         (N, 3) displacement of the measured point that the instrument adds, measurement frame, m.
     displacement
-        What is known so far to be displaced in the chain.
+        Errors of the chain that are known so far and applied.
     parameters
-        Of the effects that were asked for them here last: the settings of an effect in single places share them.
+        Cache of the effects' parameters at these observations, shared by an effect's settings in single places.
 
     Examples
     --------
@@ -147,7 +147,7 @@ class Observations:
 
     @cached_property
     def commanded(self) -> ChainFrames:
-        """Frames along the nominal chain, on which the drivers of effects depend."""
+        """Frames along the nominal chain at the commands, without displacement; the effects' drivers depend on them."""
         return self.chain if self.displacement is None else chain_frames(self.robot, self.q)
 
     @cached_property
@@ -189,12 +189,12 @@ class Observations:
 
     @cached_property
     def sight(self) -> Sight:
-        """What the rows say, each by its kind of measurement."""
+        """Measurement model of the rows, each by its kind: its gap, and the part of a target's motion that it sees."""
         pose, own = (self.position, self.rotation), self.frames
         return Sight.of(self.campaign, pose, (own.base, own.tool), self.instrument, own.artefacts)
 
     def in_root_axes(self, turns: Array) -> Array:
-        """Rotation vectors (N, 3) of the gap, rad, in root frame axes."""
+        """Rotate the gap's rotation vectors (N, 3), rad, into root frame axes; unchanged without several targets."""
         return turns if self.campaign.targets is None else np.einsum("nij,nj->ni", self.rotation, turns)
 
     @cached_property
@@ -204,7 +204,7 @@ class Observations:
 
     @cached_property
     def joint_sensitivity(self) -> Array:
-        """Geometric Jacobian (N, 6, n) at the target, LOCAL_WORLD_ALIGNED."""
+        """Geometric Jacobian (N, 6, n) at the target, linear first, root frame axes, as far as each row sees it."""
         found = frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
         return self.sight.sees(found)
 
@@ -222,7 +222,7 @@ class Observations:
 
     @cached_property
     def tool_sensitivity(self) -> Array:
-        """(N, 6, 6) twist of the target a unit twist of the tool, tool frame."""
+        """Twist (N, 6, 6) of the target per unit twist of the tool, tool frame."""
         return self.sight.sees(_twist_map(self.chain.tool_rotation, self.lever))
 
 
@@ -230,7 +230,7 @@ _HOLDING: list[ref[Observations]] = []
 
 
 def _hold(observations: Observations) -> None:
-    """Free the least recently used kinematics until all together hold few enough rows."""
+    """Free the kinematics computed longest ago until all observations together hold at most ``HELD_ROWS`` rows."""
     holding = [found for each in _HOLDING if (found := each()) is not None and "chain" in vars(found)]
     rows = observations.campaign.samples + sum(found.campaign.samples for found in holding)
     while holding and rows > HELD_ROWS:

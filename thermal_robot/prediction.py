@@ -56,7 +56,7 @@ class Spread:
     covariance
         (K, K) of the errors of the frames' step and of the effects' parameters, in the order of :func:`sensitivity`.
     beyond
-        (3,) one sigma per axis of what neither frames nor effects tell, measurement frame, m.
+        (3,) one sigma per axis of the residual that neither frames nor effects explain, measurement frame, m.
     noise
         (3,) one sigma per axis of the instrument, measurement frame, m; rows held out tell it with ``beyond``.
     ranges
@@ -133,7 +133,7 @@ class Spread:
         return np.asarray(np.sqrt(variance))
 
     def _apart(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], label: str) -> Array:
-        """Variance (N, 3) per axis of differences between levels of a label, m²."""
+        """Variance (N, 3) per axis, m², of the effects' displacement over the levels of a label, plus ``between``²."""
         campaign, moved = observations.campaign, []
         for level in self.levels[label]:
             labels = {**campaign.labels, label: np.full(campaign.samples, level)}
@@ -190,7 +190,7 @@ def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
     """Jacobian (N, 3, K) of the target's position by the unknown frames and the effects' parameters.
 
     Columns as :func:`~thermal_robot.inference.columns.frame_columns` orders them, those that turn the target left out,
-    then each effect's parameters. In the axes of the measurement frame; m a unit of each.
+    then each effect's parameters. In the axes of the measurement frame; m per unit of each.
     """
     frames, names = frame_columns(observations)
     columns = [frames[:, :3, moves(names)]]
@@ -202,7 +202,7 @@ def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
 
 
 def moves(names: Sequence[str]) -> NDArray[np.bool_]:
-    """(f,) which columns of the unknown frames move the target, by name: no turn on the tool, no artefact."""
+    """Mask (f,) of the unknown frames' columns, by name, that move the target: of the base, and tool translations."""
     place = [name == "base" or (name == "tool" and k < names.index("tool") + 3) for k, name in enumerate(names)]
     return np.array(place, dtype=bool)
 

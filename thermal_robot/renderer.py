@@ -70,17 +70,17 @@ def registered_renderer() -> Renderer:
 
 
 class Rendered:
-    """A result that is told as text and as JSON by the registered renderer."""
+    """Base class of results: text by the registered renderer, and JSON."""
 
     _kind: ClassVar[str] = ""
-    """What the names of the renderer's functions of such a result begin with."""
+    """Prefix of the names of the renderer's functions for such a result."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values of the result."""
+        """Return the result as plain values, ready for JSON; each class of results defines it."""
         raise NotImplementedError
 
     def _given(self) -> Any:
-        """Return what the renderer takes."""
+        """Return the object that the renderer's functions take: the result itself, unless a class overrides it."""
         return self
 
     def _rendered(self, how: str) -> Any:
@@ -107,7 +107,7 @@ class Rendered:
 
 
 class RenderedPage(Rendered):
-    """A result that is shown as a page and as a figure, too, and shows itself in a notebook."""
+    """Base class of results that have an HTML page and a figure, too, and show themselves in a notebook."""
 
     _figure: ClassVar[str] = "overview"
     """The renderer's function that draws it."""
@@ -142,7 +142,7 @@ class RenderedPage(Rendered):
 
 
 def _kept(text: str, path: str | Path | None) -> str | None:
-    """Return a text, or write it where a path is given."""
+    """Return a text if there is no path; else write it to the path and return ``None``."""
     if path is None:
         return text
     write_text(path, text)

@@ -32,7 +32,7 @@ ENDS = ("tool_frame", "root_frame")
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """Placement of a movable joint, or of a fixed frame with a length: where a link may bend or grow.
+    """Fixed transform to a movable joint's origin, or to a fixed frame at a distance: where a link may bend or grow.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class Segment:
     length
         m.
     direction
-        (3,) unit vector along which it grows, in its own frame (behind its placement's rotation), as a right
-        perturbation wants it; zero where two joints' origins coincide.
+        (3,) unit vector along which it grows, in its own frame (behind its placement's rotation), for a right
+        perturbation; zero where two joints' origins coincide.
     index
         Chain element that it belongs to.
     movable
@@ -297,7 +297,7 @@ def load_robot(
 
 
 def joint_range(robot: Robot) -> tuple[Array, Array]:
-    """Joint ranges (n,) and (n,): limits, rad or m, 2.4 rad for a joint of a full turn; infinite where unlimited."""
+    """Lower and upper joint limits (n,), rad or m; of a full turn cut to ±2.4 rad; infinite for an unlimited slide."""
     turns = np.array([kind != "prismatic" for kind in robot.joint_types])
     round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
     low = np.where(round_, np.maximum(robot.lower, -WIDE), robot.lower)

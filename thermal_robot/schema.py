@@ -34,7 +34,7 @@ class MisfitError(ValueError):
 
 
 def fitted(kind: Kind, value: Any, file: str, path: str = "") -> Any:
-    """Validate a value of a file against its schema.
+    """Return a value of a file as validated and converted by its schema, ``kind``.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def fitted(kind: Kind, value: Any, file: str, path: str = "") -> Any:
 
 
 def shown(value: Any) -> str:
-    """Write a value as in a file, shortened."""
+    """Write a value as it stands in a JSON file, cut to ``_MOST_SHOWN`` letters, for a message."""
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     if value is None or isinstance(value, bool):
@@ -77,7 +77,7 @@ def text(expected: str = "text", *, empty: bool = False) -> Kind:
 
 
 def word(allowed: Iterable[str], problem: str = "") -> Kind:
-    """Return a validator of one of some words."""
+    """Return a validator of text that must be one of the ``allowed`` words."""
     words = tuple(allowed)
     expected = alternatives(words)
 
@@ -90,7 +90,7 @@ def word(allowed: Iterable[str], problem: str = "") -> Kind:
 
 
 def alternatives(words: Iterable[str]) -> str:
-    """List of the allowed words, for a message."""
+    """Join the allowed words for a message, as ``"a" or "b"``."""
     return " or ".join(f'"{word}"' for word in words)
 
 

@@ -32,7 +32,7 @@ _CORNERS = 80
 
 
 def find_mesh(named: str, folder: Path) -> Path | None:
-    """File of a mesh, ``None`` where it is missing; nothing is downloaded.
+    """Find the file of a mesh named in a URDF; ``None`` where it is missing; nothing is downloaded.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def visuals(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, l
 
 
 def _shape(geometry: Any, folder: Path) -> Any:
-    """Geometry of one visual in its own frame; ``None`` without one, or without a readable file."""
+    """Mesh (``trimesh``) of one visual's geometry in its own frame; ``None`` without one or without a readable file."""
     import trimesh
 
     if geometry.box is not None:
@@ -208,7 +208,7 @@ class Arm:
 
 
 def arm(robot: Robot, q: ArrayLike, shares: Mapping[tuple[str, str], float]) -> Arm:
-    """Forward kinematics of all links at (R, n) joint positions, rad or m, with the ``shares`` of their places."""
+    """Forward kinematics of the chain's links at (R, n) joint positions, rad or m, with the ``shares`` of places."""
     chain = robot.chain
     links = (*chain.parent_links, robot.tool_frame)
     joints = [chain.names[k] for k in chain.movable]

@@ -56,7 +56,7 @@ def piped(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> str:
-    """Option whose file is a stream; empty without one."""
+    """Name of the one option, of some, whose value is ``-``; empty without one, an error if there are several."""
     found = [name for name in names if getattr(options, name) == "-"]
     if len(found) > 1:
         said = f"- as {' and as '.join(found)}"
@@ -65,7 +65,7 @@ def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> st
 
 
 def _read() -> bytes:
-    """Read all of standard input, up to a size limit."""
+    """Read all of standard input; :class:`CampaignError` if it is a terminal, empty, too long, or no text."""
     source = "text from a file or another program"
     if sys.stdin is None or sys.stdin.closed:
         raise CampaignError(STDIN, "is closed", expected=source)

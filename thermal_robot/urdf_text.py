@@ -28,7 +28,7 @@ class WritesUrdf(Protocol):
     """Protocol of objects that export URDF, such as a ``yourdfpy.URDF``."""
 
     def write_xml_string(self) -> bytes | str:
-        """XML text."""
+        """Return the robot's URDF as XML text."""
 
 
 class Source(NamedTuple):
@@ -40,7 +40,7 @@ class Source(NamedTuple):
 
 
 def urdf_text(urdf: str | Path | WritesUrdf) -> Source:
-    """URDF text of a robot and its source; errors as :func:`~thermal_robot.robot.load_robot`."""
+    """Read the URDF text of a robot from text, path, shipped name or exporting object; errors as for ``load_robot``."""
     if isinstance(urdf, str):
         text = urdf.lstrip("\ufeff \t\r\n")
         if not text or text.startswith("<"):
@@ -155,6 +155,6 @@ def _example_path(name: str) -> Path:
 
 
 def unknown(name: str, known: list[str], what: str) -> RobotError:
-    """Error for an unknown name, with the nearest known ones."""
+    """Return an error that no ``what`` has this name, with the most similar of the ``known`` names."""
     near = tuple(difflib.get_close_matches(name, known, n=5, cutoff=0.3)) or tuple(known)
     return RobotError(f"there is no {what} {name!r}; nearest: {', '.join(near)}", name=name, candidates=near)
