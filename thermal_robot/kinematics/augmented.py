@@ -175,7 +175,7 @@ def _columns(model: pin.Model, names: Sequence[str]) -> NDArray[np.int64]:
 
 
 def _coupled(model: pin.Model, robot: Robot, joints: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Coupling matrix of the robot extended by the virtual joints."""
+    """Matrix (M + S, M + S) and offset (M + S,) that couple mimicking joints; virtual joints are left as they are."""
     movable = _columns(model, [robot.chain.names[k] for k in robot.chain.movable])
     matrix, offset = np.eye(model.nq), np.zeros(model.nq)
     matrix[movable] = 0.0

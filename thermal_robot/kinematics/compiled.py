@@ -20,7 +20,7 @@ def installed() -> bool:
 
 
 def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = None, mass: Array | None = None) -> None:
-    """Run a kernel over all rows of ``out``; the point (3,) and the mass of a payload are common to all rows."""
+    """Run the compiled kernel ``what`` for (N, n) configurations into ``out`` (N, …), with one point (3,) and mass."""
     from thermal_robot.kinematics import kernels
 
     arm = arm_of(robot.chain)
@@ -31,7 +31,7 @@ def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = N
 
 
 def _write(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out: Array) -> None:
-    """Run the kernel over slices of rows in threads."""
+    """Run a compiled kernel in threads, into ``out`` itself where N is last in memory, else through a buffer."""
     rows = rows_last(out)
     if np.may_share_memory(q, out):
         q = q.copy()

@@ -72,7 +72,7 @@ def _one_for_all(point: Array | None, mass: Array | None) -> bool:
 
 
 def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Moved:
-    """Displacement as arrays for that many rows, without zero ones."""
+    """Validate a displacement; convert it to joint offsets and, for twists not all zero, rigid motions by element."""
     if displacement is None:
         return lanes.NOWHERE
     shapes = {"joint": (robot.n,), "segment": (len(robot.segments), 6), "base": (6,), "tool": (6,)}
@@ -252,7 +252,7 @@ def placement_sensitivities(
 
 
 def _point(point: ArrayLike | None, rows: int) -> Array | None:
-    """Point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
+    """Validate a point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
     if point is None:
         return None
     offset = np.asarray(point, dtype=float)

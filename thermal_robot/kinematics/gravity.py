@@ -150,7 +150,7 @@ def static_regressor(robot: Robot, q: ArrayLike) -> Array:
 
 
 def _with_tool(frames: ChainFrames) -> tuple[list[Array], list[Array]]:
-    """Rotations (3, 3, N) and positions (3, N) of the K elements, followed by the tool's."""
+    """List rotations (3, 3, N) and positions (3, N) of the K elements, followed by those of the tool."""
     places = frames.rows_last()
     return [*places.rotations, places.tool_rotation], [*places.positions, places.tool_position]
 

@@ -60,9 +60,9 @@ class Reached(NamedTuple):
     q
         (N, n) rad or m.
     position
-        (N, 3) m, root frame: what is left of the point, wanted − reached.
+        (N, 3) m, root frame: error of the point, wanted − reached.
     direction
-        (N, 3) rad, rotation vectors in the root frame: what is left of the direction.
+        (N, 3) rad, rotation vectors in the root frame: error of the orientation, wanted − reached.
     """
 
     q: Array
@@ -132,7 +132,7 @@ def inverse_kinematics(
 def nearest_postures(
     robot: Robot, poses: ArrayLike, *, tool: ArrayLike | None = None, near: ArrayLike | None = None
 ) -> Reached:
-    """Multi-start inverse kinematics: the nearest of the postures that reach each pose.
+    """Multi-start inverse kinematics: of the postures that reach each pose best, the one nearest to ``near``.
 
     Parameters
     ----------

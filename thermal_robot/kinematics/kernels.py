@@ -31,13 +31,13 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 
 @compiled
 def at(row: int) -> np.uint64:
-    """Offset of a row, unsigned, since a negative index counts from the end."""
+    """Offset of a row in the room, ``row * LANES``; unsigned, since a negative index counts from the end."""
     return np.uint64(row * LANES)
 
 
 @compiled
 def sincos(room: Array, x: int) -> None:
-    """Write sines and cosines of a row of angles below ``LARGEST_REDUCED`` into the next two rows."""
+    """Write sines and cosines of row ``x``, angles below ``LARGEST_REDUCED`` rad, into the two rows behind it."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
     angles, sines, cosines = at(x), at(x + 1), at(x + 2)
     for i in range(WIDE):
@@ -56,7 +56,7 @@ def sincos(room: Array, x: int) -> None:
 
 @compiled
 def turn(room: Array, x: int, large: bool) -> None:
-    """Write sines and cosines of angles of any size: large ones one by one."""
+    """Write sines and cosines of row ``x``, angles of any size, into the two rows behind it; large ones one by one."""
     sincos(room, x)
     if large:
         angles, sines, cosines = at(x), at(x + 1), at(x + 2)
@@ -68,7 +68,7 @@ def turn(room: Array, x: int, large: bool) -> None:
 
 @compiled
 def follow(room: Array, place: Array, x: int, to: int) -> None:
-    """Multiply the frame in twelve rows by a constant placement (3 × 4)."""
+    """Multiply the frames in the twelve rows from ``x`` by a constant placement (3, 4), into those from ``to``."""
     a0, a1, a2, a3 = place[0]
     b0, b1, b2, b3 = place[1]
     c0, c1, c2, c3 = place[2]
@@ -85,9 +85,9 @@ def follow(room: Array, place: Array, x: int, to: int) -> None:
 
 @compiled
 def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: int, to: int) -> None:
-    """Rotate column a of the frame towards column b, then multiply by a constant placement.
+    """Rotate column a of the frames from row ``x`` towards b, then multiply by a constant placement, into ``to``.
 
-    Sine and cosine are the second and third row from ``joint``.
+    Sine and cosine of the joint's angle are the second and third row from ``joint``.
     """
     c = 3 - a - b
     a0, a1, a2, a3 = place[a]
@@ -110,7 +110,7 @@ def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: in
 
 @compiled
 def slide(room: Array, axis: Array, joint: int, x: int, to: int) -> None:
-    """Translate the frame in twelve rows along its own axis by the position in a row."""
+    """Translate the frames from row ``x`` along their own ``axis`` by the positions in row ``joint``, into ``to``."""
     (ax, ay, az), moved = axis, at(joint)
     for row in range(0, 12, 4):
         u, v, w, p = at(x + row), at(x + row + 1), at(x + row + 2), at(x + row + 3)
@@ -123,7 +123,7 @@ def slide(room: Array, axis: Array, joint: int, x: int, to: int) -> None:
 
 @compiled
 def load(room: Array, arm: Arm, j: int, q: Array, start: np.uint64, to: int) -> bool:
-    """Load the positions of a movable joint; whether one is too large for :func:`sincos`."""
+    """Write the positions of a movable joint, coupled ones too, to row ``to``; whether one is too large to reduce."""
     lead, factor, offset, large, here = arm.lead[j], arm.factor[j], arm.offset[j], False, at(to)
     for i in range(WIDE):
         position = offset
@@ -136,7 +136,7 @@ def load(room: Array, arm: Arm, j: int, q: Array, start: np.uint64, to: int) -> 
 
 @compiled
 def frame_of(k: int, kept: int) -> int:
-    """Offset of the frame of an element, before its motion; where few are kept, older ones are overwritten."""
+    """First row of the frame of element ``k`` before its motion; beyond the ``kept`` frames the last two alternate."""
     return 12 * (k if k < kept else kept - 2 + (k - kept) % 2)
 
 
@@ -165,7 +165,7 @@ def new_room(arm: Arm, kept: int, more: int) -> Array:
 
 @compiled
 def walk(room: Array, arm: Arm, kept: int, q: Array, start: np.uint64) -> int:
-    """Forward kinematics of a block: the frame of each element, twelve rows each; return the tool's offset."""
+    """Forward kinematics of a block: each element's frame, twelve rows each; return the first row of the tool's."""
     elements, joint = len(arm.kinds), 12 * kept
     aligned, slid = joint + 3, joint + 15
     for k in range(still(arm), elements):
@@ -192,13 +192,13 @@ def walk(room: Array, arm: Arm, kept: int, q: Array, start: np.uint64) -> int:
 
 @compiled
 def begin(start: int, stop: int, number: int) -> np.uint64:
-    """First row of a block; the last block ends with the rows, and so overlaps the one before."""
+    """First configuration of a block; the last block ends at ``stop``, and so overlaps the one before."""
     return np.uint64(max(min(start + number * LANES, stop - LANES), 0))
 
 
 @compiled
 def give(room: Array, x: int, out: Array, row: int, start: np.uint64) -> None:
-    """Copy a row to the results."""
+    """Copy row ``x`` of the room to row ``row`` of the results, for one block of configurations."""
     given = at(x)
     for i in range(WIDE):
         out[row, start + i] = room[given + i]
@@ -206,14 +206,14 @@ def give(room: Array, x: int, out: Array, row: int, start: np.uint64) -> None:
 
 @compiled
 def give_zeros(out: Array, row: int, start: np.uint64) -> None:
-    """Write zeros to the results."""
+    """Write zeros to row ``row`` of the results, for one block of configurations."""
     for i in range(WIDE):
         out[row, start + i] = 0.0
 
 
 @compiled
 def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: np.uint64) -> None:
-    """Write one component of a cross product to the results."""
+    """Write one component of a cross product, a b − c d of four rows of the room, to row ``row`` of the results."""
     u, v, w, p = at(a), at(b), at(c), at(d)
     for i in range(WIDE):
         out[row, start + i] = room[u + i] * room[v + i] - room[w + i] * room[p + i]
@@ -221,7 +221,7 @@ def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int
 
 @compiled
 def add(room: Array, x: int, factor: float, out: Array, row: int, start: np.uint64) -> None:
-    """Add a row times a factor to the results."""
+    """Add row ``x`` of the room, times a factor, to row ``row`` of the results."""
     given = at(x)
     for i in range(WIDE):
         out[row, start + i] += factor * room[given + i]
@@ -229,7 +229,7 @@ def add(room: Array, x: int, factor: float, out: Array, row: int, start: np.uint
 
 @compiled
 def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the tool poses (16, N) of the rows from ``start`` to ``stop``, at least ``LANES`` of them."""
+    """Write homogeneous tool poses (16, N) of the configurations ``start`` to ``stop``, at least ``LANES`` of them."""
     kept = still(arm) + 3  # no frame is looked at again but those that stay, and the last
     room = new_room(arm, kept, 0)
     for number in range((stop - start + LANES - 1) // LANES):
@@ -245,7 +245,7 @@ def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def target(room: Array, arm: Arm, tool: int, to: int) -> None:
-    """Write the position of the point of the tool."""
+    """Write the root-frame position of the point fixed to the tool, ``arm.point``, into the three rows from ``to``."""
     x, y, z = arm.point
     for m in range(3):
         row, here = tool + 4 * m, at(to + m)
@@ -256,9 +256,9 @@ def target(room: Array, arm: Arm, tool: int, to: int) -> None:
 
 @compiled
 def axis_of(room: Array, arm: Arm, k: int, to: int) -> tuple[int, int, float]:
-    """Offset of a joint's axis in root axes, stride of its components, and their factor.
+    """First row of a joint's axis in root axes, stride of its components, and their sign.
 
-    Where a joint turns about an axis of its frame it is a column of that; else it is written.
+    Where a joint turns about an axis of its frame this is a column of the frame; else the axis is written to ``to``.
     """
     if arm.kinds[k] == TURNS:
         a, b = arm.turns[k]
@@ -276,7 +276,7 @@ def axis_of(room: Array, arm: Arm, k: int, to: int) -> tuple[int, int, float]:
 def add_twist(
     room: Array, m: int, axis: int, step: int, factor: float, k: int, point: int, out: Array, row: int, start: np.uint64
 ) -> None:
-    """Add one component of the velocity of a point by a unit rotation about the axis of an element."""
+    """Add component ``m`` of a point's velocity, axis × lever, for a unit turn about the axis of element ``k``."""
     a, b = (m + 1) % 3, (m + 2) % 3
     u, v, x, y = at(axis + step * a), at(axis + step * b), at(point + a), at(point + b)
     p, q = at(12 * k + 4 * a + 3), at(12 * k + 4 * b + 3)
@@ -287,7 +287,7 @@ def add_twist(
 
 @compiled
 def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write Jacobians (6 n, N) at the point; the first follower of a driving joint overwrites, the others add."""
+    """Write geometric Jacobians (6 n, N) at the tool's point; joints that follow one driving joint add up."""
     n, kept = q.shape[1], len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point = 12 * kept + 27
@@ -313,7 +313,7 @@ def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def lever_of(room: Array, k: int, point: int, to: int) -> None:
-    """Write the lever arm of a point from the origin of an element."""
+    """Write the lever arm of a point from the origin of element ``k`` into the three rows from ``to``."""
     for m in range(3):
         origin, end, here = at(12 * k + 4 * m + 3), at(point + m), at(to + m)
         for i in range(WIDE):
@@ -322,7 +322,7 @@ def lever_of(room: Array, k: int, point: int, to: int) -> None:
 
 @compiled
 def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write placement sensitivities (36 S, N) at the point."""
+    """Write the kinematic regressor (36 S, N): twist of the tool's point per unit twist of each segment's placement."""
     segments, kept = len(arm.placed), len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     point, lever = 12 * kept + 27, 12 * kept + 30
@@ -344,7 +344,7 @@ def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
 
 @compiled
 def weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
-    """Add the first moment of the bodies behind a movable joint."""
+    """Add the first moment, about the root's origin, of the mass between a movable joint and the next one."""
     weight, (x, y, z) = arm.masses[j], arm.centres[j]
     for m in range(3):
         row, here = 12 * (arm.movable[j] + 1) + 4 * m, at(moment + m)
@@ -358,7 +358,7 @@ def add_torque(
     room: Array, axis: int, step: int, factor: float, pull: Array, moment: int, mass: float, k: int,
     out: Array, row: int, start: np.uint64,
 ) -> None:  # fmt: skip
-    """Add a multiple of axis · (force × lever), with the lever from the origin of an element."""
+    """Add the holding torque: factor · axis · (gravity × first moment about the origin of element ``k``)."""
     x, y, z = pull[0] * factor, pull[1] * factor, pull[2] * factor
     u, v, w = at(axis), at(axis + step), at(axis + 2 * step)
     along, across, up = at(moment), at(moment + 1), at(moment + 2)
@@ -372,7 +372,7 @@ def add_torque(
 
 @compiled
 def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write holding torques (n, N) of the arm and of a payload at the point."""
+    """Write generalized gravity (n, N), torques or forces that hold the arm and a payload at the tool's point."""
     kept = len(arm.kinds) + 1
     room = new_room(arm, kept, 6)
     moment = 12 * kept + 27

@@ -119,11 +119,11 @@ class Moved(NamedTuple):
 
 
 BASE, TOOL = -2, -1
-"""Numbers of the ends of the chain beside those of its elements."""
+"""Numbers of the chain's two ends, in addition to those of its elements 0..K−1."""
 NOWHERE = Moved()
 """Nothing displaced."""
 TURNS, TURNS_ALIGNED, SLIDES = 1, 2, 3
-"""What happens behind a placement that is not ``FIXED``: a turn about an axis of the frame, or any other, a slide."""
+"""Kinds of joint motion: a turn about an axis of the frame, a turn about any other axis, a slide."""
 
 
 class Arm(NamedTuple):
@@ -161,7 +161,7 @@ _arms: WeakKeyDictionary[Chain, Arm] = WeakKeyDictionary()
 
 
 def arm_of(chain: Chain) -> Arm:
-    """Constant arrays of a chain, cached; the point is the tool's origin."""
+    """Return the constant arrays of a chain for the engines, cached by chain; ``point`` is the tool's origin."""
     found = _arms.get(chain)
     if found is None:
         found = _arms[chain] = _made(chain)
@@ -205,7 +205,7 @@ def _made(chain: Chain) -> Arm:
 
 
 def _about(axis: Array) -> tuple[int, tuple[int, int], Array]:
-    """Rotation type of an axis, the columns that it rotates, and a constant rotation (3, 3) before it."""
+    """Kind of a turn, the two columns of the frame that it rotates, and a constant rotation (3, 3) before it."""
     w = int(np.argmax(np.abs(axis)))
     a, b = (w + 1) % 3, (w + 2) % 3
     if np.abs(axis[w]) == 1.0 and np.count_nonzero(axis) == 1:
@@ -252,7 +252,7 @@ def walk(chain: Chain, q: Array, moved: Moved, part: slice, frames: Array | Sequ
 
 
 def _joints(arm: Arm, chain: Chain, q: Array, more: Array | None, part: slice) -> Array:
-    """Positions (M, C) of the movable joints."""
+    """Positions (M, C) of the movable joints in a chunk: offsets ``more`` added, then mimicking joints coupled."""
     driving = scratch("driving", q.shape[1], part.stop - part.start)
     driving[...] = q[part].T
     if more is not None:
@@ -275,7 +275,7 @@ def _turn(frame: Array, a: int, b: int, sine: Array, cosine: Array, out: Array) 
 
 
 def _slide(frame: Array, axis: Array, distance: Array, out: Array) -> None:
-    """Translate every frame along its own constant axis."""
+    """Translate every frame along a constant axis of its own by its ``distance``, m."""
     out[...] = frame
     term = np.matmul(axis, frame[:, :3], out=scratch("term", 3, len(distance)))
     term *= distance
@@ -346,7 +346,7 @@ def cross(a: Array, b: Array, out: Array, term: Array) -> None:
 
 
 def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
-    """Forward kinematics of the tool, (N, 4, 4), displaced or not."""
+    """Write the forward kinematics of the tool, homogeneous matrices (N, 4, 4), displaced or not."""
     elements = len(robot.chain.names)
     for part in chunks(len(q), 4):
         pair = scratch("frames", 2, 3, 4, part.stop - part.start)
@@ -357,7 +357,7 @@ def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
 
 
 def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
-    """Geometric Jacobian at a point of the tool, (N, 6, n)."""
+    """Write the geometric Jacobian (N, 6, n) at a point of the tool, linear rows first, root axes."""
     chain, plain = robot.chain, arm_of(robot.chain).plain
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
@@ -379,7 +379,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: 
 
 
 def placements(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
-    """Kinematic regressor: sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    """Write the kinematic regressor (N, 6, S, 6): twist of a point of the tool per unit twist of each placement."""
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
         end, size = target(frames, point, part), out.shape[-1]
@@ -396,7 +396,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None, given:
 
 
 def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
-    """Generalized gravity, (N, n), of the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+    """Write generalized gravity (N, n), N·m or N, of arm and payload of mass () or (N,) kg at ``com`` on the tool."""
     chain, plain, pull = robot.chain, arm_of(robot.chain).plain, robot.gravity
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:

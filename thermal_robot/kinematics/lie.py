@@ -183,7 +183,7 @@ def rotation_to_rpy(rotation: ArrayLike) -> Array:
 
 
 def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
-    """Sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, each (..., 1, 1)."""
+    """Coefficients sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, each (..., 1, 1), of rotation vectors of length θ."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2

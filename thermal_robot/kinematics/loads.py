@@ -17,9 +17,10 @@ from thermal_robot.kinematics.model import held_at
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Joint torques and inertias (k, n, J) along n configurations, N·m and kg·m²; slope (n, J) of the first, N·m/rad.
+    """Joint torques and own inertias (2, n, J) of J joints along n configurations, N·m and kg·m², and slopes, N·m/rad.
 
-    The first of the k is that of the model, the second that of 1 kg of payload.
+    The first of the two is of the model, the second of 1 kg of payload; ``slope`` (n, J): derivative of the model's
+    static torque by the joint's own position.
     """
 
     torque: Array
@@ -27,7 +28,7 @@ class Loads:
     slope: Array
 
     def towards(self, other: Loads, share: float) -> Loads:
-        """Return loads a share of the way to others."""
+        """Interpolate linearly: the loads a ``share`` of the way from these to the others."""
         pairs = ((self.torque, other.torque), (self.inertia, other.inertia), (self.slope, other.slope))
         return Loads(*(one + share * (two - one) for one, two in pairs))
 

@@ -107,8 +107,8 @@ def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimi
 def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[str] = ()) -> Coupling:
     """Coupling of the movable joints of a chain to their driving joints (:func:`followed`).
 
-    What mimics another one of the movable joints ``beside`` the chain is at the offset, as one that mimics a fixed
-    joint is.
+    A joint of the chain that mimics one of the movable joints ``beside`` it makes that one a driving joint, too; one
+    that mimics a fixed joint stays at its offset.
     """
     driving: dict[str, int] = {}
     for j, name in enumerate(names):
@@ -128,7 +128,7 @@ def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[s
 def common_limits(
     coupling: Coupling, names: Sequence[str], lower: Array, upper: Array, own: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Limits of the driving joints within which every joint that follows them is within its own.
+    """Lower and upper limits (n,) of the driving joints within which every joint that follows them is within its own.
 
     All (M,) limits, and the driving joints' ``own`` (n,), are in rad or m, infinite where there is none. Refused where
     a joint and one that follows it are never both within their limits.
@@ -205,7 +205,7 @@ def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tup
 
 
 def _links(full: pin.Model, data: pin.Data) -> list[tuple[int, float, Array]]:
-    """Frame of each link's mass, the mass (kg) and its centre in the world (m)."""
+    """List the frame of each link's mass, its mass (kg) and centre in the world (m); fixed links apart from bodies."""
     found = []
     joined = np.zeros(full.njoints)
     moment = np.zeros((full.njoints, 3))
@@ -355,7 +355,7 @@ _JOINTS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
-    """Leaf links of the tree, the usual tool frames."""
+    """Names of the leaf links of a URDF, which carry no further joint: the usual tool frames."""
     model = parse_urdf(urdf, source)
     parents = {frame.parentFrame for frame in model.frames}
     ends = [f for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY and i not in parents]
@@ -363,7 +363,7 @@ def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, .
 
 
 def held_at(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
-    """Hold joints where they are; a link may have the name of a joint."""
+    """Reduce a Pinocchio model by fixing joints (indices) at a configuration; a link may have the name of a joint."""
     # Pinocchio's reduction asks for frames by name alone, and stops where a link and a joint share one.
     mark = "link "
     renamed = full.copy()
@@ -437,7 +437,7 @@ def unit_motion(model: pin.Model, joint: pin.JointModel) -> Array:
 
 
 def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
-    """Frames of the URDF joints between a link and one of its descendants."""
+    """Frame indices of the URDF joints from a root link to a tool link, in order; an error if that is no descendant."""
     elements: list[int] = []
     frame = tool
     while frame != root:
@@ -468,7 +468,7 @@ def _joint_type(model: pin.Model, name: str) -> str:
 
 
 def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
-    """Position limits of some joints; infinite for continuous ones."""
+    """Lower and upper position limits of some joints; infinite for continuous ones and where the URDF gives none."""
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for i, name in enumerate(names):
         joint = model.joints[model.getJointId(name)]

@@ -59,7 +59,7 @@ class _Own:
         self.idle = False
 
     def joints(self, q: Array) -> Array:
-        """Positions of all joints of the model."""
+        """Pinocchio configurations (N, nq) from joint positions (N, n): mimics follow, fixed segments are at zero."""
         if not self.plain:
             q = self.coupling.positions(q)
         if self.model.nq == q.shape[1]:
@@ -69,7 +69,7 @@ class _Own:
         return rows
 
     def frames_at(self, point: Array | None, rows: int) -> Iterable[int]:
-        """Operational frame for each row: the tool, or a frame at a point of it, (3,) or (N, 3)."""
+        """Index of an operational frame for each row: the tool's, or one moved to the row's point, (3,) or (N, 3) m."""
         if point is None:
             return [self.tool] * rows
         if point.ndim == 2:
@@ -83,7 +83,7 @@ class _Own:
 
 
 class _Kept(threading.local):
-    """Per-thread cache of models, with and without all placements, as Pinocchio's data are not thread-safe."""
+    """Per-thread cache of models by chain, with movable joints only and with all segments as joints."""
 
     def __init__(self) -> None:
         self.models: tuple[WeakKeyDictionary[Chain, _Own], ...] = (WeakKeyDictionary(), WeakKeyDictionary())
@@ -110,7 +110,7 @@ def _joint(chain: Chain, k: int) -> pin.JointModel:
 
 
 def poses(robot: Chained, q: Array, out: Array) -> None:
-    """Forward kinematics of the tool, (N, 4, 4)."""
+    """Write the forward kinematics of the tool, homogeneous matrices (N, 4, 4)."""
     own = _own(robot.chain)
     model, data, tool = own.model, own.data, own.tool
     for i, row in enumerate(own.joints(q)):
@@ -119,7 +119,7 @@ def poses(robot: Chained, q: Array, out: Array) -> None:
 
 
 def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
-    """Geometric Jacobian at a point of the tool, (N, 6, n)."""
+    """Write the geometric Jacobian (N, 6, n) at a point of the tool, linear rows first, root axes."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
     frames = own.frames_at(point, len(q))
@@ -131,7 +131,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None
 
 
 def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
-    """Kinematic regressor: sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    """Write the kinematic regressor (N, 6, S, 6): twist of a point of the tool per unit twist of each placement."""
     own = _own(robot.chain, placed=True)
     model, data, shape = own.model, own.data, out.shape[1:]
     for i, (row, frame) in enumerate(zip(own.joints(q), own.frames_at(point, len(q)), strict=True)):
@@ -141,7 +141,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> Non
 
 
 def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> None:
-    """Generalized gravity, (N, n), of the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+    """Write generalized gravity (N, n), N·m or N, of arm and payload of mass () or (N,) kg at ``com`` on the tool."""
     own = _own(robot.chain)
     model, data = own.model, own.data
     if own.pull is not robot.gravity:
@@ -159,7 +159,7 @@ def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> No
 
 
 def _turning_about(own: _Own, robot: Chained) -> bool:
-    """Whether the first joint rotates about gravity, so that its torque is exactly zero."""
+    """Whether the first joint is revolute and its axis parallel to gravity, so that its torque is exactly zero."""
     chain = robot.chain
     first = int(chain.movable[0])
     if not own.plain or chain.kinds[first] != REVOLUTE:

@@ -75,7 +75,7 @@ def unsound(text: str) -> str:
 
 
 def _seen(text: str) -> str:
-    """Text with comments blanked, positions kept: urdfdom accepts ``--`` in a comment, XML does not."""
+    """Text with comments, CDATA and instructions blanked, positions kept; urdfdom accepts ``--`` in a comment."""
     return _HIDDEN.sub(lambda span: re.sub(r"[^\n]", " ", span[0]), text)
 
 
@@ -103,7 +103,7 @@ def read(urdf: str, source: str) -> Element:
 
 
 def _foreign(root: Element) -> str:
-    """Reason why a document is no URDF: another root, xacro tags, excessive size; empty if it is one."""
+    """Reason why a document is no URDF: another root, xacro tags, too deep, wide or many joints; empty if it is one."""
     if root.tag != "robot":
         return f"{_FOREIGN.get(root.tag, 'is XML')} but not a URDF: its root element is <{root.tag}>, expected <robot>"
     # a tag of xacro whose prefix is not declared is left over from an expanded file
@@ -250,14 +250,14 @@ def require_numbers(urdf: str, source: str) -> None:
 
 
 def _descendants(element: Element, place: str) -> Iterator[tuple[str, Element]]:
-    """Yield an element and its descendants with their paths below the robot."""
+    """Yield an element and its descendants depth first, each with the path of its parent, starting from ``place``."""
     yield place, element
     for child in element.iterchildren("*"):
         yield from _descendants(child, f"{place}/{element.tag}".lstrip("/"))
 
 
 def _problems(owner: Element) -> Iterator[str]:
-    """Yield what is wrong with a link or a joint."""
+    """Yield a message for each fault of a link or joint: name, repeated or unknown elements, numbers, missing mass."""
     seen, name = set(), owner.get("name", "")
     if owner.tag == "joint" and (not name or name != name.strip()):
         yield ": expected a name without blanks around it"  # a table's column has none
@@ -275,7 +275,7 @@ def _problems(owner: Element) -> Iterator[str]:
 
 
 def _unknown(place: str, element: Element) -> Iterator[str]:
-    """Error for an unknown element, with the one that was meant, where it would place or move something."""
+    """Yield a message if URDF does not know an element that seems to place or move something, with the one meant."""
     name, known = element.tag, _ELEMENTS.get(place)
     if known is None or ":" in name or element.prefix or name in (*known, *_HARMLESS):
         return
@@ -288,7 +288,7 @@ def _unknown(place: str, element: Element) -> Iterator[str]:
 
 
 def _unread(element: Element) -> Iterator[str]:
-    """Error for content that URDF ignores in an element."""
+    """Yield a message for each attribute of an element, or text in it, that URDF ignores but that seems to be meant."""
     name, known = element.tag, list(_ATTRIBUTES[element.tag])
     for key, value in element.attrib.items():
         if key in known or ":" in key or key.startswith("{"):
@@ -310,7 +310,7 @@ def _alike(name: str, known: Iterable[str]) -> str:
 
 
 def _wrong(element: Element, kind: str) -> Iterator[str]:
-    """Error for invalid numbers of an element; ``kind`` is that of its joint."""
+    """Yield a message for each missing or invalid number of an element; ``kind`` is the type of its joint."""
     name, found = element.tag, {}
     if name == "mass" and "value" not in element.attrib:
         yield "its <mass> has no value, expected a number of kg"
