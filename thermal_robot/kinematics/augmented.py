@@ -104,7 +104,7 @@ class AugmentedModel:
     def jacobians(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
         """Geometric Jacobian (N, 6, M + S) of the tool, linear rows first, in root axes.
 
-        The column of a joint that others mimic holds what they do with it; their own are zero.
+        The column of a joint that others mimic includes their motion; their own columns are zero.
         """
         data, model = self.model.createData(), self.model
         found = [

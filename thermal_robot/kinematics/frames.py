@@ -162,7 +162,7 @@ def tool_poses(
 
 
 def as_rows(robot: Chained, q: ArrayLike) -> Array:
-    """Return the configurations as an (N, n) array of floats."""
+    """Return the configurations as an (N, n) array of floats, one row for (n,); an error for another shape."""
     rows = np.asarray(q, dtype=float)
     if rows.ndim < 2:
         rows = rows.reshape(1, -1)
@@ -204,7 +204,7 @@ def frame_jacobians(
     -------
     ndarray
         (N, 6, n), linear rows first: ``LOCAL_WORLD_ALIGNED`` in Pinocchio. The column of a joint that others mimic
-        holds what they do with it.
+        includes their motion.
 
     Raises
     ------

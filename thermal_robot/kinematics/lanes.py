@@ -287,7 +287,7 @@ def _rows_of(motions: Array, part: slice) -> Array:
 
 
 def _followed(frame: Array, motions: Array) -> Array:
-    """Multiply every frame by its own motion, (4, 4, C), or by a common one, (4, 4, 1)."""
+    """Multiply every frame (3, 4, C) on its right by its own rigid motion, (4, 4, C), or a common one, (4, 4, 1)."""
     product = frame[:, 0, None] * motions[0]
     for m in (1, 2):
         product += frame[:, m, None] * motions[m]

@@ -347,7 +347,7 @@ def rewritten(
     links: Mapping[str, tuple[str, Array]] | None = None,
     notes: Sequence[str] = (),
 ) -> str:
-    """Edit a URDF: replace the placements (4, 4), m, of some joints, with all digits, below notes.
+    """Edit a URDF: replace the origins (4, 4), m, of some joints, with all digits; ``notes`` become a comment on top.
 
     ``links`` are added: by their name the link that carries each by a fixed joint, and its (4, 4) placement there. The
     joint has the link's name and ``_joint``. A link that is carried so already is placed anew; it must have no other's
