@@ -91,7 +91,7 @@ class Readings:
         return settings.MISFIT * self.spread
 
     def still(self) -> Array:
-        """Median distance (...), m, of the measurements from the pose of a robot at rest."""
+        """Median distance (...), m, of the measurements from their own median pose, as a robot at rest would have."""
         away2 = _norm2(self.position - np.median(self.position, axis=-2, keepdims=True))
         if self.orientation is not None:
             seen = quaternion_to_rotation(self.orientation)
@@ -100,7 +100,7 @@ class Readings:
         return np.asarray(np.sqrt(middle(away2)))
 
     def align(self, *, coarse: bool = False, begun: Array | None = None) -> BaseAndTarget:
-        """Register the unknown frames robustly; ``coarse``: in few iterations from one start.
+        """Estimate the unknown base and target by robust registration; ``coarse``: in few iterations from one start.
 
         ``begun`` (..., P, 3) are other places of the target to start from, m.
         """
@@ -135,9 +135,9 @@ class Readings:
     def relaxed(self, weights: Array | None = None) -> tuple[Array, Array]:
         """Fit an affine map instead of a rigid motion to position and rotation of the tool frame (ridge regression).
 
-        Whatever it leaves no frames mend, nor another unit, an exchanged or a mirrored axis of the instrument. Rows
-        have ``weights`` (..., N); alike where absent. Returns (..., N) distances, of the median distance that a robot
-        at rest leaves, and (..., 3) the target on the tool, m.
+        Its residual bounds from below that of any frames, unit, and exchanged or mirrored axes of the instrument. Rows
+        have ``weights`` (..., N), equal ones by default without outliers. Returns distances (..., N), over the median
+        distance that a robot at rest leaves, and the place (..., 3) of the target on the tool, m.
         """
         poses = self.poses
         if self.simulated_position is not None:
@@ -211,13 +211,13 @@ class Family(NamedTuple):
     made: Numbered
 
     def of(self, number: float) -> Proposal:
-        """Return the fault of a number."""
+        """Return the candidate fault of this family for one value of the number."""
         return Proposal(self.kind, *self.made(number))
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of fault."""
+    """Kind of data fault: its name, words and remedy, and the generators of its candidates."""
 
     name: str  # short, for those who count kinds
     says: str  # what is wrong, ``{}`` standing for the place
@@ -232,12 +232,12 @@ class Kind:
         return [Proposal(self, *found) for found in self.proposals(readings)]
 
     def families(self, readings: Readings) -> list[Family]:
-        """Families of this kind that differ by a number."""
+        """Families of candidates of this kind, each of faults that differ by a real number."""
         return [Family(self, *found) for found in self.offsets(readings)]
 
 
 def _changed(column: str, change: Callable[[Array], Array]) -> Repair:
-    """Repair that changes one column in the rows concerned."""
+    """Return a repair that applies a function to one column, in the affected rows alone."""
 
     def repair(readings: Readings, struck: Rows) -> Readings:
         return _combined(lambda own: np.where(struck[:, None], change(own), own), [readings], [column])
@@ -251,7 +251,7 @@ def _mapped(column: str, matrix: Array, shift: Array | float = 0.0) -> Repair:
 
 
 def _but(size: int, where: Sequence[int], value: float) -> Array:
-    """Diagonal matrix (size, size) of ones, but for one value in some places."""
+    """Diagonal matrix (size, size) of ones, with ``value`` at the places ``where``."""
     return np.diag(np.where(np.isin(np.arange(size), where), value, 1.0))
 
 
@@ -381,7 +381,7 @@ def _converted(taken: str, meant: str, factor: float = 1.0) -> Repair:
 
 
 def _orientation_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str, Repair]]) -> Kind:
-    """Kind of fault of measured orientations."""
+    """Make a kind of fault from given proposals, which apply only to readings with measured orientations."""
     found = tuple(proposals)
     return Kind(name, says, remedy, lambda readings: () if readings.orientation is None else found)
 
@@ -484,7 +484,7 @@ def _resampled(
     least: float | None = None,
     in_rows: bool = False,
 ) -> Readings:
-    """Interpolate joint positions at shifted times; from weight ``least`` on take the next row."""
+    """Interpolate columns linearly at times shifted ``by`` s, or rows; with ``least``, take one row of the two."""
     clock = np.arange(len(struck), dtype=float) if in_rows else np.asarray(readings.clock)
     first, second, part, inside = _bracketing(clock, by)
     later = (part if least is None else part >= least)[:, None]
@@ -496,7 +496,7 @@ def _resampled(
 
 
 def _unmixed(readings: Readings, struck: Rows, by: float, sign: float, columns: Sequence[str]) -> Readings:
-    """Invert a linear interpolation w = A u with two entries a row of A by its pseudo-inverse."""
+    """Undo the linear interpolation of columns at times shifted ``by`` s, by the pseudo-inverse of its matrix."""
     first, second, part, _ = _bracketing(np.asarray(readings.clock), sign * by)
     own, matrix = np.arange(len(part)), np.zeros((len(part), len(part)))
     matrix[own, np.where(struck, first, own)] = np.where(struck, 1.0 - part, 1.0)

@@ -77,7 +77,7 @@ class Repaired:
 
     @property
     def median(self) -> float:
-        """Median distance, m, by which the reduction of the gap is judged."""
+        """Median distance after the repair, m, by which the reduction of the gap is judged."""
         return float(np.median(self.distance))
 
     @property
@@ -118,11 +118,11 @@ class AffectedRows:
 
     @property
     def count(self) -> int:
-        """Number of rows on which candidates are compared, less three where frames are fitted."""
+        """Effective number of rows on which candidates are compared: the sample's, less three if frames are fitted."""
         return max(min(int(self.rows.sum()), settings.SAMPLED) - (3 if self.frames is None else 0), 0)
 
     def is_chance(self, fall: float, asked: int) -> bool:
-        """Bonferroni test: whether one of so many candidates may reduce the gap so far by chance."""
+        """Bonferroni test: whether one of ``asked`` candidates may reduce the gap by the factor ``fall`` by chance."""
         return bool(self.count * np.log(fall) < np.log(asked / LEVEL))
 
     def mended(self, fault: Fault) -> Readings:
@@ -150,7 +150,7 @@ class AffectedRows:
     def improved_rows(self, found: Repaired) -> Rows:
         """Rows (N,) that fit better with the repair than without.
 
-        Rows that nothing mends, and those that are not determined, count as the others.
+        All affected rows if nearly all of those that the repair determines fit better.
         """
         mended = self.mended(found.fault)
         frames = self.frames or mended.take(spread(np.flatnonzero(mended.known))).align(begun=found.place[None])
@@ -174,7 +174,7 @@ def part_of(readings: Readings, begun: BaseAndTarget) -> AffectedRows | None:
 
 
 def _strays(readings: Readings, distance: Array) -> Rows:
-    """Outliers (N,) relative to the quantile of distances that counts as near."""
+    """Mask (N,) of outliers: distances above ``STRAY`` times their ``NEAREST`` quantile."""
     near = float(np.quantile(distance, settings.NEAREST))
     return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * readings.tolerance))
 
@@ -204,8 +204,8 @@ def consensus(sample: Readings) -> BaseAndTarget:
 def mixture(struck: AffectedRows) -> AffectedRows | None:
     """Two-component mixture of unrepaired and repaired rows for each fault; returns the best one's repaired rows.
 
-    It serves robots whose own errors are not small beside the fault, so that no row is an outlier. Rows are classified
-    anew in each round; the choice counts against the fault as one bit a row.
+    It serves robots whose own errors are not small against the fault, so that no row is an outlier. Rows are classified
+    anew in each round. ``None`` if the gap falls no more than chance allows; each row's choice counts as a factor of 2.
     """
     readings = window(struck.readings)
     rows, every = spread(np.arange(len(readings.q)), settings.RELAXED), np.ones(len(readings.q), dtype=bool)
@@ -238,13 +238,13 @@ Chosen = list[tuple[Fault, Array, float]]
 
 
 class Screen:
-    """Candidate faults of some rows, screened on few rows before the full comparison."""
+    """Search over candidate faults of some rows, screened on a few rows before the full comparison; counts them."""
 
     def __init__(self, struck: AffectedRows) -> None:
         self.struck, self.asked = struck, 0
 
     def singly(self) -> list[Repaired]:
-        """Single faults with known frames: distances on a few rows."""
+        """Repair each single fault, with the known frames, and return its distances on a few rows."""
         parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(KINDS)]
         frames = self.struck.frames
         assert frames is not None
@@ -252,7 +252,7 @@ class Screen:
         return [Repaired(own, part.distance(frames), frames.tool[:3, 3]) for own, part in parts if part is not None]
 
     def both_sides(self) -> list[Repaired]:
-        """Faults of the joints, of the measurements, and pairs with one of each: distances on a few rows."""
+        """Distances on a few rows for faults of the joints, of the measurements, and pairs with one of each."""
         joints = self._prescreened([(), *((p,) for p in self._of_joints)])
         measured = [*self._proposals(MEASUREMENT_KINDS)]
         units, axes, turns = ([p for p in measured if p.kind in kinds] for kinds in (UNITS, AXES, TURNS))
@@ -269,7 +269,7 @@ class Screen:
         return self._screened([own for own in more if len(own[0]) <= 2], turns=True)
 
     def two_of_joints(self) -> list[Repaired]:
-        """Pairs of faults of the joints, including sign reversals of any number of joints with another fault."""
+        """Distances on a few rows for pairs of faults of the joints, such as many sign reversals with another fault."""
         turned = [p for p in self._of_joints if p.joints][: settings.PAIRED_PATTERNS]
         others = [p for p in self._of_joints if not p.joints]
         scores: list[Array] = []
@@ -301,7 +301,7 @@ class Screen:
                     yield best
 
     def _refined(self, family: Family) -> Proposal | None:
-        """Best fault of a family: best of the grid, then refined between its neighbours."""
+        """Best fault of a family by grid search, then bounded search; ``None`` if the gap hardly falls at the best."""
         if len(family.tried) < 3:
             return None
         struck = self.struck
@@ -329,7 +329,7 @@ class Screen:
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
     def _prescreened(self, faults: Sequence[Fault]) -> Chosen:
-        """Faults with the smallest residual of an affine map, refitted once without outliers."""
+        """Faults with the smallest median residual of an affine map, refitted once with Cauchy's weights."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
         if not own:
@@ -345,7 +345,7 @@ class Screen:
     def _screened(self, chosen: Chosen, *, turns: bool = False) -> list[Repaired]:
         """Faults with their rigid-registration residual on a few rows, if measured points extend as far as the motion.
 
-        Those of which even a map leaves more than a mend may are passed over.
+        Faults of which even an affine map leaves more than a repair may are skipped.
         """
         self.asked += len(chosen)
         chosen = [own for own in chosen if own[2] <= settings.NEAR * settings.STILL[max(len(own[0]), 1) - 1]]
@@ -362,7 +362,7 @@ class Screen:
 
 
 def _extends(readings: Readings) -> bool:
-    """Whether distances among measured points are about those among predicted points."""
+    """Whether measured points and predicted points have the same extent within the factor ``EXTENT``."""
     points = readings.poses[:, :3, 3] if readings.simulated_position is None else readings.simulated_position
     one, other = (float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points))
     return max(one, other) <= settings.EXTENT * min(one, other)
@@ -393,7 +393,7 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
 def repairs(struck: AffectedRows) -> list[Repaired]:
     """Faults whose repair cannot be told apart by their residuals, in the order of their kinds; empty without any.
 
-    Two faults at once are told where they leave so much less than one that it is no chance.
+    Pairs of faults are returned where they leave significantly less than the best single fault.
     """
     screen = Screen(struck)
     if struck.frames is not None:
@@ -411,7 +411,7 @@ def repairs(struck: AffectedRows) -> list[Repaired]:
 
 
 def _best(screen: Screen, tried: Sequence[Repaired], before: float) -> list[Repaired]:
-    """Faults that reduce the gap, m, far enough, and nearly as far as the best of them."""
+    """Faults that reduce the gap from ``before``, m, significantly, with a log likelihood near that of the best."""
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
     full = [own for t in likely if (own := struck.tried(t.fault, t.place)) is not None]
@@ -462,7 +462,7 @@ def _data_fault(campaign: Campaign, struck: AffectedRows, found: Sequence[Repair
 
 
 def _words(alike: Sequence[Repaired]) -> str:
-    """Describe a fault: what is wrong, in which place, and what else is."""
+    """Describe alternatives of one kind, or pair of kinds, in words: what is wrong, and in which places."""
     parts = []
     for k, proposal in enumerate(alike[0].fault):
         *others, last = dict.fromkeys(t.fault[k].place for t in alike)

@@ -68,7 +68,7 @@ class Recalibrated:
 
     @classmethod
     def of(cls, readings: Readings, parts: NDArray[np.int64], begun: Robot) -> Recalibrated:
-        """Calibrate from another start, such as a robot with longer links."""
+        """Calibrate by Gauss-Newton from a robot ``begun``, with base and target of each part registered to it."""
         own = [replace(readings.take(np.flatnonzero(parts == part)), robot=begun).align() for part in np.unique(parts)]
         bases, tools = np.stack([frames.base for frames in own]), np.stack([frames.tool for frames in own])
         found = cls(readings, parts, begun, bases, tools[:, :3, 3], tools[:, :3, :3], _prior(readings.robot))
@@ -97,9 +97,9 @@ class Recalibrated:
         return shift, log3(back @ own.rotations[index])
 
     def farthest(self) -> tuple[str, float, float, float]:
-        """Joint that is displaced most from the URDF, by how much, m, its standard deviation, and times the median.
+        """Joint displaced most from the URDF, by how much and its standard deviation, m, and over the median of all.
 
-        A slide's own way is its zero and does not count.
+        Displacement along the axis of a prismatic joint is its zero, and does not count.
         """
         (shift, _), index, chain = self.moved, self._elements, self.robot.chain
         axes = chain.axes[index] * (chain.kinds[index] == PRISMATIC)[:, None]
@@ -119,7 +119,7 @@ class Recalibrated:
     def left(self) -> tuple[float, float]:
         """Robust residual size, corrected for the unknowns: distance, m, and rotation, rad.
 
-        As medians tell them: few rows that nothing explains do not count.
+        From medians over the rows, so that few rows that nothing explains do not count.
         """
         gap = self._seen[2]
         unknown = 6 * len(self._segments) + len(self.bases) * (6 + gap.shape[1])
@@ -132,7 +132,7 @@ class Recalibrated:
     def _seen(self) -> tuple[ChainFrames, Array, Array]:
         """Frames of the chain, (N, 3) target and (N, m) measured − predicted in the root frame's axes.
 
-        The latter in m; turns times the length of a lever.
+        The latter in m; rotations are multiplied by the lever ``LEVER``.
         """
         readings, parts = self.readings, self.parts
         frames = chain_frames(self.robot, readings.q)
@@ -201,7 +201,7 @@ class Recalibrated:
         return np.concatenate(both, axis=2) * lever[:, None]
 
     def _ahead(self, step: Array, frames: int) -> Recalibrated:
-        """Apply a step to frames and joints."""
+        """Calibration after a step (frames, then 6 J) of bases, targets and joint placements."""
         by_part, by_joint = step[:frames].reshape(len(self.bases), -1), step[frames:].reshape(-1, 6)
         index = self._elements
         chain = self.robot.chain
@@ -220,7 +220,7 @@ class Recalibrated:
 def _prior(robot: Robot) -> Array:
     """Prior precision (6 J, 6 J) of translations, axis rotations and joint zeros.
 
-    Where a joint is shifted along the axis before it that axis' own joint may as well be: the shift is that one's.
+    A shift of a joint along the axis of the joint before it is an equivalent shift of that one; it is held at zero.
     """
     chain, frames = robot.chain, chain_frames(robot, np.zeros((1, robot.n)))
     index = [segment.index for segment in robot.segments if segment.movable]
@@ -264,7 +264,7 @@ def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
 
 @cache
 def _movable(name: str) -> frozenset[str]:
-    """Movable joints of a shipped robot; empty where it cannot be read."""
+    """Names of the movable joints in a shipped robot's URDF; empty where it cannot be read."""
     try:
         joints = ElementTree.fromstring(urdf_text(name).text).iter("joint")
     except (RobotError, ElementTree.ParseError):
@@ -274,7 +274,10 @@ def _movable(name: str) -> frozenset[str]:
 
 @cache
 def _chain(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str, tool: str) -> Robot | None:
-    """Chain of a shipped robot with the same end links, else one that ends at a hand."""
+    """First chain of a shipped robot whose joints turn and slide in this order, with these names if it has them all.
+
+    ``None`` without one: between the given end links, or from its root to a leaf.
+    """
     alike = set(joints) <= _movable(name)
     if not alike and not len(joints) <= len(_movable(name)) <= len(joints) + settings.HAND_JOINTS:
         return None
@@ -326,7 +329,7 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
 
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
-    """Verdict of a calibration: another motion, another model, or ``None`` where a robot may err so much."""
+    """Verdict of a calibration by residual, displacement and length factor: another motion or model; else ``None``."""
     (away, turned), (joint, far, deviation, times) = found.left(), found.farthest()
     if turned > settings.ANOTHER_TURN:
         places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
@@ -339,7 +342,7 @@ def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
 
 
 def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Part (N,) of each row: its session, or its quarter of the campaign."""
+    """Part (N,) of each row: its session if all have enough rows, else its quarter (or larger part) of the campaign."""
     sessions = campaign.labels.get("session")
     if sessions is not None:
         _, parts, counts = np.unique(sessions[rows], return_inverse=True, return_counts=True)
@@ -350,12 +353,12 @@ def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _left(readings: Readings) -> float:
-    """Median distance, m, after registration alone."""
+    """Median distance, m, of measured from predicted positions after registration of base and target alone."""
     return float(np.median(readings.distance(readings.align())))
 
 
 def _lengthened(readings: Readings) -> tuple[float, Robot]:
-    """Return the common length factor that fits best, and the robot with its links scaled by it."""
+    """Scale of all links with the least median distance after registration, by bounded search, and the scaled robot."""
     robot = readings.robot
     measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
     first = np.log(max(measured, settings.LEAST_GAP) / readings.spread)
@@ -376,7 +379,7 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
 def mismatch(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
     """Test before any effect whether robot and table match: unit of the URDF, data faults, another robot.
 
-    A fault that leaves a gap no robot leaves is none where another robot leaves clearly less.
+    A data fault whose repair leaves more than the tolerance gives way to another robot that leaves clearly less.
     """
     if campaign.position is None:  # every question below is about the columns of an instrument
         return None
@@ -393,7 +396,7 @@ def mismatch(campaign: Campaign, progress: Callable[[str], None] = lambda _: Non
 
 
 def _leaves(other: Misfit) -> float:
-    """Residual of another robot, m: of a shipped one that fits, else of this one with scaled links."""
+    """Residual of another robot, m: of a shipped one that fits, else of the calibration; infinite without a model."""
     if other.model is None:
         return np.inf
     return other.model.remains if other.model.fits else other.away or 0.0
@@ -409,7 +412,7 @@ def another_motion(fitted: Fit) -> Misfit | None:
 
 
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
-    """Conclusion of a converged Gauss-Newton fit; else that of the frames alone, with the reason."""
+    """Return a conclusion if its Gauss-Newton fit converged; else that of the frames alone, with a note why."""
     note = unconverged(last.fit)
     return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
