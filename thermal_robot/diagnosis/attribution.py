@@ -228,7 +228,7 @@ def _driver(observations: Observations, effect: Effect, parameters: list[Paramet
 
 
 def _line(values: Array, error: Array) -> Array:
-    """Fitted law (2, k) over its quantity; means of neighbouring rows where it depends on other quantities, too."""
+    """Points (2, k) of an effect's line over a quantity: the law itself if smooth in it, else means of near rows."""
     levels = np.unique(values)
     if len(levels) <= FEW_LEVELS:
         return np.array([levels, [error[values == level].mean() for level in levels]])

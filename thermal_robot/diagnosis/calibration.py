@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One effect of a calibration with its estimates; ``title`` is what it is in plain words.
+    """One effect of a calibration with its estimates; ``title`` is its name in plain words.
 
     ``unseen`` are parameters that the data do not tell from those before them, or from the frames; ``inside`` is the
     larger effect that was fitted, of which this is a part or the rest.
@@ -102,7 +102,7 @@ class Calibration:
 
     @property
     def unexplained(self) -> bool:
-        """Whether the residual is larger, or more structured, than noise."""
+        """Whether the residual is significantly larger, or more structured, than noise: the tests of a diagnosis."""
         return self._examined.unexplained.flagged
 
     @cached_property
@@ -234,7 +234,7 @@ _libraries = cache(ThreadpoolController)
 
 
 def _named(effects: str | Effect | Sequence[str | Effect]) -> tuple[Effect, ...]:
-    """Look up the effects to calibrate; refuse random ones and duplicates."""
+    """Look up the effects to calibrate by name; :class:`EffectError` for none, random ones and duplicates."""
     where, what = "calibrate(), effects", "names of effects, or effects of your own"
     require(where, effects, (str, Effect, list, tuple), what)
     given = (effects,) if isinstance(effects, (str, Effect)) else tuple(effects)

@@ -45,8 +45,8 @@ Share = tuple[float, tuple[float, float]]
 class Model:
     """Ridge regression of frames and K parameters on any subset of the rows.
 
-    ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
-    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows that count
+    ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), tiny for
+    those held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows that count
     in the score; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations are weighted
     by their own residuals, as in a registration, and not by their noise.
     """
@@ -71,8 +71,8 @@ class Model:
     def partial(self, nominal: Linear, values: Sequence[Array] = ()) -> Model:
         """Model for fits of subsets of the effects: linearised at the nominal robot, a block for each effect.
 
-        The prior size of each is that of its ``values`` in the whole model. The residual counts as noise, which exceeds
-        a smooth discrepancy. At the corrected robot, frames that are exact aliases would seem separable.
+        The prior size of each is that of its ``values`` in the whole model. Rows count as independent, and the residual
+        of each fit as noise. At the corrected robot, effects that the frames absorb exactly would seem separable.
         """
         pairs = list(zip(values, nominal.blocks, strict=True))
         sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in pairs]
@@ -107,7 +107,7 @@ class Model:
     def products(self, rows: Rows) -> Array:
         """Gram matrices (G, K + 1, K + 1) Xᵀ V⁻¹ X of columns and gap over some rows with covariance V; cached.
 
-        G is two where positions and orientations count apart, else one. Where rows have a smooth discrepancy in common,
+        G is two where positions and orientations count apart, else one. Where rows have a discrepancy in common,
         V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
         """
         key = rows.tobytes()
@@ -183,7 +183,7 @@ class Model:
         return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), gap])
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> Array:
-        """Ridge estimates (S, k + 1), −θ and 1, on each subset of rows; the noise is that of all rows."""
+        """Ridge estimates θ on each of S subsets of rows, as (S, k + 1) rows −θ, 1; the noise is that of all rows."""
         picked = self.columns(chosen)
         tight = self.prior_precision[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
@@ -207,7 +207,7 @@ def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Leave-one-fold-out fits and their residuals on the fold; ``tests`` are the rows (N,) of each fold."""
+    """Leave-one-fold-out fits and their residuals on the fold; ``tests`` are masks (N,) of the rows of each fold."""
 
     model: Model
     tests: tuple[Rows, ...]
@@ -263,10 +263,11 @@ def jackknife(values: Array) -> Array:
 
 
 def share(part: Array, whole: Array) -> Share:
-    """Ratio of two sums of squares (1 + B,), 0 where the second is 0, with its 95 % jackknife interval.
+    """Ratio of two sums of squares (1 + B,), of all rows and without each block, with its 95 % jackknife interval.
 
     The interval is that of Student's law about ln(1 − part/whole), with the jackknife's variance: one minus a share is
-    a ratio of mean squares, so that its logarithm is nearly normal. It is not exact for a handful of blocks.
+    a ratio of mean squares, so that its logarithm is nearly normal. It is not exact for a handful of blocks. The ratio
+    is 0 where the second sum is 0.
     """
     if whole[0] <= 0.0:
         return 0.0, (0.0, 0.0)
@@ -283,8 +284,8 @@ def share(part: Array, whole: Array) -> Share:
 def _half_width(values: Array) -> float:
     """Half width of the 95 % jackknife interval of a figure from its (B,) leave-one-block-out values.
 
-    Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance told by B values of kurtosis κ has
-    2 B/(κ − 1). A normal law's are about B; where a block or two make up most of the variance, few.
+    Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance from B values of kurtosis κ has
+    2 B/(κ − 1), about B for normal values, few where one or two blocks make up most of the variance.
     """
     count, apart = len(values), (values - values.mean()) ** 2
     if not apart.any():
@@ -373,7 +374,7 @@ def shrinkage(
 
 
 def _outside_model(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
-    """Most probable setting beside the model, and its scale, of each effect outside the model."""
+    """For each effect outside the model, the block that the likeliest model with one block more adds, and its scale."""
     best = explanation.best.blocks
     found: dict[int, float] = {}
     for rival in sorted(explanation.combinations, key=lambda c: -c.log_evidence):
@@ -386,7 +387,7 @@ def _outside_model(explanation: Explanation, families: Sequence[str]) -> dict[in
 
 
 def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[int]], Array]) -> Array:
-    """Shapley value (1 + B,) of an effect: its mean gain over all orders in which effects join."""
+    """Shapley value (1 + B,) of an effect: mean reduction of held-out squares over all orders in which effects join."""
     others, value = sorted(players - {player}), np.zeros_like(squares(players))
     for size in range(len(players)):
         weight = 1.0 / (len(players) * comb(len(others), size))
@@ -398,8 +399,8 @@ def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     """Cross-validate by time, session, temperature, region, reach and range; sorted by rms, the largest first.
 
-    Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. A scheme is left out if
-    the campaign lacks its column; a fold if its training rows do not determine the frames.
+    The first need not have the smallest shrinkage, as the gap before may be larger on its rows, too. A scheme is left
+    out if the campaign lacks its column; a fold if its training rows do not determine the frames.
     """
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.partial(fit.before)
@@ -442,12 +443,12 @@ def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
 
 
 def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
-    """Scheme with the largest held-out rms where that clearly exceeds the average; else ``None``."""
+    """Scheme with the largest held-out rms if that exceeds the ``average`` by a factor ``HARDER``; else ``None``."""
     return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
 
 
 def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
-    """Scheme, by session or region, in which the correction increases the held-out rms; else ``None``."""
+    """First scheme, by session or region, in which the correction increases the held-out rms; ``None`` without one."""
     return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 

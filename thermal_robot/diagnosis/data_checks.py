@@ -157,7 +157,7 @@ def counted(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def contradicted(campaign: Campaign) -> list[str]:
-    """Warnings where encoder readings contradict the commands, so that the log is wrong and not the robot."""
+    """Warnings where encoder readings differ from the commands by more than ``CONTRADICTED``: a fault of the log."""
     found = []
     for j, name in enumerate(campaign.robot.joint_names):
         read = campaign.covariates.get(f"encoder.{name}")
@@ -190,7 +190,7 @@ def with_corrected_signs(campaign: Campaign, own: Sequence[Effect] = ()) -> Camp
 
 
 def _against_gravity(campaign: Campaign) -> Iterator[str]:
-    """Note on reported torques whose sign is opposite to the holding torque against gravity."""
+    """Yield a note if reported torques correlate negatively with the holding torques of the URDF's masses."""
     robot = campaign.robot
     columns = {j: f"torque.{name}" for j, name in enumerate(robot.joint_names)}
     joints = [j for j, column in columns.items() if column in campaign.covariates]
@@ -209,7 +209,7 @@ def _against_gravity(campaign: Campaign) -> Iterator[str]:
 
 
 def _against(campaign: Campaign, own: Sequence[Effect], tried: set[str]) -> str | None:
-    """Untried quantity whose reversal has the largest evidence; ``None`` where none gains clearly."""
+    """Quantity, not yet ``tried``, whose reversal raises the evidence most; ``None`` where none raises it clearly."""
     linear, sides = _linear(campaign, own)
     if not any((names != "").any() for names in sides):
         return None
@@ -254,7 +254,7 @@ def _linear(campaign: Campaign, own: Sequence[Effect]) -> tuple[Linear, list[NDA
 
 
 def _sign_scores(free: Explanation, sides: Sequence[NDArray[np.str_]]) -> dict[str, Array]:
-    """Z scores, by quantity, of the parameters whose sign that quantity decides."""
+    """Z scores (value over standard deviation), by quantity, of the parameters whose sign that quantity decides."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():
         deviation = np.sqrt(np.maximum(np.diag(covariance), settings.TINY))
@@ -272,7 +272,7 @@ def _agree(z: Array) -> bool:
 
 
 def _keeping_signs(linear: Linear, free: Explanation) -> Combination:
-    """Most probable combination whose parameters keep their signs; rows set aside count with their weights."""
+    """Likeliest combination of effects whose parameters keep their signs, by hill climbing; outliers down-weighted."""
     problem = gram(linear, replace(downweighted(free), smooth=None))
     effects = [item.effect for item in linear.blocks]
     apart = contained(problem) | exclusive_settings([effect.name for effect in effects])

@@ -117,7 +117,7 @@ def _asked_of(campaign: Campaign, effects: Sequence[Effect]) -> Sequence[Effect]
 
 @contextmanager
 def solvable(campaign: Campaign) -> Iterator[None]:
-    """Turn a failure of linear algebra into an :class:`EstimationError` about values of very different sizes."""
+    """Context that turns NumPy's ``LinAlgError`` into an :class:`EstimationError` about values of absurd sizes."""
     try:
         yield
     except np.linalg.LinAlgError as error:
@@ -128,7 +128,7 @@ def solvable(campaign: Campaign) -> Iterator[None]:
 
 
 def effect_names(only: Iterable[str] | None, without: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of effects to consider, none for all, and those to leave out; refuse what names nothing."""
+    """Validate names of effects to consider, empty for all, and to leave out; an error where ``only`` is empty."""
     if only is not None and not (only := _names("only", only)):
         raise CampaignError("diagnose(), only", "names no effect", expected="at least one, or only left out for all")
     return tuple(only or ()), _names("without", without)
@@ -147,7 +147,7 @@ def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
 def _concluded(
     campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Explain the gap, unless robot and table do not match: data faults are tested before faults of the robot."""
+    """Explain the gap by effects; by the frames alone where a test says that robot and table do not match."""
     misfit = mismatch(campaign, progress)
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
@@ -161,7 +161,7 @@ def _concluded(
 
 
 def _explained(fit: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Add unlisted terms to the known effects, prune all by one rule, then estimate what is random."""
+    """Forward selection of unlisted terms, backward elimination, estimation of scatter, and tests of the residual."""
     for number in range(1, 1 if of_model(fit.campaign) else settings.SELECTIONS):
         wider = forward_selection(fit, number, progress)
         if wider is None:

@@ -5,9 +5,9 @@ Without each fold frames and parameters are fitted; the file applies what it hol
 both predict the fold. Which parameters are too weak to be applied is decided once, on all rows, as the choice of
 effects is.
 
-What a file lacks, the parameters in it were fitted beside. Used without the rest of the model a file does better whose
-parameters are fitted **alone**: the constant effects without the others, or zeros without anything. The same folds say
-how much.
+Parameters of a file were fitted together with others that it lacks. Used without the rest of the model a file does
+better whose parameters are fitted **alone**: the constant effects without the others, or zeros without anything. The
+same folds say how much.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from thermal_robot.prediction import FileGap
 
 
 def file_gaps(fit: Fit, model: CorrectedModel) -> tuple[FileGap, ...]:
-    """Return the expected gap on rows held out with each kind of robot file: all, without the weak, fitted alone.
+    """Return the held-out rms gap with each robot file: all parameters, without weak ones, and parameters fitted alone.
 
-    Empty where nothing can be held out, the model does not say how sure it is, or a file can hold nothing of it.
+    Empty where nothing can be held out, the model has no uncertainty, or no parameter of it fits in a file.
     """
     if model.spread is None or not constant(model).responses[:, :-12].any():
         return ()
@@ -76,7 +76,7 @@ def _alone(fit: Fit, model: CorrectedModel, whole: Model, validation: CrossValid
 
 
 def _fits(fit: Fit, whole: Model, held: Sequence[tuple[Effect, Array]], rows: Sequence[Rows]) -> Array:
-    """Ridge estimates (S, P) of some effects of about given sizes and the frames, on each subset of the rows."""
+    """Ridge estimates (S, P) of effects beside the frames, on S subsets of rows; given values set the prior sizes."""
     linear = replace(fit.before, blocks=tuple(block(fit.nominal, effect).held for effect, _ in held))
     part = whole.partial(linear, [values for _, values in held])
     return np.asarray(-part.fits(rows, range(len(held)))[:, part.flat : -1])
@@ -87,7 +87,7 @@ class _Moved(Model):
 
     @classmethod
     def of(cls, fit: Fit, whole: Model) -> _Moved:  # type: ignore[override]
-        """Columns of a fit, weighted as in its explanation without a smooth discrepancy."""
+        """Build it from the Jacobians of a fit's nominal robot, weighted as in the fit, but with independent rows."""
         seen, measures = fit.nominal, fit.before.measures
         segments = seen.segment_sensitivity[:, :measures]
         columns = np.concatenate([seen.joint_sensitivity[:, :measures], segments.reshape(*segments.shape[:2], -1)], 2)
@@ -101,9 +101,9 @@ class _Moved(Model):
         return len(self.linear.blocks[0].sizes)
 
     def squares(self, validation: CrossValidation, displacements: Array) -> tuple[int, Array]:
-        """Return the number of rows held out and their squares (1 + F,), m²: of all, and without each fold's.
+        """Return the number of held-out rows and their squared residuals (1 + F,), m²: of all folds, and without each.
 
-        Displacements (F, n + 6 S) are applied, and frames are fitted, without each fold.
+        In each fold its displacements (F, n + 6 S) are applied, and frames are fitted to the other rows.
         """
         each_fold, rows = [], 0
         for test, own in zip(validation.tests, displacements, strict=True):

@@ -42,7 +42,7 @@ class Inside:
 
 
 def divided_effects(fit: Fit) -> dict[str, Inside]:
-    """Fitted effects that are reported in parts, by name, with these parts."""
+    """Estimates of the smaller effects, by name, that are reported inside a larger fitted effect, and of its rest."""
     found = {}
     for effect, _ in fit.effects:
         for part in divided(fit, effect.name):
@@ -215,7 +215,7 @@ def findings(
 
 
 def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
-    """Fields of a finding that only laws or effects with a curve for each joint have."""
+    """Fields of a finding that only discovered laws, or effects with several parameters for each joint, have."""
     e, values = fit.explanation, fitted_values(fit, block)
     law, _ = fit.effects[e.best.blocks.index(block)]
     parameters, spread = e.linear.blocks[block].parameters, e.values[block][1]
@@ -243,7 +243,7 @@ def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect], model: bool = False) -> tuple[Finding, ...]:
-    """Return the findings with titles: of the effect, in another ``model`` or the robot, or of a discovered law."""
+    """Return the findings with titles in plain words; ``model``: as worded where rows are another model's output."""
     known = {effect.name: effect for effect in effects}
     return tuple(
         replace(f, title=known[f.name].in_model if model else known[f.name].title, random=known[f.name].random)
@@ -261,7 +261,7 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """List groups of effects that the data cannot separate; one with an unknown frame only if it is the only one."""
+    """List groups of confounded effects; a group with an unknown frame only if there is no other group."""
     confounded = [tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded"]
     groups = tuple(dict.fromkeys(confounded))
     return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

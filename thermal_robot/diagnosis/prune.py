@@ -66,7 +66,7 @@ def forward_selection(fit: Fit, number: int, progress: Callable[[str], None]) ->
 
 
 def _ripple(fit: Fit) -> JointRipple | None:
-    """Ripple that a fit shows, if it is a candidate."""
+    """Significant waves in the residual as joint ripple; ``None`` without any, with very many rows, or if left out."""
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     return found if (found := waves(fit)).orders else None
@@ -134,7 +134,7 @@ def selected_with_scatter(
 
 
 def concluded(fit: Fit, left: ResidualAnalysis, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
-    """Conclusion of a fit: discovered laws are separated from what known effects explain."""
+    """Conclusion of a fit, in which what discovered laws explain counts as residual of the known effects."""
     laws = discovered(fit)
     unexplained = attributed_to_laws(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)
@@ -179,22 +179,22 @@ class HeldOutTest:
 
     @property
     def hardest(self) -> DensityGain:
-        """Gain under the scheme that speaks least for the effect."""
+        """Gain under the scheme in which the effect least probably raises the held-out density."""
         return min(self.gains, key=lambda gained: gained.chance, default=_NOT_ASKED)
 
     @property
     def clearly(self) -> bool:
-        """Whether the odds are nine that a scheme's held-out predictive density is lower with the effect."""
+        """Whether in some scheme the odds exceed nine that the held-out predictive density is lower with the effect."""
         return self.hardest.chance < 1.0 / (1.0 + settings.NAMING_ODDS)
 
     @property
     def harms(self) -> bool:
-        """Whether the held-out predictive density is lower with the effect."""
+        """Whether the held-out predictive density is lower with the effect: over blocks of rows, or :attr:`clearly`."""
         return self.blocked.nats < 0.0 or self.clearly
 
     @property
     def helps(self) -> bool:
-        """Whether the held-out predictive density is significantly higher with the effect."""
+        """Whether the density over blocks of rows is significantly (97.5 %) higher with the effect, and none harms."""
         return self.blocked.chance > settings.INTERVAL[1] and not self.harms
 
 
@@ -285,10 +285,10 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
 
 
 def odds_in_place(fit: Fit) -> dict[str, float]:
-    """Posterior odds of each effect and law against nothing in its place; of a law also against its alternatives.
+    """Posterior odds of each effect and law against nothing in its place, of a law at most those of place and quantity.
 
-    Alternatives of an effect do not count here: they are reported as confounded. The odds of a law include those of its
-    place and quantity.
+    Alternatives of an effect do not count here: they are reported as confounded. The odds are capped at
+    ``NAMING_ODDS``² times, for a law, the probability of its place and quantity.
     """
     odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
     told = {d.law.name: d.probability for d in discovered(fit)}
@@ -322,9 +322,9 @@ def unsupported(fit: Fit, inflated: Fit) -> dict[str, Refused]:
 
 
 def _refused(judged: HeldOutTest) -> Refused:
-    """Cross-validation result of a removed effect: probability from its prior and held-out densities, and share.
+    """Record why an effect is removed: probability from prior odds and held-out log density, and its held-out share.
 
-    The probability is at most the prior's, whatever other blocks of rows gain.
+    The probability is at most the prior's: a gain of density does not count.
     """
     said = judged.hardest if judged.clearly else judged.blocked
     return Refused(float(expit(log_odds() + min(judged.blocked.nats, 0.0))), said.share)

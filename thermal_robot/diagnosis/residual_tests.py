@@ -45,7 +45,7 @@ class Residual:
 
     @property
     def white(self) -> Array:
-        """Residual (N, m) divided by the noise."""
+        """Residual (N, m) divided by the noise, with the fitted columns projected out."""
         return self.target.white.reshape(len(self.rows), -1)
 
     def some(self, count: int) -> Residual:
@@ -190,7 +190,7 @@ def _lack_of_fit(left: Residual, again: Repeats | None) -> Outcome:
 
 
 def _autocorrelation(fit: Fit, left: Residual) -> Outcome:
-    """Permutation test of the autocorrelation of the residual, in joint space and in time."""
+    """Permutation test of the residual's correlation between neighbours in joint space, and in order of measurement."""
     q = fit.campaign.q[left.rows]
     q = q[:, q.std(axis=0) > settings.ROUNDING]
     white = left.white / np.sqrt((left.white**2).mean(axis=0) + settings.TINY)
@@ -353,7 +353,7 @@ def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: i
 
 
 def _asked(observations: Observations) -> dict[str, Array]:
-    """Quantities over which outliers may cluster, with words for each: all recorded, torques, approach times torque.
+    """Quantities (N,) by name over which outliers may cluster: all recorded, joint torques, approach times torque.
 
     The product's sign tells whether gravity presses a joint towards the side from which it came.
     """

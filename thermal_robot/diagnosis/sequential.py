@@ -50,7 +50,7 @@ class Point(NamedTuple):
 
 
 class Judge(NamedTuple):
-    """Fixed model of a diagnosis for weights of new rows: point, residual sigma (m,), m and rad, row count."""
+    """Fixed model that gives new rows their weights: linearisation point, residual sigma (m,), m and rad, row count."""
 
     point: Point
     sigma: Array
@@ -84,7 +84,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class WeightedRows:
-    """Measured rows with robust weights (n,), 0 where set aside, and the mask of those."""
+    """Measured rows with robust weights (n,), 0 where set aside, and the mask ``aside`` (n,) of those."""
 
     campaign: Campaign
     weights: Array
@@ -108,7 +108,7 @@ class WeightedRows:
         return cls(appended([one.campaign for one in batches]), np.concatenate(weights), np.concatenate(aside))
 
     def take(self, which: NDArray[np.int64] | NDArray[np.bool_] | slice) -> WeightedRows:
-        """Return some of the rows."""
+        """Return the rows selected by number, mask or slice."""
         numbers = np.arange(len(self.aside))[which]
         return WeightedRows(self.campaign.take(numbers), self.weights[numbers], self.aside[numbers])
 
@@ -148,14 +148,14 @@ def joined(parts: Sequence[Array]) -> Array:
 
 
 def products(stack: Array, weights: Array) -> Array:
-    """Gram matrices (G, K + 1, K + 1) of columns (N, m, K + 1) with weights, of positions and of orientations."""
+    """Weighted Gram matrices (G, K + 1, K + 1) of columns (N, m, K + 1), of positions and, if G = 2, orientations."""
     n, m, k = stack.shape
     parts = (stack.T * np.sqrt(weights).T).T.reshape(n, m // 3, 3, k).swapaxes(0, 1).reshape(m // 3, 3 * n, k)
     return np.asarray(parts.swapaxes(1, 2) @ parts)
 
 
 def carried(sums: Array, step: Array) -> Array:
-    """Gram matrices (…, K + 1, K + 1) after a step (k,): the gap less the first k columns times the step."""
+    """Gram matrices (…, K + 1, K + 1) after a step (k,) of the parameters: the gap less the first k columns · step."""
     change = np.eye(sums.shape[-1])
     change[: len(step), -1] = -step
     return np.asarray(change.T @ sums @ change)
@@ -165,11 +165,11 @@ def carried(sums: Array, step: Array) -> Array:
 class Guard:
     """Trust region of the sums: how far parameters and limits may move before the weight of a summed row changes.
 
-    Steps up to √(δᵀAδ) = ``reach`` are safe, A (k, k) the ``metric``, positive. ``share`` and ``typical``: how far a
-    step of 1 moves a row, at most and in the root mean square, in units of the noise, of the median row and over all;
-    limits may move by as much beside. ``sigma`` (m,): the unit of distances. ``medians`` (G,): median distance;
-    ``huber_threshold``: that from which on a row is in the tail. ``quiet``: noise is stated, and no more than its slack
-    remains, so that medians bear on nothing.
+    Steps δ up to √(δᵀAδ) = ``reach`` are safe, A (k, k) the ``metric``, positive. In units of the noise a step of
+    length 1 moves the median row by at most ``share``, and all rows by ``typical`` in the root mean square; limits may
+    move as far. ``sigma`` (m,): the unit of distances. ``medians`` (G,): median distance; ``huber_threshold``: distance
+    beyond which a row is down-weighted. ``quiet``: noise is stated and the residual within its slack, so that medians
+    have no effect.
     """
 
     metric: Array
@@ -187,7 +187,7 @@ class Guard:
         return np.asarray(np.linalg.norm(white, axis=2))
 
     def scores(self, stack: Array, weights: Array) -> Array:
-        """Trust-region radius (N,) up to which each row, (N, m, K + 1), keeps its weight; −1 where it has none."""
+        """Trust-region radius (N,) within which each row, (N, m, K + 1), keeps weight 1; −1 for rows of less weight."""
         parts = self.distances(stack)
         score = (self.huber_threshold - np.linalg.norm(parts, axis=1)) / (
             moves(stack, self.metric, self.sigma) + self.share
@@ -221,8 +221,8 @@ class Sums:
     """Sufficient statistics of rows: Gram matrices and counts.
 
     ``products`` (2, G, K + 1, K + 1): of rows with weight, in the units of :func:`linearised`, and of rows not set
-    aside, m and rad. ``counts`` (3,): how many there are, have weight, are not set aside; ``below`` (G,): nearer than
-    the median. ``guard`` says how far it holds; ``None`` where rows keep their weights, or there are none.
+    aside, m and rad. ``counts`` (3,): of all rows, those with weight, those not set aside; ``below`` (G,): of rows
+    nearer than the median. ``guard``: trust region in which they hold; ``None`` where weights are fixed, or no rows.
     """
 
     products: Array
@@ -232,7 +232,7 @@ class Sums:
 
     @classmethod
     def of(cls, stack: Array, rows: WeightedRows, guard: Guard | None = None) -> Sums:
-        """Sufficient statistics of rows with columns (N, m, K + 1) at the linearisation point."""
+        """Sum rows to sufficient statistics: their Gram matrices from columns (N, m, K + 1), and counts."""
         below = np.zeros(stack.shape[1] // 3, dtype=np.int64)
         if guard is not None:
             below = (guard.distances(stack) < guard.medians).sum(axis=0)
@@ -245,7 +245,7 @@ class Sums:
         return replace(self, **{name: getattr(self, name) + sign * getattr(other, name) for name in names})
 
     def after(self, step: Array, columns: int) -> Sums:
-        """Statistics of the first columns and the residual after a step of the parameters."""
+        """Statistics with the first ``columns`` − 1 columns and the residual, after a step of the parameters."""
         own = np.r_[: columns - 1, -1]
         return replace(self, products=carried(self.products[..., own[:, None], own], step))
 
@@ -254,10 +254,10 @@ class Sums:
 class State:
     """State of the iteration: point, step (k,) since the sums were linearised, rows kept one by one, noise.
 
-    ``sigma`` (m,) and ``held``: whitening noise and its prior's degrees of freedom. ``leverage``: share of the
-    equations that is fitted. ``best``: prior scales and noise, if known. ``medians`` (G,) and ``huber_threshold``, in
-    units of ``sigma``: median distance of rows, and that from which on one counts less;
-    ``steady``: the median is a row's.
+    ``sigma`` (m,) and ``held``: whitening noise and its prior's degrees of freedom. ``leverage``: degrees of freedom
+    fitted, over the number of equations. ``best``: prior scales and noise, if known. ``medians`` (G,) and
+    ``huber_threshold``, in units of ``sigma``: median distance of rows, and distance beyond which one is down-weighted;
+    ``steady``: whether the median lies among the rows kept one by one.
     """
 
     point: Point
@@ -274,10 +274,10 @@ class State:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted(State):
-    """Converged fit of a choice to all rows: ``values`` are mean and covariance by effect, ``gram`` its problem.
+    """Converged fit of a choice to all rows: ``values`` are mean and covariance by effect, ``gram`` its linear problem.
 
-    ``products`` (k + 1, k + 1) in units of ``sigma``, the gap at the point. ``squares`` (G,): sum of squares, m² and
-    rad², over ``count`` rows not set aside. ``steady``: it is the fixed point, too.
+    ``products``: Gram matrix (k + 1, k + 1) in units of ``sigma``, the gap at the point. ``squares`` (G,): sum of
+    squares, m² and rad², over ``count`` rows not set aside. ``steady``: also that the iteration has converged.
     """
 
     best: Combination
@@ -313,7 +313,7 @@ class Fitted(State):
 
 
 def converged_fit(choice: Choice, sums: Sums, begin: State) -> Fitted:
-    """Fit a choice to summed and single rows by fixed-point iteration; the result does not depend on the start."""
+    """Fit a choice to summed and single rows by fixed-point iteration, from any start; not ``steady`` if it fails."""
     for _ in range(own_settings.REST_ROUNDS):
         found, size = _round(choice, sums, begin)
         before = np.e * found.best.noise if begin.best is None else begin.best.noise
@@ -325,7 +325,7 @@ def converged_fit(choice: Choice, sums: Sums, begin: State) -> Fitted:
 
 
 def _round(choice: Choice, sums: Sums, begin: State) -> tuple[Fitted, float]:
-    """One iteration: weights, prior scales, noise, Gauss-Newton step; also returns the step's length in noise."""
+    """One iteration: weights, prior scales, noise, Gauss-Newton step; also the step's length in units of the noise."""
     campaign, point = begin.rows.campaign, begin.point
     stack, names = linearised(campaign, point, choice), unknown_frames(campaign)
     state, flat = weighed(choice, sums, begin, stack[:, :, -1]), len(names)
@@ -364,7 +364,7 @@ def normal(choice: Choice, total: Sums, state: State, rivals: bool = False) -> t
 
 
 def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
-    """Huber weights (1964) of the single rows from their residual (n, m), and the noise of all rows."""
+    """Set Huber's weights (1964) of the single rows from their residual (n, m), and the noise from all rows' median."""
     if choice.judge is not None:
         return replace(state, steady=True)
     count, measures, rows, guard = len(gap), choice.measures, state.rows, sums.guard
@@ -393,7 +393,7 @@ def axis_noise(medians: Array, leverage: float) -> Array:
 
 
 def huber_threshold(measures: int, leverage: float, sigma: Array, scale: Array) -> float:
-    """Huber's threshold, in units of the noise, at the distance beyond which a row is down-weighted."""
+    """Huber's threshold: the distance, in units of the noise, beyond which a row is down-weighted (a χ² quantile)."""
     return float(np.sqrt(chdtri(measures, settings.BEND_LEVEL) * (1.0 - leverage)) * (scale / sigma).min())
 
 
@@ -401,9 +401,9 @@ def huber_threshold(measures: int, leverage: float, sigma: Array, scale: Array) 
 class Sequential:
     """Sequential estimate: fit of a choice, sums of old rows, and rows kept one by one.
 
-    ``sums`` are of rows that are not looked at again, linearised at ``anchor``; ``fitted`` is the fit to all, and has
-    those kept one by one. ``batches`` are read only when the sums must be formed anew; ``aside`` are those of the last
-    batch set aside; ``anew`` whether the last rows made it necessary to look at all of them.
+    ``sums`` are of rows that are not revisited, linearised at ``anchor``; ``fitted`` is the fit to all, and holds the
+    rows kept one by one. ``batches`` are read only when the sums must be formed anew; ``aside`` is the mask of the last
+    batch's rows set aside; ``anew`` tells whether the last rows made it necessary to revisit all.
     """
 
     choice: Choice
@@ -432,7 +432,7 @@ class Sequential:
         return int(self.sums.counts[0]) + len(self.fitted.rows.aside)
 
     def plus(self, new: WeightedRows) -> Sequential:
-        """Add rows; summed rows are revisited only where ``anew`` says so."""
+        """Add rows and refit; all rows are revisited only if the sums do not hold, or too many are kept one by one."""
         batches, old = (*self.batches, new), len(self.fitted.rows.aside)
         fitted = converged_fit(
             self.choice, self.sums, replace(self.fitted, rows=WeightedRows.joined(self.fitted.rows, new))
@@ -466,8 +466,8 @@ class Sequential:
     def _bent(self, fitted: Fitted) -> float:
         """Largest bias of a parameter, in standard deviations, by the curvature of the summed rows.
 
-        Rows kept one by one tell what it leaves of the gap, which adds up over rows, and how it turns the columns. The
-        latter meets residuals that know nothing of it, so that its sum grows as the square root of the rows.
+        It is estimated from the rows kept one by one: the second-order part of their gap adds up over all rows; the
+        change of their columns meets independent residuals, so that its sum grows as the square root of the rows.
         """
         old, k = self.fitted.rows, len(fitted.step)
         here, there = (linearised(old.campaign, point, self.choice) for point in (self.anchor, fitted.point))
@@ -484,7 +484,7 @@ class Sequential:
 
 
 def summed(choice: Choice, rows: WeightedRows, at: State, guard: Guard | None = None) -> Sums:
-    """Sufficient statistics of rows linearised at the point of a state."""
+    """Linearise rows at the point of a state and sum them to sufficient statistics."""
     return Sums.of(linearised(rows.campaign, at.point, choice, rivals=True), rows, guard)
 
 
@@ -503,12 +503,12 @@ def split(choice: Choice, begin: State) -> tuple[Sums, NDArray[np.int64]]:
 
 
 def _sample(rows: int) -> NDArray[np.int64]:
-    """Evenly spaced row numbers, a representative sample of so many rows."""
+    """Systematic sample of row numbers, evenly spaced, at most ``KEPT`` of so many."""
     return np.linspace(0, rows - 1, min(own_settings.KEPT, rows)).astype(np.int64)
 
 
 def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]:
-    """Rows kept one by one, and the trust-region radius up to which the others are safe."""
+    """Numbers of the rows with the smallest radii, kept one by one, and the radius within which the others are safe."""
     if guard is None:
         return _sample(len(scores)), 0.0
     count = min(max(own_settings.KEPT, int((scores < 0.0).sum()) + own_settings.KEPT // 2), len(scores))
@@ -517,7 +517,7 @@ def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]
 
 
 def _guarded(choice: Choice, begin: State) -> tuple[WeightedRows, Guard | None]:
-    """Weights of all rows at the point, and the trust region of their sums with its radius still open."""
+    """Reweighted rows, and the trust region of their sums with radius still 0; ``None`` where weights are fixed."""
     rows = begin.rows
     if choice.judge is not None:
         return rows, None

@@ -120,7 +120,7 @@ def _posterior(information: Array, tight: Array) -> Array:
 
 
 def _symmetric(matrix: Array) -> Array:
-    """Symmetric part of a matrix, without rounding errors."""
+    """Symmetric part of a matrix, (A + Aᵀ)/2, against rounding errors."""
     return (matrix + matrix.T) / 2.0
 
 
@@ -220,9 +220,9 @@ def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | Non
 
 
 def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Effect, Array], ...]:
-    """Fading effects with the part that the fitted frames absorb where they fade; unchanged if some do not fade.
+    """Give fading effects the part of their columns that the fitted frames absorb, a least-squares projection.
 
-    That part is the least-squares projection of each column on the frames.
+    It remains where they have faded. Returned unchanged if any of the effects does not fade.
     """
     fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
     if len(fading) < len(held):

@@ -99,8 +99,8 @@ class Agreement:
 class Watch:
     """Reference for tests of new rows; ``tested`` are effects, without columns, of which a change is looked for.
 
-    ``scatter`` is times the variance of χ² by which the mean square of blocks of the diagnosed rows scatters, at least
-    1; ``aside`` of the diagnosed ``rows`` were gross errors.
+    ``scatter``, at least 1: overdispersion of the mean squares of blocks of diagnosed rows, their variance over that of
+    χ²; ``aside`` of the diagnosed ``rows`` were gross errors.
     """
 
     tested: tuple[Block, ...]
@@ -205,7 +205,7 @@ class Runner(NamedTuple):
 
 
 def runners_up(fit: Fit) -> list[tuple[int, ...]]:
-    """Alternative combinations by posterior probability, most probable first."""
+    """Most probable alternative combinations, at most ``RUNNERS``, each of ``LEAST_RIVAL`` times the chosen one's."""
     e = fit.explanation
     known = [(c.blocks, p) for c, p in zip(e.combinations, e.probabilities, strict=True)]
     own = max((p for blocks, p in known if blocks == e.best.blocks), default=1.0)
@@ -253,7 +253,7 @@ def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
 
 
 def _without_columns(fit: Fit, item: Block, effect: Effect) -> Block:
-    """Block without rows, of the effect as a model holds it."""
+    """Copy of a block with no rows, for the effect with its constants as a saved model holds it."""
     nothing = np.zeros((0, fit.explanation.linear.measures, len(item.sizes)))
     return replace(item, effect=gate.delivered(effect, fit.nominal), source=nothing)
 
@@ -263,7 +263,7 @@ def _point(fit: Fit) -> Point:
 
 
 def fixed_point(fit: Fit) -> Sequential:
-    """Sequential estimate that starts at the fit of a diagnosis."""
+    """Sequential estimate of a diagnosis's choice from its rows, started at its fit and iterated to the fixed point."""
     e, point, flat = fit.explanation, _point(fit), len(unknown_frames(fit.campaign))
     leverage = (e.best.effective + flat) / max(e.problem.equations + flat, 1)
     rows = WeightedRows(fit.campaign, e.whitening.weights, e.outliers)
@@ -273,7 +273,7 @@ def fixed_point(fit: Fit) -> Sequential:
 
 
 def watch(fit: Fit) -> Watch:
-    """Return the reference for tests of new rows, from a diagnosis."""
+    """Return the reference for tests of new rows: a diagnosis's overdispersion, outlier count and candidate effects."""
     e, kept = fit.explanation, ~fit.explanation.outliers
     left = (fit.corrected.gap / (e.whitening.sigma() * e.best.noise))[kept]
     first = [own[0] for own in fit.variants.values() if own]
@@ -545,7 +545,7 @@ def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
 
 
 def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
-    """Factors (P,) by which the diagnosis inflated each deviation for unexplained residuals; ``own`` are at rest."""
+    """Factors (P,), at least 1: each deviation as inflated by the diagnosis over that of the converged fit, ``own``."""
     left, e = found.unexplained if found.remaining is None else found.remaining, fit.explanation
     if not left.flagged:
         return np.ones_like(own)
