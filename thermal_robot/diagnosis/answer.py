@@ -191,7 +191,7 @@ def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:
 
 
 def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
-    """Cap the probability of effects that make held-out sessions or regions worse, and give the reason."""
+    """Cap all probabilities at ``DECIDED``, with a note, if the correction makes held-out sessions or regions worse."""
     if gap.worse is None:
         return found, []
     most = settings.DECIDED

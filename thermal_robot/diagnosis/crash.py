@@ -209,7 +209,7 @@ _KINDS = {
     frozenset({False}): "link",
     frozenset({True, False}): "both",
 }
-"""Verdicts by whether the members of a set are zeros."""
+"""Verdict for a set of moved joints and links, by whether its members are zeros of joints (True) or links (False)."""
 
 
 def _zero(item: Block) -> bool:

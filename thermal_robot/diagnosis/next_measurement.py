@@ -408,7 +408,7 @@ def _pose(fit: Fit, group: Effects) -> Wanted | None:
 
 
 def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:
-    """Effects of only one of the two explanations that the first sample separates, and the gain."""
+    """Effects of only one of the two explanations that the first sample separates, and all samples' gain, nats."""
     if not samples.samples or len(samples.samples[0].separates) < 2:
         return (), 0.0
     one, other = map(set, samples.samples[0].separates)

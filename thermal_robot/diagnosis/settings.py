@@ -1,7 +1,7 @@
 """Chosen numbers of the diagnosis: verdict, drawing of effects, next measurement; each with its unit and reason."""
 
 LEAST_LEADING, MOST_LEADING = 1e-3, 4
-"""Probability below which no explanation is worth a measurement, and how many explanations are told apart."""
+"""Probability below which an explanation is left out of the design of samples, and largest number of explanations."""
 DECIDED, WORTHWHILE = 0.9, 1.0
 """Probability from which an explanation is decided where further samples would bring less than so many nats for any
 rival; it caps that of one whose correction harms rows held out by session or region."""
@@ -64,4 +64,4 @@ RUNNERS, LEAST_RIVAL = 8, 1e-3
 """Number of alternative combinations compared by the new rows, and their least probability against the chosen one: one
 of a thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
 MOST_LEAD = 20.0
-"""Largest log odds that are told: beyond 5e8 : 1 nobody asks how many."""
+"""Largest log odds of a rival that are reported, 5e8 : 1."""

@@ -44,7 +44,7 @@ from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
 def inflated_for_structure(fit: Fit) -> Fit:
-    """Inflate the parameter covariances of a fit for structure in its residual; the values stay."""
+    """Inflate parameter covariances to the jackknife's and sandwich's for structure in the residual; values stay."""
     e = fit.explanation
     if not e.best.blocks:
         return fit
@@ -186,7 +186,7 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
-    """Held-out residuals (H, 3), m, measurement frame, with their row numbers; residuals of all rows without folds."""
+    """Held-out residuals (H, 3), m, measurement frame, and row numbers; the fit's own if nothing can be held out."""
     validation, base = CrossValidation.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
     if not validation.tests:
         return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
@@ -194,7 +194,7 @@ def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _conformal_size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
-    """Conformal residual size (3,) per axis: with the parameters' variance, 1.96 of it hold 95 % of the residuals.
+    """Conformal residual size t (3,) per axis: 95 % of residuals lie within 1.96 √(t² + the parameters' variance).
 
     The ratio of the axes is that of their rms without outliers; outliers count in the 95 %.
     """
@@ -208,7 +208,7 @@ def _conformal_size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
 
 
 def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
-    """Between-session standard deviation (3,) per axis (random effects), m; ``None`` for one session."""
+    """Between-session standard deviation (3,) per axis, m (random effects); ``None`` for fewer than two sessions."""
     kept = ~fit.explanation.outliers
     left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
     runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]

@@ -409,7 +409,7 @@ class Updated:
         return replace(self, estimate=estimate, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
 
     def _testable(self, new: WeightedRows) -> Iterator[str]:
-        """Yield the untestable effects that the new rows make testable."""
+        """Yield a sentence for each effect that the diagnosis could not test and that the new rows make testable."""
         known = library()
         if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
             old = self.estimate.fitted

@@ -15,7 +15,7 @@ from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_words import Size
 
 UNIT = 30.0
-"""Factor, up or down, on the lengths of all links from which a unit is wrong, not the model: inches read as m are 39,
+"""Factor on all link lengths, up or down, from which the URDF's unit is wrong, not its robot: inches read as m are 39,
 cm a hundred, mm a thousand; sisters differ by three."""
 
 Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
@@ -137,7 +137,7 @@ class Finding:
 def is_frame(found: Sequence[Finding], name: str) -> bool:
     """Whether an effect is the displacement of an unknown frame.
 
-    A name without a finding is one: of what was no candidate, only unknown frames are confounded with effects.
+    True for a name without a finding, too: only an unknown frame is confounded with effects without being a candidate.
     """
     needs = next((f.needs for f in found if f.name == name), ("frames.",))
     return any(need.startswith("frames.") for need in needs)

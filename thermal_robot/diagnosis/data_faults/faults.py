@@ -185,7 +185,7 @@ def _norm2(vectors: Array) -> Array:
 Repair = Callable[[Readings, Rows], Readings]
 """Function from readings and the affected rows (N,) to the readings repaired in these rows."""
 Numbered = Callable[[float], tuple[str, Repair]]
-"""Place and repair of a fault by its number."""
+"""Function from the number of a fault in its family, such as a time offset, to its place in words and its repair."""
 
 
 @dataclass(frozen=True)

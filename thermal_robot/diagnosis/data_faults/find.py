@@ -234,7 +234,7 @@ def mixture(struck: AffectedRows) -> AffectedRows | None:
 
 
 Chosen = list[tuple[Fault, Array, float]]
-"""Faults, (3,) where the target then sits on the tool, m, and what is left at least, of what a robot at rest leaves."""
+"""Faults, the target's place (3,) on the tool after repair, m, and a lower bound of the gap over a resting robot's."""
 
 
 class Screen:

@@ -12,9 +12,9 @@ candidate brings 28 sound campaigns a factor of 1.0 to 1.5; faults of tables bri
 TIE = 3.0
 """Log likelihood ratio below which two candidates cannot be told apart: odds of 20."""
 LEAST_GAP = 1e-6
-"""Rounding error of the table, m: smaller gaps are none."""
+"""Rounding error of the table, m: smaller gaps count as this one."""
 STRAY = 10.0
-"""Outlier limit over the median gap. Of normal noise none is beyond 4, of heavy-tailed noise one in a thousand."""
+"""Outlier limit over a typical gap. Of normal noise none is beyond 4, of heavy-tailed noise one in a thousand."""
 FEW_STRAYS, LEAST = 0.05, 0.01
 """Smallest share of outliers that are a group, as fewer fit by chance as they stand, or stray; and smallest gap, of a
 misfit, by which outliers are counted: where noise is all, a gross error of a few tenths of a millimetre is none."""
@@ -30,9 +30,9 @@ DRAWS_HALVED = 10
 ABREAST = 256
 """Number of candidates registered side by side: more would not stay in the processor's memory."""
 WORSE = 10.0
-"""Cap on the gap over the least of the numbers tried while one is refined: above, no difference is made."""
+"""Cap on the gap while a fault's number is refined, over the least gap on the grid: larger ones count alike."""
 NEAREST = 0.4
-"""Share of the rows, nearest to the prediction, by which such a start is judged."""
+"""Quantile of the rows' distances by which draws of RANSAC are compared, and above which outliers are counted."""
 SAMPLED, SKETCHED = 150, 40
 """Rows on which candidates are compared, spread evenly: a median is then known to a tenth; and those on which rigid
 frames are first fitted to them."""
@@ -46,8 +46,8 @@ is there; and its ridge, of the trace: an arm in a plane does not determine all 
 RELAXED = 60
 """Rows on which affine maps are fitted to each candidate: 180 equations for 39 numbers."""
 SURVIVORS, NEAR, MOST_SURVIVORS = 24, 3.0, 128
-"""Candidates for the joints that are registered with rigid frames: so many, and all that leave less than so many times
-the least, since they may do the same, but not more than these."""
+"""Number of candidates for the joints that go on to registration with rigid frames; ratio to the least gap below which
+further ones do, since they may be equivalent; and largest number of all."""
 EXTENT = 2.0
 """Largest ratio of the extents of measured and predicted points with the right unit: a target beside the tool frame
 changes it by less, and units differ by 2.54 and more."""
@@ -56,7 +56,7 @@ MOST_PATTERNS, FEW_REVERSED = 10, 3
 PAIRED_PATTERNS = 128
 """Number of patterns of signs, those of fewest joints, that are tried together with another fault."""
 TOLD = 4
-"""Largest number of alternatives that are told."""
+"""Largest number of alternative kinds of fault that a finding names."""
 WINDOW = 100
 """Consecutive rows on which clocks are compared: to undo an interpolation a matrix of them is inverted."""
 COARSE_ROUNDS = 40
@@ -85,7 +85,7 @@ PRIOR_TURN, PRIOR_ZERO = 0.1, 0.5
 """Prior standard deviations of a joint's axis and zero in a free calibration, rad; places are held to ``FARTHEST``.
 Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth farther."""
 ANOTHERS = 1e6
-"""Factor on the prior precision of a shift that another joint has, over that of a joint's own."""
+"""Factor on the prior precision of a joint's shift along the axis of the joint before, which is a shift of that one."""
 CALIBRATED, ROUNDED = 1e-3, 1e-9
 """Relative decrease of a calibration's cost at its last step; and ridge on the frames, of the largest weight of their
 motion, that holds those that nothing determines."""
