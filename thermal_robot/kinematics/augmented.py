@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 ELONGATION = "elongation of "
-"""What the name of a virtual joint begins with; the name of its segment follows."""
+"""Prefix of the name of a virtual joint; the name of its segment follows."""
 
 
 @dataclass(frozen=True, eq=False)

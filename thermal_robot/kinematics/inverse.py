@@ -30,26 +30,26 @@ if TYPE_CHECKING:
 
 
 ARM = 0.05
-"""m; an error of direction counts as what it does at this distance: so short that the point goes first already."""
+"""m; lever arm that weighs an error of orientation against one of position: short, as the point has priority."""
 STEPS = 60
-"""At most, of the first kind; from a good start four are enough, from anywhere thirty."""
+"""Largest number of Levenberg-Marquardt steps; from a good start four are enough, from anywhere thirty."""
 POINT_STEPS = 12
-"""At most, of the second kind; each squares the error."""
+"""Largest number of Newton steps on the point; each squares the error."""
 EXACT = 1e-12
-"""m; a point as near as this is reached: a hundred times the rounding of an arm of a metre."""
+"""m; position error below which a point counts as reached: a hundred times the rounding of an arm of a metre."""
 STARTS = 24
-"""Places from which a pose is searched beside the given one: an arm of six joints has up to eight postures
+"""Random starts of the search for a pose in addition to the given one: an arm of six joints has up to eight postures
 (sixteen with general axes), and from a random place a third of the searches ends at a limit."""
 _SAME = 1e-6
-"""rad; two postures whose directions are missed by as much are as good as each other."""
+"""rad; difference of orientation errors below which two postures reach a pose equally well."""
 _DAMPING = 1e-6
-"""m²; of the first step. It is divided or multiplied by ten as steps succeed or fail."""
+"""m²; Levenberg-Marquardt damping of the first step, divided or multiplied by ten as steps succeed or fail."""
 _LEAST_DAMPING = 1e-15
-"""m²; below it rounding decides."""
+"""m²; floor of the damping, below which rounding decides."""
 _GAIN = 1e-9
-"""Share of the cost that a step must take off, or the row has come as near as it can."""
+"""Smallest relative decrease of the cost by a step; with less, a row counts as converged."""
 _SMALLEST = 1e-6
-"""Of the largest singular value of J_p: directions in which joints hardly move the point are not used."""
+"""Cutoff of the pseudo-inverse, of J_p's largest singular value: directions that hardly move the point are not used."""
 
 
 class Reached(NamedTuple):

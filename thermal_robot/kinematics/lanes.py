@@ -121,7 +121,7 @@ class Moved(NamedTuple):
 BASE, TOOL = -2, -1
 """Numbers of the chain's two ends, in addition to those of its elements 0..K−1."""
 NOWHERE = Moved()
-"""Nothing displaced."""
+"""Displacement of a nominal chain: none."""
 TURNS, TURNS_ALIGNED, SLIDES = 1, 2, 3
 """Kinds of joint motion: a turn about an axis of the frame, a turn about any other axis, a slide."""
 

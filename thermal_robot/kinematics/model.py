@@ -180,7 +180,7 @@ def held_position(model: pin.Model, q: Array, name: str) -> float:
 
 
 _NO_MASS = 1e-12
-"""kg; less is what rounding leaves of a body's mass once the links that are fixed to it are taken off."""
+"""kg; smallest mass of a body without the links fixed to it: less is the rounding error of that difference."""
 
 
 def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tuple[Array, Array]:

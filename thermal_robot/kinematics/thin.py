@@ -24,7 +24,7 @@ _ALONG = {
 
 
 _UPRIGHT = 1e-14
-"""rad; an axis that leans no more turns about gravity: what it carries then is the rounding of what others do."""
+"""rad; angle to gravity below which an axis counts as parallel, so that its torque, else a rounding error, is zero."""
 
 
 class _Own:

@@ -193,7 +193,7 @@ _ELEMENTS = {
     "link": ("inertial",),
     "link/inertial": ("origin", "mass", "inertia"),
 }
-"""Elements that say where things are and what they weigh, by what they stand in; others of any name are let pass."""
+"""Known elements that place or weigh something, by the path of their parent; the names are checked only there."""
 
 
 class _Figures(NamedTuple):
@@ -217,7 +217,7 @@ _ATTRIBUTES: dict[str, dict[str, _Figures | None]] = {
     # the sign of an inertia plays no part in statics, and exporters write −5e-20 for nothing
     "inertia": {n: _Figures(f"inertia {n}", "a number of kg·m²") for n in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
 }
-"""Attributes of these elements, with what is asked of their figures."""
+"""Known attributes by element, with the requirement on their numbers; ``None`` for text."""
 _MEANT = {
     **dict.fromkeys(("pose", "transform", "frame", "position", "translation", "rotation", "xyz", "rpy"), "origin"),
     **dict.fromkeys(("min", "max", "range", "bounds"), "limit"),
@@ -225,7 +225,7 @@ _MEANT = {
     "inertia": "inertial",
     "mass": "inertial",
 }
-"""Elements of other formats, and what says the same in a URDF."""
+"""Names of elements in other formats, and the URDF element of the same meaning."""
 _MEANT_OF_LIMIT = {"min": "lower", "low": "lower", "max": "upper", "high": "upper"}
 _ONCE = {"link/inertial", "link/inertial/mass", *(f"joint/{name}" for name in _ELEMENTS["joint"])}
 """Elements of which urdfdom reads the first alone."""
