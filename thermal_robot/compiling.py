@@ -14,9 +14,9 @@ from typing import Any
 THREADS = 0
 """Threads that run compiled loops; 0 for one on each processor that this process may use."""
 PIECE = 16_384
-"""Rows that a thread works on before it takes the next ones."""
+"""Number of rows in the slice of a batch that a thread works on at a time."""
 MOST_UNKEPT = 50
-"""Compiled functions that there may be no room on the disk for; a kernel is made of twenty at most."""
+"""Number of retries where a full disk cannot keep a compiled function; a kernel is made of twenty at most."""
 
 
 def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"})) -> Any:

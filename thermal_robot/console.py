@@ -16,10 +16,10 @@ from thermal_robot.errors import Note
 
 QUIET, NORMAL, VERBOSE = "quiet", "normal", "verbose"
 _PATIENCE = 2.0
-"""s after which a terminal shows the stages: of what is over sooner nobody wants to hear."""
+"""s after which a terminal shows the stages: a shorter task needs no progress display."""
 
 _SILENCE = 300.0
-"""s after which counted work says how far it is, between tenths: a fleet may take days."""
+"""s after which a line tells the progress of counted work although no tenth is full: a fleet may take days."""
 
 Counted = Callable[[str, int, int], None]
 """Callback of a progress display: name of a stage, number of parts done, and number of all parts."""

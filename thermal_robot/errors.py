@@ -69,7 +69,7 @@ class RobotError(ThermalRobotError):
 
 
 class CampaignError(ThermalRobotError):
-    """A campaign file that cannot be used; names file, row and column, what was found and what was expected.
+    """Error: a file or argument cannot be used; names file, row and column, what was found and what was expected.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class EffectError(ThermalRobotError):
 
 
 class OwnEffectError(EffectError):
-    """Breach of contract by one of the program's own effects; exit status 1."""
+    """Error: one of the program's own effects breaks the contract of effects; exit status 1."""
 
     def __init__(self, message: str) -> None:
         super().__init__(ours(message))

@@ -47,23 +47,23 @@ from thermal_robot.schema import (
 
 SCHEMA = "thermal-robot/model/"
 VERSION = 2
-"""Of the file: 1 had no checksum and is read, too."""
+"""Version of the file format that is written; version 1, without a checksum, is read, too."""
 _LARGEST_FILE = 128 << 20
-"""Bytes: twice those of the largest URDF, as its text is a part."""
+"""Bytes: largest model file, twice the largest URDF, as that text is a part."""
 _SQUARE = 1e-6
-"""By how much a rotation matrix may miss its inverse: six digits of each figure are a rounding, fewer a mistake."""
+"""Largest entry of R Rᵀ − 1 of a rotation matrix: figures of six digits are rounded, of fewer a mistake."""
 _FARTHEST = 1e7
-"""m: an instrument may measure in the coordinates of a country, and stands on the Earth."""
+"""m: largest component of a translation; an instrument may measure in the coordinates of a country."""
 _ROUNDED = 1e-9
-"""Of a covariance's largest entry: by how much rounding makes it miss its transpose."""
+"""Largest asymmetry of a covariance by rounding, of its largest entry."""
 _LARGEST_VALUE = 1e6
-"""Of the expected size of a parameter: a joint that is off by a whole turn has 6e3, a base by 100 m 1e6."""
+"""Largest value of a parameter, in expected sizes: a joint that is off by a whole turn has 6e3, a base by 100 m 1e6."""
 _NO_MODEL = "this is not a model that `diagnose --model` wrote"
 
 
 @dataclass(frozen=True)
 class Part:
-    """One key of the file.
+    """One key of a model file: how its value is read and written, and whether it may be absent.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def _ends(value: Any, path: str) -> tuple[float, float]:
 
 
 def _covariance(value: Any, path: str) -> Array:
-    """Validate a covariance: symmetric, without negative variances."""
+    """Validate a covariance matrix: symmetric to rounding, without negative variances."""
     covariance: Array = matrix()(value, path)
     size = float(np.abs(covariance).max(initial=0.0))
     if not size:
@@ -157,7 +157,7 @@ def _spread(value: Any, path: str) -> Spread:
 
 
 def _file_gap(value: Any, path: str) -> FileGap:
-    """Validate the expected gap with a robot file."""
+    """Validate the expected held-out gap with one kind of robot file and convert it to a :class:`FileGap`."""
     kinds = {"holds": text("what a file holds"), "min_sigma": optional(NOT_NEGATIVE), "shrinkage": number()}
     sizes = {"rms_before": NOT_NEGATIVE, "rms_after": NOT_NEGATIVE, "shrinkage_ci95": _ends}
     return FileGap(**record({**kinds, **sizes, "alone": listed(number())})(value, path))
@@ -201,7 +201,7 @@ def written(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def checksum(document: Mapping[str, Any]) -> str:
-    """SHA-256 of all but the checksum itself, independent of layout and number format."""
+    """SHA-256 of a document without its key ``checksum``, independent of layout and number format."""
     rest = {key: value for key, value in document.items() if key != "checksum"}
     return hashlib.sha256(json.dumps(_spelt(rest), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 

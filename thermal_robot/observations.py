@@ -70,7 +70,7 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """A campaign seen through a robot, with the gap between them.
+    """A campaign with the forward kinematics of its robot, and the gap between measured and predicted.
 
     Use :func:`observe` to make one. N rows, n joints, S segments, m = 3 (positions) or 6 (poses).
 

@@ -11,7 +11,7 @@ _MOST = 4  # decimals: a share that is still rounded to all with them is told as
 
 
 def percent(share: float | None, decimals: int = 1) -> str:
-    """Format a share in per cent, as ``96.0 %``; below 1 never rounds to 100 %, beyond ±1000 % it is that bound.
+    """Format a share in per cent, as ``96.0 %``; less than 1 never becomes 100 %, more than ±10 only ``> 1000 %``.
 
     Parameters
     ----------

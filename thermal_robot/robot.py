@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 
 _MOST_SHOWN = 12
-"""Names in one message; a humanoid has dozens of fingers."""
+"""Largest number of names in one message; a humanoid has dozens of fingers."""
 STRONGEST_GRAVITY = 100.0
 """m/s²: four times that of any planet where a robot has been sent; a figure in mm/s² is above it."""
 WIDE = 2.4
-"""rad: as far as a joint without a limit is sent; nearly once round."""
+"""rad: range, to either side, in which poses of a joint that can turn fully are planned; nearly once round."""
 ENDS = ("tool_frame", "root_frame")
 """Names of the links between which the chain lies, as a robot, a campaign and a model call them."""
 

@@ -20,13 +20,13 @@ from thermal_robot.errors import CampaignError
 Kind: TypeAlias = Callable[[Any, str], Any]
 
 LARGEST = 1e20
-"""In any unit: nanoseconds since 1970 are 2e18, and no quantity that a robot's log holds is larger."""
+"""Largest number that is accepted, in any unit: nanoseconds since 1970, the largest in a robot's log, are 2e18."""
 _MOST_SHOWN = 60
-"""Letters of what was found that an error shows."""
+"""Number of letters of an invalid value that an error message shows."""
 
 
 class MisfitError(ValueError):
-    """A value that does not match its schema: path, value, expectation, and reason."""
+    """Error: a value does not match its schema; holds its path, the value, what is expected, and the reason."""
 
     def __init__(self, path: str, value: Any, expected: str, problem: str = "") -> None:
         super().__init__(f"{path}: {problem or shown(value)}, expected {expected}")

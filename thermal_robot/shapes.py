@@ -26,9 +26,9 @@ _SEARCHED = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 """Variables of the environment in which ROS lists its packages, or the folders above them."""
 _DECLARATION = re.compile(r"^\s*<\?xml.*?\?>", re.DOTALL)
 _FLAT = 1e-9
-"""Thickness over extent of what has no hull."""
+"""Relative thickness below which points count as flat and have no hull."""
 _CORNERS = 80
-"""Directions in which the outermost point of a mesh is kept: tubes look round, a page of ten links stays small."""
+"""Number of directions in which a hull keeps a mesh's outermost point: tubes look round, and pages stay small."""
 
 
 def find_mesh(named: str, folder: Path) -> Path | None:

@@ -17,7 +17,7 @@ EXAMPLE_ROBOT_DATA = "example-robot-data:"
 DESCRIPTION = "the robot description"
 
 _LARGEST_FILE = 64 << 20
-"""Bytes: a URDF is text about links, of a few kilobytes each."""
+"""Bytes: largest URDF file that is read; a link takes a few kilobytes."""
 
 # The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
 _LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}
