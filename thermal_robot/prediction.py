@@ -1,4 +1,4 @@
-"""Predictive uncertainty: parameters, residual and instrument."""
+"""Predictive uncertainty of a corrected model, from parameters, residual and instrument; tests for extrapolation."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class Model:
 
     @cached_property
     def spans(self) -> tuple[NDArray[np.int64], ...]:
-        """Column numbers of each block."""
+        """Column numbers of the parameters of each block of effects; those of the frames come first."""
         ends = self.flat + np.cumsum([0, *(len(b.sizes) for b in self.linear.blocks)])
         return tuple(np.arange(a, b) for a, b in pairwise(ends))
 

@@ -60,7 +60,7 @@ def file_gaps(fit: Fit, model: CorrectedModel) -> tuple[FileGap, ...]:
 
 
 def _alone(fit: Fit, model: CorrectedModel, whole: Model, validation: CrossValidation) -> dict[str, Array]:
-    """Displacements (F + 1, n + 6 S) of files fitted alone without each fold, and to all rows."""
+    """Displacements (F + 1, n + 6 S), by kind of file, of parameters fitted alone without each fold and to all rows."""
     known, robot = constant(model), fit.campaign.robot
     ends = np.cumsum([0, *(len(values) for _, values in model.effects)])
     own = [k for k in range(len(model.effects)) if known.responses[ends[k] : ends[k + 1], :-12].any()]

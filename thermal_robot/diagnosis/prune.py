@@ -265,7 +265,7 @@ def pruned(
 
 
 def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
-    """Terms to remove next, which do not obey the rule, with the reason for each."""
+    """Terms to remove next, with the reason: all clearly harmful ones, else of those that break the rule the worst."""
     table = held_out_tests(fit)
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
@@ -296,7 +296,7 @@ def odds_in_place(fit: Fit) -> dict[str, float]:
 
 
 def undetermined(fit: Fit) -> dict[str, Refused]:
-    """Effects and laws of a fit of which the data determine no direction, with their probability before the data.
+    """Effects and laws of a fit of which the data determine no direction, with at most their prior probability.
 
     Determined means that the posterior standard deviation is below half the prior's along some principal axis.
     """
@@ -311,7 +311,7 @@ def undetermined(fit: Fit) -> dict[str, Refused]:
 
 
 def unsupported(fit: Fit, inflated: Fit) -> dict[str, Refused]:
-    """Effects and laws of a fit that structure in the residual may mimic, with their probability before the data.
+    """Effects and laws of a fit that structure in the residual may mimic, with at most their prior probability.
 
     The covariance that is ``inflated`` for structure leaves all their directions undetermined, and their held-out
     density is not significantly higher.

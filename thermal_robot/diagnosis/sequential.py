@@ -210,7 +210,7 @@ class Guard:
 
 
 def moves(stack: Array, metric: Array, sigma: Array) -> Array:
-    """Largest displacement (N,) of each row (N, m, K + 1) by a unit step in a metric (k, k), in units of the noise."""
+    """Bound (N,) on how far a unit step in a metric (k, k) moves rows (N, m, K + 1), in noise units: Frobenius norm."""
     white = stack[:, :, : len(metric)] / sigma[:, None]
     within = white @ np.linalg.inv(np.linalg.cholesky(metric)).T
     return np.asarray(np.sqrt((within**2).sum(axis=(1, 2))))

@@ -72,7 +72,7 @@ def _model(fit: Fit) -> Model:
 
 
 def _other_covariances(fit: Fit, model: Model) -> list[Array]:
-    """Parameter covariances (P, P) beside the posterior's: jackknife over blocks of rows, and sandwich."""
+    """Parameter covariances (P, P): jackknife over blocks of rows in time and in joint space, and sandwich if any."""
     found, e = [], fit.explanation
     for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
         rows = [~group for group in each(labels) if model.determines(~group)]

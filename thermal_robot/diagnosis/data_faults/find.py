@@ -99,7 +99,7 @@ class AffectedRows:
 
     @classmethod
     def whole(cls, readings: Readings) -> AffectedRows:
-        """All rows; the frames are fitted anew to each candidate."""
+        """Regard all rows as in question: the frames are fitted anew to each candidate."""
         sample = readings.take(spread(np.arange(len(readings.q))))
         distance = readings.distance(sample.align(coarse=True))
         if np.median(distance) > readings.tolerance:
@@ -108,7 +108,7 @@ class AffectedRows:
 
     @property
     def sample(self) -> Readings:
-        """A sample of the rows in question, as they stand."""
+        """Evenly spaced sample of the rows in question, unrepaired."""
         return self.readings.take(spread(np.flatnonzero(self.rows)))
 
     @property
