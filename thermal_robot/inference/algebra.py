@@ -1,6 +1,6 @@
 """Rank-revealing least squares: the one place where weakly determined directions are dropped.
 
-Every function scales its columns to unit length first, so that one floor serves metres, radians and coefficients alike.
+The solvers scale columns to unit length first, so that one tolerance serves metres, radians and coefficients alike.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def rms(vectors: Array) -> float:
 
 
 def total_probability(probabilities: ArrayLike) -> float:
-    """Sum of probabilities of cases that exclude each other, at most 1: rounding takes it beyond."""
+    """Sum the probabilities of mutually exclusive cases; rounding errors above 1 are clipped."""
     return min(float(np.sum(probabilities)), 1.0)
 
 
@@ -65,8 +65,8 @@ def without(columns: Array, basis: Array) -> Array:
 def ridge(products: Array, flat: int, prior: Array) -> Array:
     """Ridge regression: posterior mean (K,) with normal priors, from the Gram matrix (K + 1, K + 1) alone.
 
-    The last column is the values. The first ``flat`` have no prior and stay at zero where nothing determines them;
-    ``prior`` (K − flat,) is one over the variance of the others.
+    The last row and column of ``products`` belong to the fitted values. The first ``flat`` coefficients have no prior
+    and stay at zero where nothing determines them; ``prior`` (K − flat,) is one over the prior variance of the others.
     """
     matrix = products[:-1, :-1].copy()
     own = np.diag(matrix)[:flat]

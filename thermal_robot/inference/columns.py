@@ -1,4 +1,4 @@
-"""Design matrix: derivatives of the gap by the parameters of effects, and by the unknown frames."""
+"""Design matrix: derivatives of the gap (measured − predicted pose) by parameters of effects and by unknown frames."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class Block:
 
     ``source`` is the columns, or the observations from which they are recomputed on demand to save memory. ``bare`` are
     the parameters without responses, ``sizes`` (P,) their expected sizes with the campaign's ``[priors]``, ``spread``
-    the standard deviation of the logarithm of their common factor, at most ``largest_scale``.
+    the prior standard deviation of the logarithm of the factor λ that all sizes share, ``largest_scale`` the bound of
+    λ.
     """
 
     effect: Effect
@@ -38,7 +39,7 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """Jacobian (N, m, P) of the gap by the parameters, root frame axes; rounding errors are set to 0."""
+        """Jacobian (N, m, P) of the gap by the parameters, root frame axes; columns of rounding errors are set to 0."""
         if not isinstance(self.source, Observations):
             return self.source
         found = moved_by(self.source, self.parameters)
@@ -61,7 +62,7 @@ class Block:
         return replace(self, source=self.columns)
 
     def kept(self, values: Array) -> Array:
-        """Prior shrinkage factors (P,): next to 0 for parameters that an inequality holds at zero, else 1."""
+        """Factor (P,) on prior deviations: nearly 0 for a non-negative parameter with a value of 0 or less, else 1."""
         return np.where(self.positive & (values <= 0.0), settings.LEAST_HELD, 1.0)
 
 
@@ -94,8 +95,9 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     """Jacobian (N, m, f) of the gap by the unknown frames and artefacts, and the name of each column.
 
     Base: twist in the root frame, of rows that an instrument measured. Tool: translation of the target in the tool
-    frame, and its turn where orientation is measured. Artefacts: what rows share beside the robot, by their names.
-    Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
+    frame, and its rotation where orientation is measured. Artefacts: unknowns of the measuring set-up that rows share
+    (a plane, a stand), by their names. Where the campaign brings a simulator's prediction, which includes the tool, the
+    tool is not fitted.
     """
     campaign, names = observations.campaign, _unknown(observations.campaign)
     measures = components(campaign)

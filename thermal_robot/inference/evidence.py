@@ -56,7 +56,7 @@ class Columns:
         return np.flatnonzero(self.positive)
 
     def some(self, kept: NDArray[np.int64]) -> Columns:
-        """Subset of the columns."""
+        """Return the normal equations of a subset of the columns, given by their indices."""
         if len(kept) == len(self.vector):
             return self
         return Columns(self.matrix[kept[:, None], kept], self.vector[kept], self.owner[kept], self.positive[kept])
@@ -64,11 +64,12 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Posterior of the parameters of one combination at given scales and noise: mode, and covariance about it.
+    """Posterior of the parameters of one combination at given scales λ and noise s: mode, and covariance about it.
 
-    A dropped column (``free`` (D,) False) has the mode zero, and its mean square. ``log_volume`` is the log ratio of
-    posterior to prior volume: −½ log|I + Λ G/s²|, and the factors of the half lines; ``effective`` per block, how many
-    of its columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
+    A column held at zero by its constraint (``free`` (D,) False) has the mode zero, and its mean square as variance.
+    ``log_volume`` is the log ratio of posterior to prior volume: −½ log|I + Λ G/s²|, and the factors of the half lines.
+    Sums over the columns of each block: ``effective`` 1 − v/λ², the number that the data determine; ``fitted`` m²/λ²
+    and ``determined`` 1 − v/λ², with mean m and variance v of the truncated columns where they are constrained.
     """
 
     values: Array
@@ -81,9 +82,11 @@ class Posterior:
 
     @classmethod
     def at(cls, columns: Columns, scale: Array, variance: float, free: Mask | None = None) -> Posterior:
-        """Solve (G/s² + Λ⁻¹) θ = b/s² under non-negativity constraints; ``free`` is a first guess of the inactive ones.
+        """Find the posterior mode under non-negativity constraints by block principal pivoting.
 
-        Raises :class:`EstimationError` if rounding errors dominate.
+        It solves (G/s² + Λ⁻¹) θ = b/s² with s² = ``variance`` and Λ = diag(``scale``²), one scale for each block;
+        ``free`` (D,) is a first guess of the columns not held at zero. Raises :class:`EstimationError` if rounding
+        errors dominate.
         """
         size, count = len(columns.vector), len(scale)
         free = np.ones(size, dtype=bool) if free is None else free
@@ -143,9 +146,9 @@ class Posterior:
         return np.asarray(hessian)
 
     def step(self, hessian: Array, scale: Array, prior_precision: Array) -> tuple[Array, float]:
-        """Newton step of ln λ, each component at most one, and the gain that a quadratic model predicts.
+        """Newton step (B,) of ln λ, each component clipped to ±1, and the gain that a quadratic model predicts.
 
-        Where the problem is not convex, each scale steps separately.
+        Where the Hessian is not positive definite, each scale takes a step of its own, with a diagonal Hessian.
         """
         slope = self.fitted - self.determined - prior_precision @ np.log(scale)
         _, step, failed = dposv(hessian, slope) if len(scale) else (None, slope, 0)
@@ -155,16 +158,16 @@ class Posterior:
 
 
 def _by_block(columns: Columns, values: Array, count: int) -> Array:
-    """Return the sums (count,) over the columns of each block."""
+    """Return the sums (count,) of values (D,) over the columns of each block."""
     return np.asarray(np.bincount(columns.owner, values, count), dtype=float)
 
 
 def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
-    """Posterior with a given set of active constraints.
+    """Posterior with all columns that are not ``free`` held at zero (a given active set).
 
-    Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood where a column is
-    dropped, and which columns should change by more than rounding: those that stay and are negative, those dropped that
-    would be positive.
+    Returns values (D,), covariance of the free columns, log|I + Λ G/s²|, slopes (D,) of the log likelihood at the held
+    columns, and a mask (D,) of the violated constraints: free columns that are negative and held ones with a positive
+    slope, by more than rounding.
     """
     kept = np.flatnonzero(free)
     mean, covariance, log_det = _unconstrained(columns.some(kept), scale, variance)
@@ -183,7 +186,7 @@ def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tupl
 
 
 def _unconstrained(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:
-    """Unconstrained posterior mean, covariance and log|I + Λ G/s²|."""
+    """Unconstrained normal posterior: mean (D,), covariance (D, D) and log|I + Λ G/s²|, with Λ = diag(scale²)."""
     size = len(columns.vector)
     if not size:
         return np.zeros(0), np.zeros((0, 0)), 0.0
@@ -211,7 +214,7 @@ def _truncated(
     prior_precision: Array,
     s2: float,
 ) -> tuple[Array, Array, float]:
-    """Mean and second moment of truncated normal columns, and the log probability of their half lines."""
+    """Means and mean squares (D,) of normal columns, truncated to ≥ 0 where constrained, and the log factor of that."""
     mean, own, log_mass = values.copy(), spread.copy(), 0.0
     if len(kept) < len(values):
         dropped = np.ones(len(values), dtype=bool)
@@ -238,12 +241,12 @@ def _truncated(
 class Gram:
     """Normal equations of a linear problem, frames projected out, whitened, in units of the prior sizes.
 
-    G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
-    (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
-    cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ − ln κ; ``most``
-    (B,): λ at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it
-    is not known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
-    covariance and of the frames, and the log prior of that covariance.
+    G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``. Each block is reduced to the directions that the
+    data determine (``ranks`` of them): it has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter
+    values. ``positive`` (D,) cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation
+    of ln λ − ln κ; ``most`` (B,): largest λ. ``equations`` n: their number less the rank of the frames; ``noise_dof``:
+    prior degrees of freedom of the noise, 0 where none is stated; ``offset``: the log evidence that all combinations
+    share, −½ log of the determinants of the rows' covariance and of the frames, and the log prior of that covariance.
     """
 
     matrix: Array
@@ -272,7 +275,8 @@ class Gram:
     def posterior(self, found: Combination) -> tuple[Array, Array]:
         """Posterior mode (D_γ,) and covariance (D_γ, D_γ) of the reduced columns at a combination's scales and noise.
 
-        Block after block; zero for those that would be negative and cannot, and where rounding hides all.
+        Block after block. Columns held at zero by their constraint have the mode zero; all are zero where the log
+        evidence is −∞, as rounding errors dominate.
         """
         columns = self.equations_of(found.blocks)
         if not np.isfinite(found.log_evidence):
@@ -303,8 +307,8 @@ class Combination:
     """One combination of blocks with its evidence, at the most probable prior scales and noise.
 
     ``log_evidence`` is the log marginal likelihood with log prior odds; ``noise`` s, in units of the whitening noise;
-    ``scales`` λ of each block; ``effective`` the number of determined parameters; ``exact`` whether all scales are
-    converged, else at most those of one block are.
+    ``scales`` λ of each block; ``effective`` the number of determined parameters; ``exact`` False for an estimate: a
+    search that stopped early, or one more block to first order, with the other scales as they were.
     """
 
     blocks: tuple[int, ...]
@@ -325,8 +329,9 @@ def evidence(
 ) -> Combination:
     """Log evidence of one combination at the most probable noise and prior scales (empirical Bayes).
 
-    The iteration starts at the noise and scales of ``start``, ends once their logarithms move less than ``settled``,
-    and early where it is clear that the log evidence ``floor`` is not reached.
+    ``prior`` is its log prior odds. The iteration starts at the noise and scales of ``start``, ends once their
+    logarithms move less than ``settled``, and early, with an estimate that is not ``exact``, where it is clear that the
+    log evidence ``floor`` is not reached. Raises :class:`EstimationError` if rounding errors dominate.
     """
     columns = gram.equations_of(blocks)
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
@@ -372,7 +377,7 @@ def conditional_scales(spread: Array, log_scale: Array, own: Array) -> tuple[flo
 
 @dataclass(frozen=True, eq=False)
 class _Mode:
-    """Posterior mode of scales and noise; where the search stopped early, with the gain still expected."""
+    """Posterior mode of scales and noise; ``promised``: log evidence left to gain where the search stopped early."""
 
     posterior: Posterior
     hessian: Array
@@ -391,7 +396,10 @@ def _most_probable(
     floor: float,
     settled: float,
 ) -> _Mode:
-    """Find the posterior mode of scales and noise; stop early where the log evidence cannot reach ``floor``."""
+    """Posterior mode of scales and noise by Newton steps of ln λ and MacKay's fixed point of s.
+
+    Stops early where the log evidence cannot reach ``floor``.
+    """
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:

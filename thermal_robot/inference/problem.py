@@ -80,7 +80,7 @@ class Whitening:
 
     @property
     def unseen(self) -> int:
-        """Number of components that the rows in use do not measure: they are no equations."""
+        """Number of components that the rows in use do not measure, and that therefore are no equations."""
         return 0 if self.seen is None else int((3 - self.seen[self.weights > 0]).sum())
 
     def figures(self, measures: int) -> NDArray[np.int64] | int:
@@ -99,13 +99,13 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
 
 
 def products(linear: Linear, whitening: Whitening) -> Array:
-    """Gram matrix (f + P + 1, f + P + 1) of the whitened columns; their rows are never all held at once."""
+    """Gram matrix (f + P + 1, f + P + 1) of the whitened columns of frames, parameters and gap, by chunks of rows."""
     stack = white_stack(DesignMatrix.of(linear.columns), whitening)
     return stack.products() if whitening.smooth is None else whitening.smooth.products(stack)
 
 
 def white_stack(stack: DesignMatrix, whitening: Whitening) -> DesignMatrix:
-    """Columns over the rows with weight, in units of the noise, without the discrepancy."""
+    """Columns of the rows with weight, times root weight over noise; a correlated discrepancy is not whitened."""
     used = np.flatnonzero(whitening.weights > 0)
     return stack.weighted(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
 
@@ -113,9 +113,10 @@ def white_stack(stack: DesignMatrix, whitening: Whitening) -> DesignMatrix:
 def normal_equations(
     linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None
 ) -> Gram:
-    """Return the normal equations from the Gram matrix of all columns; ``like`` gives the reduction of each block.
+    """Return the normal equations from the Gram matrix of all columns, frames projected out and each block reduced.
 
-    ``full`` (f + P + 1, f + P + 1) are the products of the whitened columns.
+    ``full`` (f + P + 1, f + P + 1) are the products of the whitened columns; the reduction of each block is that of
+    ``like``, or else to the directions that the data determine.
     """
     flat = linear.frames.shape[2]
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
@@ -144,7 +145,7 @@ def normal_equations(
 
 
 def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[int, ...]]:
-    """Eigenvectors of each block's information that the data determine, and their number.
+    """Eigenvectors of each block's information matrix with eigenvalues above rounding and noise, and their number.
 
     In a block with non-negative parameters, each determined parameter is its own direction.
     """
@@ -250,7 +251,7 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
 
 
 def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
-    """Least-squares step (f,) of the unknown frames, over the rows with weight."""
+    """Least-squares step (f,) of the unknown frames that fits a residual, over the rows with weight."""
     flat = linear.frames.shape[2]
     if not flat:
         return np.zeros(0)
