@@ -60,7 +60,10 @@ def _descended(
     settled: float,
     steps: int,
 ) -> tuple[Observations, list[tuple[Effect, Array]], float]:
-    """Gauss-Newton descent of a limited number of steps: corrected model, its effects, and their cost."""
+    """Levenberg-Marquardt descent of at most ``steps`` steps; return corrected model, effects with values, and cost.
+
+    The cost is the sum of squares of the whitened gap and of the values over their prior deviations.
+    """
     whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
     chosen = [explanation.block_of(effect) for effect in effects]
@@ -99,7 +102,7 @@ def _descended(
 
 
 def _step_inside(products: Array, state: Array, prior: Array, least: Array, damping: float) -> tuple[Array, float]:
-    """Damped ridge step under bounds 0 or −∞: parameters that would cross are held at zero."""
+    """Damped ridge step from ``state`` with lower bounds ``least``, 0 or −∞: what would cross one is held at 0."""
     flat, held = len(products) - 1 - len(prior), np.zeros(len(prior), dtype=bool)
     while True:
         step, size = _ridge_step(products, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
@@ -110,9 +113,9 @@ def _step_inside(products: Array, state: Array, prior: Array, least: Array, damp
 
 
 def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
-    """Ridge step that minimises |gap − design step|² + |(state + step)/prior|², and its effect in units of noise.
+    """Ridge step that minimises |gap − design step|² + |(state + step)/prior|², and its length in posterior deviations.
 
-    ``products`` are those of the columns of the design and of the gap, the last. The first columns have no prior.
+    ``products`` is the Gram matrix of the design's columns and the gap, the last. The first columns have no prior.
     Undetermined directions are not moved.
     """
     matrix, vector = products[:-1, :-1].copy(), products[:-1, -1].copy()
@@ -126,7 +129,7 @@ def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> 
 
 
 def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
-    """Observations displaced by the effects; responses are read at the nominal robot, as in prediction."""
+    """Observe the robot displaced by effects with values (P,); their responses are those at the nominal robot."""
     moved_by, instrument = displacement(observe(campaign, frames), pairs)
     return observe(campaign, frames, displacement=moved_by, instrument=instrument)
 
@@ -149,7 +152,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
 
 
 def refined_blocks(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
-    """One sweep of the coordinate search: the blocks with the constants of each moved in turn."""
+    """One sweep of coordinate search: maximise the evidence over the nonlinear constants of each block in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
         if _has_constants(item, factor):
@@ -158,20 +161,20 @@ def refined_blocks(kept: Products, observations: Observations, blocks: Sequence[
 
 
 def _has_constants(item: Block, factor: float) -> bool:
-    """Whether the effect of a block has constants to refine."""
+    """Whether the effect of a block proposes settings near its own, so that it has nonlinear constants to refine."""
     return len(gate.nearby(item.effect, factor)) > 1
 
 
 def weighed(kept: Products, blocks: Sequence[Block]) -> float:
-    """Log evidence of a combination of effects plus their log prior odds."""
+    """Log evidence of a combination of effects plus log prior odds; a constant of its own counts as an effect."""
     priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
     return _evaluated(kept, blocks)[2].log_evidence + priors
 
 
 def downweighted(explanation: Explanation) -> Whitening:
-    """Whitening in which outliers are down-weighted instead of left out, unless a smooth discrepancy is in it.
+    """Whitening in which outliers have Huber weights instead of zero; as it is where it has a smooth discrepancy.
 
-    A per-pose discrepancy is left out of it, as it would absorb the residual of a slightly wrong constant.
+    A per-pose discrepancy is removed from it first, as it would absorb the residual of a slightly wrong constant.
     """
     whitening, aside, kernel = explanation.whitening, explanation.outliers, explanation.discrepancy.kernel
     if kernel is not None and kernel.grouped:
@@ -189,7 +192,7 @@ def downweighted(explanation: Explanation) -> Whitening:
 def _refined_block(
     kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float
 ) -> Block:
-    """Hill climbing over the constants of one effect, the others fixed; return its block."""
+    """Hill climbing of the evidence over the nonlinear constants of one effect, the others fixed; return its block."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
     seen: dict[Effect, float] = {}
 
@@ -218,16 +221,16 @@ def _refined_block(
 
 
 def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
-    """Evidence of the combination of all these blocks."""
+    """Evidence of the combination of all these blocks, without prior odds; its linear problem and normal equations."""
     linear, problem = kept.problem(blocks)
     return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))
 
 
 @dataclass(frozen=True, eq=False)
 class ExactSelection:
-    """Explanation linearised at the exact model of its own effects, which have the values (P,).
+    """Selected effects ``held`` with their values (P,), and the explanation linearised at their exact model.
 
-    ``families`` names the effect that each block belongs to.
+    ``families`` names the effect that each block of the explanation belongs to.
     """
 
     observations: Observations
@@ -291,14 +294,14 @@ def select_exactly(
 
 
 def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
-    """Linear problem at the exact model: its gap, plus the displacement by the effects that it holds."""
+    """Linearise at the exact model: its gap plus the displacement by its own effects, so that values are no steps."""
     moved = (block(observations, effect).columns @ values for effect, values in held)
     gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
     return Linear(gap, frame_columns(observations)[0], tuple(blocks))
 
 
 def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
-    """Yield an all-places setting restricted to the two, three and more places with the largest fitted effect."""
+    """Yield an all-places setting restricted to the two, three and more places with the largest fitted displacement."""
     if chosen.places or chosen.share is not None:
         return
     every = gate.places_of(item.parameters)
@@ -338,7 +341,8 @@ def _testable_blocks(
 ) -> Iterator[Block]:
     """Yield the blocks of all settings but those that the data or the unknown frames leave undetermined.
 
-    Those ``kept`` stay in any case.
+    Left out are constant effects in a joint that the frames absorb, or on a link outside the moving chain, and settings
+    of several places of which one moves nothing. Those ``kept`` stay in any case.
     """
     frames, names = frame_columns(observations)[0], observations.robot.joint_names
     basis = orthonormal(equations_of(frames))
@@ -359,7 +363,7 @@ def _testable_blocks(
 
 
 def _all_places_visible(item: Block) -> bool:
-    """Whether the columns of each place of a multi-place setting differ from zero."""
+    """Whether every place of a setting in several places has a column above rounding, relative to the longest."""
     places = item.effect.places if len(item.effect.places) > 1 else ()
     if not places:
         return True
@@ -369,6 +373,6 @@ def _all_places_visible(item: Block) -> bool:
 
 
 def constant(effect: Effect, observations: Observations) -> bool:
-    """Whether the displacement of each place is the same in all rows."""
+    """Whether an effect is constant: all its responses are the same in every row."""
     responses = [r for p in gate.checked(effect, observations) for r in p.responses]
     return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)

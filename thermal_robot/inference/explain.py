@@ -47,10 +47,11 @@ PLAIN: Hyperparameters = (-1, 0.0)
 
 @dataclass(eq=False)
 class ModelSearch:
-    """Model search over combinations of blocks and over kernels and amplitudes of a discrepancy.
+    """Model search over combinations of blocks and over kernels and amplitudes of a correlated model discrepancy.
 
-    ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
-    contains the other; ``among`` is the number of kernels that share the prior, of which ``kernels`` are left.
+    ``whitening`` is that without a discrepancy. ``log_prior`` are log prior odds of the blocks. ``exclusive`` pairs of
+    blocks must not be together, nor those of which one contains the other. ``among`` is the number of kernels that
+    share the prior of a discrepancy; ``kernels`` are those of them that are still searched.
     """
 
     linear: Linear
@@ -63,7 +64,7 @@ class ModelSearch:
     searches: dict[Hyperparameters, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Decompose each kernel once for all amplitudes."""
+        """Form the Gram matrix without a discrepancy, and decompose each kernel once for all amplitudes."""
         w = self.whitening
         self._stack = white_stack(self.stack or DesignMatrix.of(self.linear.columns), w)
         self._products, self._equations = self._stack.products(), self._stack.equations
@@ -102,7 +103,7 @@ class ModelSearch:
         return found
 
     def without_columns(self) -> ModelSearch:
-        """Copy without the rows' columns, unless a per-pose discrepancy still needs them."""
+        """Copy without the stored design columns, to save memory; unchanged if a per-pose kernel still needs them."""
         if any(kernel.grouped for kernel in self.kernels):
             return self
         found = copy(self)
@@ -111,7 +112,7 @@ class ModelSearch:
 
     @staticmethod
     def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
-        """Yield the larger block of each nested pair of which the data determine the smaller."""
+        """Yield the larger block of each nested pair whose smaller block has a signal-to-noise above a limit."""
         for pair in inside:
             small, large = sorted(pair, key=lambda b: plain.ranks[b])
             own = plain.slices[small]
@@ -128,7 +129,7 @@ class ModelSearch:
         )
 
     def search_at(self, hyper: Hyperparameters) -> Search:
-        """Search over blocks with one discrepancy in the covariance, made once."""
+        """Return the memoised search over blocks with one discrepancy in the rows' covariance."""
         if hyper not in self.searches:
             white, products = self.whitened_at(hyper), self._whitened_gram(hyper, np.arange(len(self._products)))
             plain = self.searches[PLAIN].gram
@@ -145,7 +146,7 @@ class ModelSearch:
     def run(
         self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True
     ) -> tuple[Hyperparameters, Combination]:
-        """Hill climbing over combinations and discrepancies from several starts.
+        """Hill climbing over combinations and discrepancies from several starts; return the best of both.
 
         With ``detours`` larger moves are tried, too.
         """
@@ -184,7 +185,7 @@ class ModelSearch:
         return (hyper, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _best_amplitude(self, kernel: int, blocks: tuple[int, ...]) -> tuple[Hyperparameters, float]:
-        """Most probable amplitude of a kernel with one combination, and its log evidence; it is unimodal."""
+        """Maximise the log evidence of one combination over a kernel's grid of amplitudes, in which it is unimodal."""
         k = settings.TAUS.index(self._amplitudes.get(kernel, 1.0))
         best = self._log_evidence((kernel, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:
@@ -198,7 +199,7 @@ class ModelSearch:
         return (kernel, settings.TAUS[k]), best
 
     def _log_evidence(self, hyper: Hyperparameters, blocks: tuple[int, ...]) -> float:
-        """Log evidence of one combination with one discrepancy, from the columns of its blocks alone."""
+        """Log evidence of one combination with one discrepancy, memoised; −∞ where rounding errors dominate."""
         key = hyper, tuple(sorted(blocks))
         if key not in self._log_evidences:
             flat, white = self.linear.frames.shape[2], self.whitened_at(hyper)
@@ -219,7 +220,7 @@ class ModelSearch:
         return self._log_evidences[key]
 
     def _warm_start(self, kernel: int, blocks: tuple[int, ...]) -> Combination | None:
-        """Warm start: the same combination with the last amplitude, or without a discrepancy."""
+        """Warm start: the combination with the last amplitude, or else without a discrepancy; ``None`` if unknown."""
         if (kernel, blocks) in self._combinations:
             return self._combinations[kernel, blocks]
         known = self.searches[PLAIN].seen.get(blocks)
@@ -234,7 +235,7 @@ class ModelSearch:
         return np.asarray(found[np.ix_(number, number)])
 
     def _projected(self, kernel: int, kept: NDArray[np.int64]) -> Array:
-        """Products of a kernel's factor with some of the distinct columns."""
+        """Products BᵀS of a kernel's factor B with distinct columns S; the last are kept for its next amplitude."""
         known = self._projections[kernel]
         if known is not None:
             return known[:, kept]
@@ -244,23 +245,23 @@ class ModelSearch:
         return self._last[1]
 
     def likeliest_joints(self) -> Kernel | None:
-        """Kernel of scattering joints with the most evidence, whatever it was weighed beside."""
+        """Kernel of joint scatter with the most evidence over all combinations and amplitudes; ``None`` without any."""
         asked = [(log, k) for ((k, _), _), log in self._log_evidences.items() if k >= 0 and self.kernels[k].joints]
         return self.kernels[max(asked)[1]] if asked else None
 
     def plausible_kernels(self, best: Combination) -> tuple[Kernel, ...]:
-        """Kernels with substantial posterior probability beside the best combination.
+        """Kernels whose log evidence with the best combination is within a limit of its own, at their best amplitude.
 
-        A kernel whose most probable amplitude is the smallest is noise; one that is far less probable is left out.
+        A kernel whose best amplitude is the smallest of the grid is noise, and is left out.
         """
         least, near = best.log_evidence - settings.KERNEL_REACH, self._peaks(best)
         kept = [k for log, tau, k in near.values() if tau > settings.TAUS[0] and log > least]
         return tuple(self.kernels[k] for k in sorted(kept))
 
     def _peaks(self, best: Combination) -> dict[str, tuple[float, float, int]]:
-        """Maximum over amplitudes, and over the relative sizes of joints, of the log evidence of kernels, by name.
+        """Largest log evidence of each kernel, by name, with the best combination; with its amplitude and its number.
 
-        Beside the best combination; with the amplitude and the number of the kernel.
+        The maximum is over amplitudes and over the relative sizes of joints.
         """
         peaks: dict[str, tuple[float, float, int]] = {}
         for ((kernel, tau), blocks), log in self._log_evidences.items():
@@ -270,7 +271,7 @@ class ModelSearch:
         return peaks
 
     def _beside_others(self, best: Combination) -> tuple[Hyperparameters, Combination] | None:
-        """Evaluate the neighbours with all plausible discrepancies; return an improvement, if any."""
+        """Evaluate the best combination's neighbours with each plausible discrepancy; return an improvement, if any."""
         likeliest = {kernel for _, _, kernel in self._peaks(best).values()}
         asked = [(r, log) for (r, blocks), log in self._log_evidences.items() if blocks == best.blocks]
         near = [r for r, log in asked if r[0] in likeliest and self._is_near(log, best)]
@@ -327,14 +328,14 @@ class ModelSearch:
         return hyper, self.search_at(hyper).evaluate(best.blocks)
 
     def probabilities(self) -> tuple[list[Combination], Array]:
-        """Posterior probabilities of all combinations, summed over discrepancies, most probable first."""
+        """Posterior probability of each combination with each discrepancy, normalised over all, most probable first."""
         masses = [(mass, c) for own in self._log_masses().values() for mass, c in own]
         masses.sort(key=lambda item: -item[0])
         weight = np.exp(np.array([mass for mass, _ in masses]) - masses[0][0])
         return [c for _, c in masses], weight / weight.sum()
 
     def kernel_probabilities(self) -> dict[str, float]:
-        """Posterior probability of each kernel by its name, and by an empty name that of none."""
+        """Posterior probability of each kernel by its name; under the empty name that of no discrepancy."""
         held = {hyper: np.array([mass for mass, _ in own]) for hyper, own in self._log_masses().items()}
         top = max(own.max() for own in held.values())
         mass: dict[str, float] = {}
@@ -344,9 +345,9 @@ class ModelSearch:
         return {name: m / sum(mass.values()) for name, m in mass.items()}
 
     def _log_masses(self) -> dict[Hyperparameters, list[tuple[float, Combination]]]:
-        """Log evidence of all combinations for each discrepancy, weighted by the amplitudes that it represents.
+        """Log evidence of all combinations for each discrepancy, plus the log of the number of its amplitudes.
 
-        Sum over all amplitudes by those computed: each represents the amplitudes nearest to it.
+        It counts for the amplitudes of the grid that are nearest to it, as only some of them are computed.
         """
         seen = {hyper: list(search.seen.values()) for hyper, search in self.searches.items()}
         best = max((c for own in seen.values() for c in own), key=lambda c: c.log_evidence)
@@ -410,7 +411,7 @@ class Explanation:
         return self.searched.without(frozenset(out)).explanation(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
-        """Block of the best combination that belongs to an effect, in any setting."""
+        """Return the number of that block of the best combination which is a setting of the given effect."""
         return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
 
     def held(self, block: int) -> Array:
@@ -436,11 +437,11 @@ def explain(
 ) -> Explanation:
     """Bayesian model selection of blocks together with outliers, noise and a correlated discrepancy.
 
-    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Blocks of one
-    family are settings that exclude each other and share its prior probability. The search starts from ``starts``. With
-    an explanation of a similar problem ``before``, its weights, noise and plausible kernels are reused; if the first of
-    the starts is found again with the same kernel, the iteration ends. ``log_prior`` is by default that of
-    the blocks' effects.
+    Robust: rows at a squared distance beyond a χ² limit are set aside, those in the tail weigh less (Huber). Blocks of
+    one family are settings that exclude each other and share its prior probability. The search starts from ``starts``.
+    With an explanation of a similar problem ``before``, its weights, noise and plausible kernels are reused; if the
+    first of the starts is found again with the same kernel, the iteration ends. ``log_prior`` is by default that of the
+    blocks' effects.
     """
     aside = np.zeros(len(linear.gap), dtype=bool) if before is None else before.outliers
     families = families or [str(k) for k in range(len(linear.blocks))]
@@ -484,7 +485,7 @@ def _state(blocks: tuple[int, ...], kernel: Kernel | None, whitening: Whitening)
 
 @dataclass(frozen=True, eq=False)
 class _Inputs:
-    """Inputs that stay the same in all iterations."""
+    """Inputs of :func:`explain` that are the same in all iterations; ``rivals`` are blocks that exclude each other."""
 
     linear: Linear
     families: Sequence[str]
@@ -496,7 +497,7 @@ class _Inputs:
 
 @dataclass(frozen=True, eq=False)
 class _Iteration:
-    """One search at fixed weights: best combination, its discrepancy, and both residuals."""
+    """One model search at fixed weights: best combination, its discrepancy with posterior mean, and its residual."""
 
     inputs: _Inputs
     models: ModelSearch
@@ -515,7 +516,7 @@ class _Iteration:
         return cls._searched(inputs, models, seeds, detours=False)
 
     def without(self, out: frozenset[int]) -> _Iteration:
-        """Return the round without some blocks, started from the best combination without them."""
+        """Repeat the search without some blocks, started from the best combination without them."""
         return self._searched(
             self.inputs, self.models.without(out), [tuple(b for b in self.best.blocks if b not in out)]
         )
@@ -537,7 +538,7 @@ class _Iteration:
         return self.models.kernels[self.hyper[0]] if self.hyper[0] >= 0 else None
 
     def next_kernels(self, kernels: Sequence[Kernel]) -> Sequence[Kernel]:
-        """Forward selection of scattering joints: plausible kernels, and beside scatter those of one joint more."""
+        """Forward selection of scattering joints: plausible kernels, and the likeliest joint scatter plus one joint."""
         likely, known = self.models.plausible_kernels(self.best), {kernel.name for kernel in self.models.kernels}
         own = self.models.likeliest_joints() if self.kernel and self.kernel.grouped else None
         more = own.with_one_more(kernels) if own else []
@@ -633,7 +634,10 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
 
 
 def share_of_places(count: int, among: int) -> float:
-    """Prior probability that an effect acts in exactly so many given places, in all where 0; 1 without places."""
+    """Prior probability, given an effect, that it acts in exactly one set of ``count`` places of ``among``.
+
+    With a count of 0 it is that of acting in all; without places 1.
+    """
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
 
 

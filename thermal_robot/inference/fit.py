@@ -60,11 +60,11 @@ class Fit:
     variants: dict[str, tuple[Effect, ...]]
 
     def blocks_of(self, name: str) -> list[int]:
-        """Blocks of one effect: its settings."""
+        """Return the numbers of the blocks of one effect, one for each of its settings."""
         return [b for b, family in enumerate(self.families) if family == name]
 
     def names_of(self, combination: Combination) -> frozenset[str]:
-        """Effects of a combination of blocks."""
+        """Return the names of the effects in a combination of blocks."""
         return frozenset(self.families[b] for b in combination.blocks)
 
     def probability(self, name: str) -> float:
@@ -97,7 +97,7 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
 
 
 def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect that are compared: in all its joints, and in each alone."""
+    """Return the settings of an effect that are compared: all its variants, and the first one in each single place."""
     known = gate.variants(effect, observations)
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
@@ -148,7 +148,7 @@ def _fitted(
 
 
 def require_enough(campaign: Campaign) -> None:
-    """Refuse a campaign with too few different poses for the frames, the effects and a held-out fold."""
+    """Raise :class:`EstimationError` if there are too few different poses for frames, effects and a held-out fold."""
     still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
     poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
     unknown = len(unknown_frames(campaign))
@@ -214,7 +214,7 @@ def _exact(
 
 
 def _exact_model(observations: Observations, explanation: Explanation, held: Held) -> tuple[Observations, Held]:
-    """Exact refit from the values of the linear fit, or from the former ones if that has the smaller cost."""
+    """Gauss-Newton refit from the values of the linear fit; from the former values if these cost less than that."""
     linear, campaign = explanation.linear, observations.campaign
     values = [mean for mean, _ in explanation.values.values()]
     left = linear.gap - sum((linear.contribution(b, own) for b, own in enumerate(values)), np.zeros_like(linear.gap))

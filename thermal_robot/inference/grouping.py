@@ -99,7 +99,10 @@ STAND = "stand"  # Label of what stays in one place while the robot is brought t
 
 
 def held_out_groups(campaign: Campaign) -> tuple[Labels, str]:
-    """Cross-validation folds (N,), and their scheme: an instrument's stands, or blocks of rows where these are few."""
+    """Cross-validation folds (N,), and their scheme: an instrument's stands, or else blocks of consecutive rows.
+
+    Stands are taken where the campaign holds no positions and has at least :data:`settings.FEWEST_STANDS` of them.
+    """
     stands = campaign.labels.get(STAND)
     if stands is not None and campaign.position is None:
         number = np.unique(stands, return_inverse=True)[1].ravel()

@@ -5,7 +5,7 @@ two exchanges of which neither gains alone, one block that contains several smal
 block in place of two blocks.
 
 The gain of one more block is found for all blocks at once, to first order: the parameters of the others stay. In the
-eigenvectors of a block's information given the others, with eigenvalues w, the vector c, and the remaining noise s'²,
+eigenvectors of a block's information given the others, with eigenvalues w, the scores c, and the remaining noise s'²,
 
     (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
     gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
@@ -15,7 +15,7 @@ negative it stays at zero; in both cases its own factor is
 
     log 2 Φ(z) ,  and at zero beside that  ½ z² − ½ log(1 + λ² w/s'²) ,    z = c λ/(s' (s'² + λ² w)^½) .
 
-with w and c of it beside the others of its block. For a block of one column that is exact.
+with w and c of this column given the others of its block. For a block of one column that is exact.
 """
 
 from __future__ import annotations
@@ -39,9 +39,11 @@ _LOG_2, _ROOT_2 = np.log(2.0), np.sqrt(2.0)
 
 @dataclass(frozen=True, eq=False)
 class _EqualWidth:
-    """Blocks of equal width: their numbers, w and c² (K, D) of the columns not held at zero, and the constrained ones.
+    """Blocks of equal width with the statistics of their first-order gain, given the blocks already in the model.
 
-    ``sides`` (J,): place in ``blocks``, w and c of each column that cannot be negative.
+    ``value`` w and ``along`` c² (K, D): eigenvalues of each block's information, and squared scores in its
+    eigenvectors, columns held at zero excepted. ``sides`` (J,): place in ``blocks``, w and c of each column that cannot
+    be negative.
     """
 
     blocks: list[int]
@@ -51,7 +53,7 @@ class _EqualWidth:
 
 
 def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
-    """First-order gain of log evidence by adding each block, its scale integrated out, and its best scale."""
+    """First-order gain of log evidence by adding each block, its scale integrated out: block, gain and best scale."""
     used = gram.columns_of(base.blocks)
     # a column that is held at zero takes nothing up
     values, covariance = gram.posterior(base)
@@ -91,7 +93,7 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
 def _beside(
     gram: Gram, base: Combination, blocks: list[int], used: NDArray[np.int64], left: Array, covariance: Array
 ) -> _EqualWidth:
-    """Projected statistics of blocks of equal width, given the columns in use and their covariance."""
+    """Statistics of blocks of equal width given the columns in use, which are projected out by their covariance."""
     own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks])
     cross = gram.matrix[own[:, :, None], used]
     inside = gram.matrix[own[:, :, None], own[:, None, :]] - cross @ covariance @ cross.transpose(0, 2, 1)
@@ -107,10 +109,10 @@ def _beside(
 def _constrained(
     inside: Array, pull: Array, constrained: NDArray[np.bool_], noise2: float
 ) -> tuple[NDArray[np.bool_], _Sides]:
-    """Mask of the columns not held at zero at their expected sizes, and single-column statistics of constrained ones.
+    """Active set of each block at its expected sizes: mask of columns not held at zero; statistics of constrained ones.
 
-    Of a free column its mean and variance given the other free ones; of one held at zero its gradient and information
-    given these.
+    Of a free column its information and score given the other free ones; of one held at zero its information and
+    gradient given these.
     """
     free = ~constrained | (pull > 0.0)
     for last in [*(False,) * settings.NOISE_ROUNDS, True]:
@@ -132,7 +134,7 @@ def _constrained(
 
 
 def _log_half_lines(alike: _EqualWidth, square: Array, noise: Array) -> Array:
-    """Log integrals (K, S) over the half lines of non-negative columns alone, at each scale."""
+    """Log factors (K, S) of the half-normal priors of each block's non-negative columns, at each of S scales."""
     found = np.zeros_like(noise)
     block, value, pull = alike.sides
     if not len(block):
@@ -173,10 +175,10 @@ def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
 
 @dataclass(eq=False)
 class Search:
-    """Memoised evaluation of combinations of blocks.
+    """Memoised hill climbing over combinations of blocks by their log evidence.
 
-    ``exclusive`` pairs of blocks must not be together; ``containers`` can do all that a block of another effect can;
-    those that are ``out`` are in no combination.
+    ``exclusive`` pairs of blocks must not be together; ``containers`` are blocks whose columns span those of a block of
+    another effect; blocks that are ``out`` are in no combination. ``seen`` is the memo.
     """
 
     gram: Gram
@@ -187,7 +189,7 @@ class Search:
     out: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
-        """List the blocks that each block excludes."""
+        """List for each block those that it excludes, and find the largest log evidence in the memo."""
         self._apart: dict[int, set[int]] = {}
         self._expanded: set[tuple[int, ...]] = set()
         self._left_at: dict[tuple[int, ...], float] = {}
@@ -218,7 +220,7 @@ class Search:
         return self.seen[key]
 
     def _at_least(self, blocks: Sequence[int], start: Combination) -> Combination:
-        """Evaluate a combination fully only where it comes near another one."""
+        """Evaluate a combination exactly, unless its log evidence is clearly below that of ``start``."""
         return self.evaluate(blocks, start, start.log_evidence - settings.NEARLY)
 
     def _computed(self, key: tuple[int, ...], start: Combination | None, floor: float) -> Combination:
@@ -233,7 +235,8 @@ class Search:
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Hill climbing with larger moves, until no move improves.
 
-        All neighbours of the best combination are evaluated, so that its probability is relative to all of them.
+        All neighbours of the best combination are scored, near ones exactly, so that its probability is relative to
+        all.
         """
         best = self.climb(start)
         detours = (self._simpler, self._smaller, self._two_at_once)
@@ -242,7 +245,7 @@ class Search:
         return best
 
     def climb(self, start: Sequence[int] = ()) -> Combination:
-        """Hill climbing by adding, dropping and exchanging blocks, neighbours of near ties included."""
+        """Hill climbing by adding, dropping and exchanging blocks, also from combinations that are nearly as good."""
         best = self._climb(start, frozenset())
         while (better := self._near_ties(best)) is not None:
             best = self._climb(better.blocks, frozenset())
@@ -288,13 +291,13 @@ class Search:
         return None
 
     def ties(self, best: Combination) -> list[Combination]:
-        """Best combination, then others of the same size that are nearly as probable."""
+        """Best combination, then others with as many blocks and nearly the same log evidence, best first."""
         near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
         near = [c for c in near if len(c.blocks) == len(best.blocks)]
         return [best, *sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]]
 
     def evaluate_neighbours(self, blocks: Sequence[int]) -> Combination:
-        """Evaluate all neighbours of a combination; return the best of them and it."""
+        """Evaluate the neighbours of a combination that come near it to first order; return the best of all."""
         own = self.evaluate(blocks)
         near = [self._at_least(c.blocks, own) for c in self._promising(own)]
         return max((own, *near), key=lambda c: c.log_evidence)
@@ -320,7 +323,7 @@ class Search:
         return None
 
     def _fewer(self, found: Combination, kept: int) -> Combination:
-        """Backward elimination of all blocks but one."""
+        """Backward elimination, as long as the evidence grows, of blocks other than ``kept``."""
         while True:
             without = [self.evaluate([c for c in found.blocks if c != b], found) for b in found.blocks if b != kept]
             best = max(without, key=lambda c: c.log_evidence, default=found)
@@ -364,7 +367,7 @@ class Search:
         return sorted(found.values(), key=lambda c: -c.log_evidence)
 
     def _bases(self, best: Combination) -> list[Combination]:
-        """Return the combination, and it without each of its blocks: the starting points of additions."""
+        """Return the combination itself, and without each one of its blocks: the starting points of additions."""
         return [best, *(self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks)]
 
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
@@ -387,7 +390,7 @@ class Search:
         return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
 
     def set_best(self, blocks: Sequence[int], families: Sequence[str]) -> Combination:
-        """Best settings of the same effects, by coordinate search."""
+        """Best settings of the same effects by coordinate search: single blocks are exchanged while that gains."""
         best = self.evaluate(blocks)
         while True:
             names = {families[b]: b for b in best.blocks}
@@ -402,7 +405,7 @@ class Search:
             best = found
 
     def probabilities(self) -> tuple[list[Combination], Array]:
-        """Return the combinations evaluated, with their posterior probabilities, most probable first."""
+        """Return all combinations evaluated, with their posterior probabilities among these, most probable first."""
         order = sorted(self.seen.values(), key=lambda c: -c.log_evidence)
         log = np.array([c.log_evidence for c in order])
         weight = np.exp(log - log[0])
