@@ -53,10 +53,11 @@ Runs = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """Cumulative sums, in the order of measurement, of products of a place's d displacement columns.
+    """Cumulative sums, in the order of measurement, of the sufficient statistics of a place, to score runs of rows.
 
-    They are those with each other, with the r columns of the design, and with the residual, of which ``squares`` (N,)
-    are the squared lengths; ``total`` and ``freedom`` as of ``PlaceStatistics``.
+    ``products`` (N, ·) are each row's products of the place's d displacement columns with each other, with the r
+    columns of the design, and with the residual; ``summed`` (N + 1, ·) their cumulative sums; ``squares`` (N,) the
+    squared lengths of the residual; ``size`` (m, d, r); ``total`` and ``freedom`` as of ``PlaceStatistics``.
     """
 
     products: Array
@@ -68,7 +69,7 @@ class _Sums:
 
     @classmethod
     def of(cls, target: Target, moves: Array, order: NDArray[np.int64]) -> _Sums:
-        """Cumulative sums of the columns (N, m, d) of a place over a residual."""
+        """Form the sums for the displacement columns (N, m, d) of a place, and the residual of a target."""
         (rows, m, d), statistics = moves.shape, target.statistics(moves)
         parts = (statistics.weight, statistics.design.transpose(2, 0, 1), statistics.remainder)
         products = np.concatenate([part.reshape(rows, -1) for part in parts], axis=1)[order]
@@ -83,7 +84,7 @@ class _Sums:
         return settings.FEWEST_ASIDE + -(-2 * d // m)
 
     def gains(self, sums: Array, total: float, freedom: int) -> Array:
-        """Log evidence (C,) of a displacement of some rows (:attr:`Score.gain`), from sums (C, ·) over these rows."""
+        """Gain of log evidence (C,) by a constant displacement in each run, from sums (C, ·) over its rows (BIC)."""
         (_, d, r), runs = self.size, len(sums)
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
@@ -91,7 +92,7 @@ class _Sums:
         return bic_gain(total, explained, rank, freedom)
 
     def best(self, runs: Runs) -> Runs:
-        """Run (2,) of rows with the largest gain; the empty one where there is none."""
+        """Return the run (2,) of rows with the largest gain; (0, 0) where there is none to choose from."""
         if not len(runs):
             return np.zeros(2, dtype=np.int64)
         sums = self.summed[runs[:, 1]] - self.summed[runs[:, 0]]
@@ -122,9 +123,10 @@ class _Sums:
         return run
 
     def shared(self, rows: Rows) -> float:
-        """Robust log evidence of a displacement of rows (N,): the smaller of that with and without the farthest.
+        """Robust gain of log evidence by a displacement of masked rows (N,): the smaller of with and without outliers.
 
-        All rows contribute to an event, but only a few to consecutive gross errors.
+        Left out are the rows with the largest residual, a fixed share: all rows contribute to an event, but only a few
+        to consecutive gross errors.
         """
         few, far = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE), self.squares * rows
         out = np.argsort(-far)[:few]
@@ -136,7 +138,11 @@ class _Sums:
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
-    """Change points of a fit: steps in time, runs of rows, and sessions; the simplest first, one a place."""
+    """Change points of a fit: steps in time, runs of rows, and sessions; the largest net gain first, one a place.
+
+    Net is the gain of log evidence less the logarithm of the number tried, and less the gain of an effect that was left
+    out for it. Empty for very few or very many rows.
+    """
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations, order = fit.corrected, in_order(fit.campaign)
@@ -158,10 +164,10 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
 
 
 def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
-    """Yield residuals, of all rows but single outliers, and the gain that an event in each must exceed.
+    """Yield residuals in which clustered outliers weigh fully, and the gain that an event in each must exceed.
 
-    Twice with all effects, with and without down-weighting of far rows; then without each effect, which may imitate an
-    event: the event must gain more than the effect.
+    First with all effects: once all rows but single outliers weigh fully, once far rows have Cauchy weights. Then
+    without each effect, which may imitate an event: the event must gain more than the effect.
     """
     e = fit.explanation
     single = e.outliers & ~clustered_outliers(fit, e.outliers)
@@ -179,7 +185,7 @@ def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
 
 
 def clustered_outliers(fit: Fit, aside: Rows) -> Rows:
-    """Outliers (N,) that cluster in the order of measurement more than chance allows."""
+    """Outliers (N,) with at least two others within a few rows in the order of measurement."""
     order = in_order(fit.campaign)
     near = np.convolve(aside[order], np.ones(2 * settings.NEAR_IN_ORDER + 1), "same")
     found = np.zeros_like(aside)
@@ -190,7 +196,7 @@ def clustered_outliers(fit: Fit, aside: Rows) -> Rows:
 def _at_place(
     observations: Observations, place: Discovered, sums: _Sums, order: NDArray[np.int64]
 ) -> Iterator[tuple[float, Discovered]]:
-    """Yield the best step, run and session at a place: gain, law, and number of those tried."""
+    """Yield the best step, the best run and each session at a place, as robust gain and law (with the number tried)."""
     rows, labels = len(order), observations.campaign.labels.get("session")
     sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
     kinds, inner = 3 if len(sessions) > 1 else 2, max(rows - 2 * sums.fewest + 1, 0)
@@ -226,7 +232,7 @@ class HeldOut:
 
     @classmethod
     def of(cls, columns: Array, values: Array, folds: Sequence[Rows]) -> HeldOut:
-        """Gram matrices of columns (N, m, K) and values (N, m) over disjoint folds."""
+        """Form the Gram matrices of columns (N, m, K) and values (N, m) over disjoint folds."""
         stack = np.concatenate([columns, values[:, :, None]], axis=2)
         stacks = tuple(equations_of(stack[fold]) for fold in folds)
         return cls(folds, stacks, np.array([own.T @ own for own in stacks]))
@@ -288,7 +294,7 @@ def alike(one: JointRipple, other: JointRipple) -> bool:
 
 @dataclass(frozen=True)
 class _Wave:
-    """A wave of a joint, and the number of waves among which it was selected."""
+    """Wave sin(k q), cos(k q) of order k in a joint's position q, and the number of waves it was selected from."""
 
     joint: str
     order: float
@@ -299,9 +305,10 @@ class _Wave:
 class _Pursuit:
     """Matching pursuit: waves are added one after another.
 
-    ``gap`` (N, m) is what all effects and waves explain; ``design`` (N, m, K) the columns of ``flat`` frame parameters
-    and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried by joint,
-    ``folds`` the rows (N,) of each fold by scheme; rows that are ``changed`` (N,) weigh fully, however far they are.
+    ``gap`` (N, m) is what effects and waves together are to explain; ``design`` (N, m, K) the columns of ``flat`` frame
+    parameters and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried
+    by joint, ``folds`` the rows (N,) of each fold by scheme; rows that are ``changed`` (N,) weigh fully, however far
+    they are.
     """
 
     observations: Observations
@@ -341,7 +348,7 @@ class _Pursuit:
 
     @property
     def independent_waves(self) -> float:
-        """Number of independent waves among which the best is picked."""
+        """Number of independent wave orders of all joints together, at least 1: a correction for multiple tests."""
         return max(sum(independent(grid) for grid in self.grids.values()), 1.0)
 
     def run(self, found: list[_Wave]) -> JointRipple:
@@ -356,7 +363,7 @@ class _Pursuit:
         return _ripple(self._pruned(found, target))
 
     def _with_best_wave(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
-        """Add the wave of the largest gain that does not harm held-out rows; ``None`` where none qualifies.
+        """Add the wave of largest net gain that keeps every scheme's held-out residual in bounds; ``None`` without one.
 
         ``astray`` (S,) is the held-out residual of each scheme over the smallest so far.
         """
@@ -383,7 +390,7 @@ class _Pursuit:
         return None
 
     def _pruned(self, found: list[_Wave], target: Target) -> list[_Wave]:
-        """Backward elimination of the waves that later ones made needless."""
+        """Backward elimination of waves that gain less log evidence than the logarithm of the number tried for them."""
         kept = list(found)
         while kept:
             whole = self._columns(kept) * target.root[:, :, None]
@@ -401,9 +408,10 @@ class _Pursuit:
         return kept
 
     def _peaks(self, target: Target, found: Sequence[_Wave], seen: Sequence[_Wave]) -> Iterator[_Wave]:
-        """Yield each joint's best new wave, and its best at the orders of other joints.
+        """Yield the peak of each joint's periodogram, and its best order among those of waves in other joints.
 
-        Joints often have gears of one kind, so that a wave at another joint's order is one of few.
+        Joints often have gears of one kind, so that a wave at another joint's order is one of few. Orders within a
+        peak's width of a wave seen in that joint are left out.
         """
         for joint, grid in self.grids.items():
             q, moves = self._moves(joint)
@@ -428,7 +436,7 @@ class _Pursuit:
         return np.stack([np.sin(wave.order * q), np.cos(wave.order * q)], axis=1)[:, None, :]
 
     def _wave(self, wave: _Wave) -> Array:
-        """Displacements (N, m, 2) by sine and cosine of a wave."""
+        """Displacements (N, m, 2) of the target by unit sine and cosine of a wave."""
         return np.asarray(self._moves(wave.joint)[1] * self._functions(wave))
 
     def _columns(self, found: Sequence[_Wave]) -> Array:
@@ -457,7 +465,8 @@ class _Pursuit:
 def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
     """Wald test of each pair of columns (E, K) given all others: the log evidence (W,) that dropping it costs.
 
-    Without a pair the sum of squares is larger by β_wᵀ C_ww⁻¹ β_w, β the values fitted and C their covariance.
+    ``pairs`` (W,) are the numbers of each pair's first column. Without a pair the sum of squares is larger by β_wᵀ
+    C_ww⁻¹ β_w, β the values fitted and C their covariance.
     """
     root = whitener(columns.T @ columns)
     fitted = root @ (root.T @ (columns.T @ values))
@@ -476,14 +485,17 @@ def _ripple(waves: Sequence[_Wave]) -> JointRipple:
 
 
 def _orders(q: Array, slides: bool) -> Array:
-    """Orders (K,) of the grid of a joint at positions (N,): those with a whole wave in its range."""
+    """Wave orders (K,) of a joint's grid with at least one period in the range of its positions ``q`` (N,).
+
+    Those of a revolute joint are no less than :data:`settings.LOWEST_RIPPLE`.
+    """
     grid = orders(q, slides)
     least = 2.0 * np.pi / max(float(np.ptp(q)), settings.TINY)
     return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
 
 
 def _holds(grid: Array, order: float) -> bool:
-    """Whether an order lies between the ends of a grid (K,)."""
+    """Whether an order lies between the ends of a grid (K,) of orders, both included; never for an empty grid."""
     return bool(len(grid)) and bool(grid[0] <= order <= grid[-1])
 
 
@@ -514,7 +526,7 @@ def _unit_vectors(target: Target, moves: Array) -> tuple[Array, Array]:
 
 
 def _along(target: Target, moves: Array) -> Target:
-    """Target of one equation a row: the component along the displacement (N, m) of one joint."""
+    """Reduce a target to one equation a row: residual and design along the displacement (N, m) of one joint."""
     way, length = _unit_vectors(target, moves)
     basis = orthonormal(np.einsum("nm,nmr->nr", way, target.basis.reshape(*way.shape, -1)))
     white = np.einsum("nm,nm->n", way, target.white.reshape(way.shape))
@@ -581,7 +593,10 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
 
 
 def _best_laws(sample: RowSample, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
-    """Best laws of a residual, with the number of those tried; for a segment also the law of the joint behind it."""
+    """Laws of a residual in their best functional form, by net gain; for a segment also that of the joint at its end.
+
+    Left out are laws whose gain of log evidence, less the logarithm of the number tried, is clearly negative.
+    """
     first = [(item, shaped(sample.observations, target, item.law)) for item in _with_joints(own)]
     joints = sample.observations.robot.joint_names
     at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
@@ -602,7 +617,7 @@ def _best_laws(sample: RowSample, target: Target, own: Sequence[Scanned]) -> lis
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
-    """Best candidates; for one at a segment also the simpler law of the joint behind it."""
+    """Return the best candidates, and for those at a segment the laws of the same quantity in the joint at its end."""
     first = list(own[: settings.SHAPED])
     simpler = {(i.law.place, i.law.follows) for i in first if i.law.kind == "link"}
     return first + [
@@ -636,7 +651,7 @@ def _sorted(found: dict) -> tuple:  # type: ignore[type-arg]
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:
-    """Kind and name of a law's place; a segment is named by the link that carries it."""
+    """Kind and name of a law's place; for a segment the link that carries it, not the joint at its end."""
     if law.kind != "link":
         return law.kind, law.place
     return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)

@@ -86,15 +86,15 @@ def _without_prior_of(
 
 
 def _inside(fit: Fit, effect: Effect) -> list[Effect]:
-    """List the candidate effects, in all their places, that an effect contains, itself excluded."""
+    """List the effects contained in an effect and reported within it, in all their places, unless fitted themselves."""
     first, held = [known[0] for known in fit.variants.values() if known], {e.name for e, _ in fit.effects}
     return [e for e in first if e.told_inside and effect.name in e.contained_in and e.name not in held]
 
 
 def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Basis (P, D) of an effect's determined directions, parameters (D, W) projected on it, and which it spans.
+    """Basis (P, D) of an effect's determined directions, parameters projected on it (D, W), and a mask of the spanned.
 
-    All in prior sizes.
+    All in prior sizes. A parameter is spanned where its residual is a negligible share of it or below the noise.
     """
     e, sizes = fit.explanation, np.array([p.size for p in wanted])
     asked = Block(item.effect, tuple(wanted), moved_by(fit.corrected, wanted), sizes)
@@ -108,12 +108,15 @@ def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Ar
 
 
 def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
-    """Mask of the parameters that the data identify, by posterior over prior standard deviation."""
+    """Mask of the parameters whose posterior deviation is below a fixed share of the prior one (half)."""
     return np.asarray(np.asarray(spread) < settings.DETERMINED * np.asarray(prior))
 
 
 def distinct(across: Array, within: NDArray[np.bool_], least: float = settings.DISTINCT) -> list[int]:
-    """Gram-Schmidt selection: columns independent of those before them by ``least``, as many as there are rows."""
+    """Gram-Schmidt selection: numbers of the columns of ``across`` (D, W) independent of those chosen before them.
+
+    Taken in order are columns ``within`` whose orthogonal part is longer than ``least``, D at most.
+    """
     basis = np.zeros((len(across), 0))
     kept: list[int] = []
     for k in np.flatnonzero(within):

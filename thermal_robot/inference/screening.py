@@ -66,8 +66,8 @@ def bic_gain(total: Array | float, explained: Array | float, rank: Array | float
 class Target:
     """Residual to be explained: ``white`` (N·m,), the gap with a design projected out, in units of the noise.
 
-    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design;
-    ``unseen``: how many of the N·m components no row sees.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): orthonormal basis of the design;
+    ``unseen``: how many of the N·m components are not measured.
     """
 
     white: Array
@@ -105,7 +105,7 @@ class Target:
 
     @property
     def left(self) -> Array:
-        """Residual (N, m), m and rad."""
+        """Residual (N, m) in m and rad: ``white`` without weights."""
         return self.white.reshape(self.root.shape) / self.root
 
     @property
@@ -114,7 +114,7 @@ class Target:
         return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
     def score(self, columns: Array) -> Score:
-        """Score of further columns (N, m, K); zero where they leave too few degrees of freedom."""
+        """F test and BIC of further columns (N, m, K); :data:`NOTHING` where they leave too few degrees of freedom."""
         whole = equations_of(columns * self.root[:, :, None])
         flat = without(whole, self.basis)
         # what is left of an exact alias of the design is rounding, no column
@@ -133,7 +133,7 @@ class Target:
         )
 
     def statistics(self, moves: Array) -> PlaceStatistics:
-        """Sufficient statistics for laws at a place whose d components displace the target by (N, m, d) a unit."""
+        """Sufficient statistics, row by row, to screen laws at a place from its Jacobian ``moves`` (N, m, d)."""
         own = moves * self.root[:, :, None]
         basis = self.basis.reshape(*self.root.shape, -1)
         return PlaceStatistics(
@@ -148,7 +148,7 @@ class Target:
 def _reweighted(
     gap: Array, design: Array, left: Array, seen: NDArray[np.int64] | None = None, first: bool = False
 ) -> Target:
-    """Return the target with Cauchy weights from a former residual, or equal weights the ``first`` time."""
+    """Return the target with Cauchy weights at a former residual ``left``, or with equal weights the ``first`` time."""
     noise = np.repeat(robust_noise(left, seen=seen), 3)
     figures = left.shape[1] if seen is None else np.maximum(seen.sum(axis=1), 1)
     far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * figures)
@@ -162,7 +162,7 @@ def _projected(gap: Array, design: Array, root: Array) -> Target:
 
 @dataclass(frozen=True, eq=False)
 class LawStack:
-    """Batch of C laws of K functions each (C, N, K) with their products (C, N, K, K)."""
+    """Batch of C laws, grouped by their number K of functions: (C, N, K) and their products (C, N, K, K)."""
 
     laws: int
     stacks: tuple[tuple[list[int], Array, Array], ...]
@@ -180,12 +180,12 @@ class LawStack:
 
 @dataclass(frozen=True, eq=False)
 class PlaceStatistics:
-    """Sufficient statistics of a residual for all laws at one place, summed over the components of each row.
+    """Sufficient statistics of a residual for all laws at one place, each row's components summed.
 
-    A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
-    without the design is then Σ_n φ_k φ_l W_n less that of their part in the design. In units of the noise: ``weight``
-    (N, d, d) products of the components, ``design`` (r, d, N) and ``remainder`` (N, d) those with the basis and the
-    residual; ``total`` and ``freedom`` of the residual.
+    A law's columns are the products of the place's d displacement components with K functions φ of a quantity. Their
+    Gram matrix without the design is Σ_n φ_k φ_l W_n less that of their projection on the design. In units of the
+    noise: ``weight`` (N, d, d) products W of the components, ``design`` (r, d, N) and ``remainder`` (N, d) those with
+    the design's basis and the residual; ``total`` sum of squares and degrees of ``freedom`` of the residual.
     """
 
     weight: Array
@@ -217,9 +217,10 @@ class PlaceStatistics:
 
 
 def explained_by(gram: Array, vector: Array, whole: Array, rows: int) -> tuple[Array, Array]:
-    """Explained sums of squares (C,) and ranks, from Gram matrices (C, K, K), (C, K) and squared lengths (C, K).
+    """Explained sums of squares (C,) and ranks (C,) of C regressions, from normal equations (C, K, K) and (C, K).
 
-    Errors of sums over ``rows`` grow with the square root of their number (Higham, *Accuracy and Stability*, 2002).
+    ``whole`` (C, K) are the squared lengths of the columns before the design was projected out. Errors of sums over
+    ``rows`` grow with the square root of their number (Higham, *Accuracy and Stability*, 2002).
     """
     own = np.einsum("cii->ci", gram)
     # what is left of an alias of the design is a difference of large numbers: rounding has to lie below the tolerance
@@ -246,7 +247,7 @@ __all__ = [
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
-    """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
+    """Smooth laws of each quantity at each place of the given kinds; constant ones at segments, harmonics in joints."""
     turns = components(observations.campaign) == 6
     robot = observations.robot
     places = {
@@ -285,7 +286,7 @@ def law_of(observations: Observations, plain: Discovered, name: str, values: Arr
 
 
 def straight(law: Discovered) -> Discovered:
-    """Straight-line version of a law; one of labels stays as it is."""
+    """Straight-line version of a law; a law of labels, such as sessions, stays as it is."""
     return law if law.labels else replace(law, shape="ramp", marks=())
 
 
@@ -352,10 +353,10 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
 
 
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
-    """Laws of stop operators (hysteresis) of a joint: coarse over the whole range, or neighbours of one.
+    """Laws of stop operators (hysteresis) of a joint: sets over the whole range of slips, and neighbours in it.
 
-    ``values`` (N,), rad or m from the last turning point, decide which are observable; an element between two is nearly
-    their sum.
+    ``values`` (N,), rad or m from the last turning point, decide which slips are observable. A slip between two of the
+    grid is nearly the sum of these.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)
@@ -365,9 +366,10 @@ def hystereses(law: Discovered, values: Array) -> list[Discovered]:
 
 
 def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
-    """Laws of time that relax exponentially after each start: with one amplitude, and one for each start.
+    """Laws of time that relax exponentially after each start, with several time constants; none where time is constant.
 
-    A session begins with its first row; where there are none, the campaign does.
+    With sessions both: one amplitude for all starts, and one for each. A session begins with its first row; without
+    sessions the campaign does.
     """
     clock = law.values(observations)
     if clock is None or not np.ptp(clock) > 0.0:
@@ -501,7 +503,7 @@ class RowSample:
 
     @classmethod
     def of(cls, fit: Fit) -> RowSample:
-        """Sample the rows of a fit."""
+        """Take all rows of a fit, or a reproducible random sample of :data:`settings.ENOUGH_ROWS` of more."""
         e = fit.explanation
         if fit.campaign.samples <= settings.ENOUGH_ROWS:
             return cls(fit.corrected, e.linear, consecutive_outliers(fit.campaign, e.outliers))
@@ -520,10 +522,9 @@ class RowSample:
         )
 
     def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
-        """Residual with the frames and some blocks projected out.
+        """Residual with the frames and some blocks projected out; far rows but consecutive ones have Cauchy weights.
 
-        Far rows have Cauchy weights, unless they are consecutive, or all but the farthest few are ``sound``: a law that
-        is large in few rows looks like gross errors.
+        With ``sound`` all but the farthest few weigh fully: a law that is large in few rows looks like gross errors.
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
@@ -537,9 +538,9 @@ class RowSample:
 
 
 def conditions(observations: Observations, joint: str = "") -> list[str]:
-    """Quantities of the campaign that may act on a place: recorded ones, the clock and the session.
+    """List the quantities that may act on a place: recorded ones, the clock and the session.
 
-    Of quantities recorded for each joint, only this joint's.
+    Not the joints' positions, gravity and reach; of quantities recorded for each joint, only this joint's.
     """
     robot = observations.robot
     others = tuple(f".{name}" for name in robot.joint_names if name != joint)
@@ -592,7 +593,7 @@ def _varying_responses(parameter: Parameter) -> Iterator[Response]:
 
 
 def interactions(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
-    """Interactions of two quantities, 1, u, v and u·v, the first a condition of the place or a joint's position."""
+    """Interactions of two quantities u and v (functions 1, u, v and u·v): a condition or own position with another."""
     robot, known = observations.robot, quantities(observations)
     turns = components(observations.campaign) == 6
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
@@ -640,7 +641,8 @@ Site = tuple[str, str, str]
 class Scanned:
     """Candidate law, its gain of log evidence, and the number of candidates tried.
 
-    One over ``tried``, the kinds of law times the laws of its kind, is its share of the prior; all sum to one.
+    ``tried`` is the number of kinds of law times that of the laws of its kind; 1/``tried`` is its share of the prior,
+    and all sum to one.
     """
 
     law: Discovered
@@ -670,7 +672,7 @@ class ScanCache:
         return self._statistics[place]
 
     def functions(self, law: Discovered) -> Array:
-        """Functions (N, K) of a law of what it follows, wherever it enters."""
+        """Basis functions (N, K) of a law, memoised by what it follows and its shape, wherever it enters the robot."""
         # all that the functions hang on
         followed = (
             *(law.quantity, law.shape, law.marks, law.origin, law.span, law.labels, law.runs, law.starts),
@@ -742,7 +744,7 @@ def _candidates(cache: ScanCache, effects: Iterable[Effect] | None) -> dict[str,
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Select the functional form of a law by its net gain of log evidence.
+    """Select the functional form of a law by its net gain of log evidence, with marks and widths refined.
 
     Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
     """
@@ -776,7 +778,10 @@ def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
 
 
 def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
-    """Pattern search over marks and widths; a law bends where rows lie on both sides, or it would follow one row."""
+    """Pattern search over the mark and width of a law for the largest gain of log evidence.
+
+    The mark stays between two quantiles of the quantity, lest the law follow a single row beyond it.
+    """
     step, low, high = settings.MARK_STEP, -np.inf, np.inf
     values = None if best.law.starts else best.law.values(cache.observations)
     if values is not None:
@@ -799,7 +804,7 @@ def _refined_marks(best: Scanned, cache: ScanCache) -> Scanned:
 
 
 def _refined_step(best: Scanned, cache: ScanCache) -> Scanned:
-    """Move a step to the best of the gaps between neighbouring values.
+    """Move a step to the midpoint between neighbouring values, near its own, with the largest net gain.
 
     The prior of the mark is uniform over the range, so that a long break between sessions has a larger share than a gap
     between two rows.
@@ -818,7 +823,7 @@ def _refined_step(best: Scanned, cache: ScanCache) -> Scanned:
 
 
 def _between_runs(law: Discovered, observations: Observations) -> Discovered:
-    """Step in time, labelled with the two sessions that it separates, if it separates sessions."""
+    """Label a step in time with the sessions on either side of it; unchanged where a session lies on both sides."""
     clock, runs = law.values(observations), observations.campaign.labels.get("session")
     if law.quantity not in CLOCK or clock is None or runs is None:
         return law
@@ -830,7 +835,7 @@ def _between_runs(law: Discovered, observations: Observations) -> Discovered:
 
 
 def _constant_law(law: Discovered) -> Discovered:
-    """Constant law at the place, or of the known effect, of a law."""
+    """Constant law at a law's place, or the known effect itself that the law modulates."""
     return Discovered(
         kind=law.kind,
         place=law.place,
@@ -861,7 +866,7 @@ def _grids(observations: Observations) -> dict[str, Array]:
 
 
 def _free_waves(cache: ScanCache, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
-    """Best wave of each joint."""
+    """Best wave of each joint, by the peak of its periodogram over the grid of orders."""
     observations, found = cache.observations, []
     for joint, grid in grids.items():
         q = observations.q[:, observations.robot.joint_names.index(joint)]
@@ -874,7 +879,7 @@ def _free_waves(cache: ScanCache, t: int, grids: Mapping[str, Array], tried: int
 
 
 def _session_step(cache: ScanCache, t: int, levels: Scanned) -> Scanned | None:
-    """Best step between consecutive sessions at the place of a law of sessions."""
+    """Best step between consecutive sessions at the place of a law of sessions; ``None`` where there is none."""
     observations = cache.observations
     known = quantities(observations)
     clock = next((name for name in CLOCK if name in known), None)
@@ -891,7 +896,7 @@ def _session_step(cache: ScanCache, t: int, levels: Scanned) -> Scanned | None:
 
 
 def _prefer_sessions(single: dict[Site, Scanned], session: Site, cache: ScanCache, t: int) -> None:
-    """Drop a law of time where one of sessions at its place explains nearly as much with less resolution."""
+    """Drop laws of time whose net gain is not clearly above that of the law of sessions at the same place."""
     own = _best_shape(cache, t, single[session].law)
     for clock in [(*session[:2], name) for name in CLOCK]:
         if clock in single and _best_shape(cache, t, single[clock].law) < own + settings.COARSER:
@@ -904,7 +909,7 @@ def _best_shape(cache: ScanCache, t: int, law: Discovered) -> float:
 
 
 def _best(own: Mapping[str, list[Scanned]], cache: ScanCache, t: int) -> list[Scanned]:
-    """Candidates better than the laws nested in them, sorted; of a smooth and a straight law the better one."""
+    """Rank candidates by net gain: one law for each place and quantity; products only if better than their factors."""
     single: dict[Site, Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)
