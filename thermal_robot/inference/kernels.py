@@ -40,8 +40,8 @@ Numbers = NDArray[np.int64]
 class DesignMatrix:
     """Design matrix of K columns over E = n·m equations; columns shared by several settings are stored once.
 
-    ``different`` are U arrays (N, m) of all rows, ``number`` (K,) which of them each column is, ``used`` (n,) the rows
-    in use, ``root`` (n, m) by what they are multiplied.
+    ``different`` are U distinct columns (N, m) over all rows, ``number`` (K,) which of them each column is, ``used``
+    (n,) the rows in use, ``root`` (n, m) the factors by which these are multiplied.
     """
 
     different: tuple[Array, ...]
@@ -73,7 +73,7 @@ class DesignMatrix:
         return cls(different, np.arange(len(different)), np.arange(rows), np.ones((rows, measures)))
 
     def weighted(self, used: Numbers, root: Array) -> DesignMatrix:
-        """Columns over the rows in use, (n,), times ``root`` (n, m), computed on demand."""
+        """Copy over the rows ``used`` (n,), times ``root`` (n, m); both are applied when columns are asked for."""
         return replace(self, used=used, root=root)
 
     @property
@@ -115,9 +115,10 @@ def chunks(rows: int) -> Iterator[slice]:
 
 @dataclass(frozen=True, eq=False)
 class KernelFactor:
-    """Factor of a kernel: B = functions (N, k) × displacements (N, m, c), times ``root`` (n,) of the rows' weights.
+    """Factor B of a kernel BBᵀ: functions (N, k) × displacements (N, m, c) of each row, times ``root`` (n,).
 
-    Moves are in units of the noise; (m, c) where all rows have the same.
+    ``root`` are the square roots of the weights of the rows in use. Displacements (``moves``) are in units of the
+    noise; (m, c) where all rows have the same.
     """
 
     functions: Array
@@ -149,7 +150,7 @@ class KernelFactor:
         return bool(len(self.used) * self.moves.shape[-2] <= self.functions.shape[1] * self.moves.shape[-1])
 
     def own(self) -> Array:
-        """Smaller Gram matrix of the factor: B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
+        """Smaller one of the Gram matrices of the factor: B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
         if self.wide:
             functions, moves = self.rows(slice(None))
             m, c = moves.shape[-2:]
@@ -220,13 +221,16 @@ class GroupKernel:
         return equations_of(found)
 
     def back(self, inner: Array, *, everywhere: bool = False) -> Array:
-        """Product (n, m, K) of B with (G c, K) in the eigenvectors of the groups; of all rows (N, m, K)."""
+        """Product (n, m, K) of B with coefficients (G c, K) in the groups' eigenvectors; ``everywhere``: (N, m, K)."""
         turned = self.vector @ inner.reshape(*self.values.shape, inner.shape[1])
         moves, group = (self.everywhere, self.groups) if everywhere else (self.moves, self.group)
         return np.asarray(moves @ turned[group])
 
     def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
+        """Information SᵀS − SᵀV⁻¹S that whitened columns S lose to the correlated noise V of some rows.
+
+        See :meth:`KernelCovariance.reduction`.
+        """
         above = tau**2 * self.values > floor
         unit = self.vector * np.where(above, 1.0 / np.sqrt(np.where(above, self.values, 1.0)), 0.0)[:, None, :]
         tight = 1.0 / np.where(above, tau**2 * self.values, 1.0)
@@ -252,7 +256,7 @@ def _in_chunks(group: Labels) -> Iterator[tuple[Labels, Labels, Labels]]:
 
 
 def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:
-    """Return the sums (count, ...) over each group."""
+    """Return the sums (count, ...) of rows ``each`` (n, ...) over each group."""
     found = np.zeros((count, *each.shape[1:]))
     order = np.argsort(group, kind="stable")
     first = np.flatnonzero(np.diff(group[order], prepend=-1))
@@ -290,21 +294,21 @@ class Kernel:
         return (name, *self.further) if self.grouped and kind == "joint" else ()
 
     def with_joint(self, other: Kernel, part: float) -> Kernel:
-        """Add one more joint (sum of two kernels), whose rms is a part of that of all joints so far."""
+        """Sum of this kernel and that of another joint, whose rms is ``part`` of that of all joints so far."""
         length = [np.sqrt((kernel.moves**2).sum(axis=2).mean()) for kernel in (self, other)]
         moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
         name = ", ".join((self.kind, *sorted((*self.joints, *other.joints))))
         return replace(self, name=name, moves=moves, further=(*self.further, *other.joints))
 
     def with_one_more(self, kernels: Iterable[Kernel]) -> list[Kernel]:
-        """Add each joint that is not in this kernel to it, at several relative sizes."""
+        """Return the kernels with one more joint of the same kind, at several relative sizes; none above a number."""
         if len(self.joints) >= settings.SCATTERING:
             return []
         more = [k for k in kernels if k.kind == self.kind and k.joints and k.joints[0] not in self.joints]
         return [self.with_joint(kernel, part) for kernel in more for part in settings.PARTS]
 
     def over(self, relative: Array | None) -> Kernel:
-        """Kernel with each row divided by its relative noise (N, m); ``None`` if all are one."""
+        """Kernel with each row divided by its relative noise (N, m); unchanged for ``None``."""
         if relative is None:
             return self
         if not self.grouped and bool((relative == relative[:, :1]).all()):
@@ -326,7 +330,7 @@ class KernelCovariance:
 
     @property
     def weight(self) -> Array:
-        """Weights τ²/(1 + τ²λ) of the eigenvectors."""
+        """Diagonal weights τ²/(1 + τ²λ) in Woodbury's identity, λ the eigenvalues of BBᵀ."""
         return self.tau**2 / (1.0 + self.tau**2 * self.spectrum.value)
 
     def products(self, stack: DesignMatrix) -> Array:
@@ -336,7 +340,7 @@ class KernelCovariance:
         return np.asarray(found[np.ix_(stack.number, stack.number)])
 
     def reduced(self, plain: Array, along: Array) -> Array:
-        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S from SᵀS and what the kernel's spectrum takes along of S."""
+        """Gram matrix Sᵀ (1 + τ²BBᵀ)⁻¹ S by Woodbury's identity, from SᵀS and BᵀS in the eigenvectors (``along``)."""
         found, weight = plain.copy(), self.weight
         for part in chunks(len(weight)):
             found -= along[part].T @ (weight[part, None] * along[part])
@@ -350,15 +354,16 @@ class KernelCovariance:
         return stack + self.spectrum.back(power[:, None] * along).reshape(stack.shape)
 
     def reduction(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
+        """Information SᵀS − SᵀV⁻¹S that whitened columns S lose to the correlated noise V = 1 + τ²BBᵀ of some rows.
 
-        ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
+        ``rows`` (n,) are those among the rows in use, ``white`` gives their columns (r, m, K) by row number; directions
+        of τ²BBᵀ with a variance below ``floor`` are left out.
         """
         return self.spectrum.reduction(self.tau, rows, white, floor)
 
     @property
     def log_det(self) -> float:
-        """log|1 + τ²BBᵀ|."""
+        """Log determinant of the covariance, log|1 + τ²BBᵀ|."""
         return float(np.log1p(self.tau**2 * self.spectrum.value).sum())
 
     @property
@@ -434,7 +439,7 @@ class SmoothKernel:
         return np.concatenate(found)
 
     def back(self, inner: Array, *, everywhere: bool = False) -> Array:
-        """Product (n, m, K) of B with (R, K) in the eigenvectors of the parts; of all rows (N, m, K)."""
+        """Product (n, m, K) of B with coefficients (R, K) in the parts' eigenvectors; ``everywhere``: (N, m, K)."""
         ends = np.cumsum([len(value) for value in self.values])[:-1]
         turned = []
         for part, value, vector, own in zip(self.parts, self.values, self.vectors, np.split(inner, ends), strict=True):
@@ -451,7 +456,7 @@ class SmoothKernel:
         return found
 
     def apart(self, rows: Array) -> list[Array]:
-        """Split (n, m, K) columns by part."""
+        """Project columns (n, m, K) on each of the axes: a part (n, 1, K) each, or the columns if there is one part."""
         if len(self.parts) == 1:
             return [rows]
         return [np.einsum("a,nak->nk", axis, rows)[:, None] for axis in self.axes.T]
@@ -463,7 +468,10 @@ class SmoothKernel:
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
 
     def reduction(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Reduction SᵀS − SᵀV⁻¹S over some rows; see :meth:`KernelCovariance.reduction`."""
+        """Information SᵀS − SᵀV⁻¹S that whitened columns S lose to the correlated noise V of some rows.
+
+        See :meth:`KernelCovariance.reduction`.
+        """
         above = tau**2 * self.value > floor
         basis = self.back((np.eye(len(above)) / np.sqrt(self.value))[:, above])[rows]
         basis, columns = equations_of(basis), equations_of(white(np.flatnonzero(rows)))
@@ -480,7 +488,7 @@ def _positive_part(matrix: Array) -> tuple[Array, Array]:
 
 
 def decomposed(kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel | GroupKernel:
-    """Decompose a kernel for every amplitude: unit mean diagonal, in units of the noise."""
+    """Eigendecomposition, for every amplitude, of a kernel scaled to unit mean diagonal in units of the noise."""
     if not kernel.grouped:
         return SmoothKernel.of(kernel, weights, noise)
     moves = np.broadcast_to(kernel.moves, (len(kernel.functions), *kernel.moves.shape[-2:]))
@@ -488,7 +496,10 @@ def decomposed(kernel: Kernel, weights: Array, noise: Array) -> SmoothKernel | G
 
 
 def discrepancy_kernels(observations: Observations) -> tuple[Kernel, ...]:
-    """Kernels of the discrepancy that a campaign allows."""
+    """Return the kernels of the discrepancy that a campaign allows: at the tool, in all places, in one place alone.
+
+    Those per pose need repeated poses or a stated noise, those per visit repeated poses.
+    """
     measures = components(observations.campaign)
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
@@ -536,7 +547,7 @@ def _together(observations: Observations) -> list[Array]:
 
 
 def _moves(observations: Observations, measures: int) -> Array:
-    """Displacement (N, m, c) of the target by a unit error in each joint, and in base and tool components."""
+    """Displacement (N, m, c) of the target by an error of expected size in each joint, base and tool component."""
     joints = observations.joint_sensitivity[:, :measures] * settings.ERROR_AT_JOINT
     base = observations.base_sensitivity[:, :measures] * settings.ERROR_ELSEWHERE
     tool = observations.tool_sensitivity[:, :measures, :measures] * settings.ERROR_ELSEWHERE

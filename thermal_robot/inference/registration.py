@@ -61,7 +61,7 @@ class PoseProtocol(Protocol):
 
 
 def starts(campaign: PoseProtocol) -> Array:
-    """Return the initial shifts (S, 3) of the target, m, for :func:`alternate`; the first is zero."""
+    """Return the initial shifts (S, 3) of the target, m, for :func:`alternate`: zero first, alone if it is known."""
     fixed = campaign.tool_known or campaign.simulated_position is not None
     return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
 
@@ -89,9 +89,9 @@ def alternate(
 ) -> tuple[Array, BaseAndTarget]:
     """Robust registration by alternation: rigid alignment of the base, then linear fit of the target's place.
 
-    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front
-    (..., N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...)
-    the median distance that the nearest start leaves, m, and its frames.
+    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front (...,
+    N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns the smallest
+    of the starts' median distances (...), m, and the frames of that start.
     """
     lead, many = campaign.q.shape[:-2], targets.shape[-2]
     measured, turns = np.asarray(campaign.position)[..., some, :], None
@@ -122,7 +122,7 @@ def alternate(
 
 
 def _turn(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
-    """Weighted mean rotation (..., 3, 3) of the target on the tool frame, weights (..., N)."""
+    """Weighted mean rotation (..., 3, 3) of the target on the tool frame (SVD), weights (..., N)."""
     seen = turns.swapaxes(-1, -2) @ base[..., None, :3, :3].swapaxes(-1, -2) @ measured
     u, _, vt = np.linalg.svd(np.einsum("...n,...nij->...ij", weights, seen))
     upright = np.ones(u.shape[:-1])
@@ -168,7 +168,7 @@ def _alternated(
 
 
 def _predicted(origin: Array, turns: Array | None, place: Array) -> Array:
-    """Predicted target (S, N, 3) in the root frame, or the simulator's prediction."""
+    """Predicted positions of the target (S, N, 3) in the root frame, or the simulator's prediction."""
     if turns is None:
         return np.broadcast_to(origin, (len(place), *origin.shape[-2:]))
     return np.asarray(origin + (turns @ place[:, None, :, None])[..., 0])
@@ -188,7 +188,7 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
 
 
 def frames_known(campaign: Campaign) -> bool:
-    """Tell whether nothing has to be fitted: both frames are declared, or a simulator holds the tool."""
+    """Tell whether no frame or artefact has to be fitted: base declared, and tool declared or held by a simulator."""
     if campaign.position is None and campaign.measured and unknown_frames(campaign):
         return False
     return campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None)
@@ -216,7 +216,7 @@ def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
 
 
 def _turned(campaign: Campaign, frames: Frames) -> Frames:
-    """Register the rotation of the target on the tool, if measured, from several of the 24 rotations of a cube."""
+    """Register the rotation of the target on the tool, if measured, from the best of the 24 rotations of a cube."""
     if campaign.tool_known or tool_width(campaign) == 3:
         return frames
     rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
@@ -251,7 +251,10 @@ def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
 
 
 def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
-    """Gauss-Newton registration of positions and orientations, each scaled by its median; noisy rows weigh less."""
+    """Gauss-Newton registration of positions and orientations, each scaled by its median; noisy rows weigh less.
+
+    Rows have Cauchy weights where ``robust``, equal weights otherwise.
+    """
     relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
     for _ in range(settings.START_ROUNDS):
         observations = observe(campaign, frames)

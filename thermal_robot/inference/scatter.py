@@ -1,6 +1,6 @@
 """Variance components of a residual (REML): scatter of the joints beside the instrument, by visit or by pose.
 
-Told from it are errors that follow a smooth law, by F tests, and the steps of an encoder, by their likelihood ratio.
+Errors that follow a smooth law are told apart by F tests, the steps of an encoder by their likelihood ratio.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Likelihood:
 
     @property
     def nuisances(self) -> int:
-        """Number of variances in every model."""
+        """Number of variances in every model beside components: the instrument's, with repeats also that of poses."""
         return len(self.stated) + int(self.rows.contrasts > 0)
 
     def fit(self, components: tuple[Component, ...], start: Array | None = None, held: int | None = None) -> Fitted:
@@ -134,7 +134,7 @@ class Likelihood:
         return Fitted(components, logs, value, covariance, np.asarray(np.linalg.inv(information), dtype=float))
 
     def density(self, components: tuple[Component, ...]) -> Callable[[Array], tuple[float, Array, Array, Array]]:
-        """Log posterior density of log variances, its gradient, Fisher information and covariances."""
+        """Return a function of log variances: their log posterior density, its gradient, information, covariances."""
         rows, (factor, member) = self.rows, self._factors(components)
         m, turned = rows.values.shape[1], np.swapaxes(factor, 1, 2)
 
@@ -209,9 +209,9 @@ class Likelihood:
         return np.repeat(logs, [len(self.stated), self.nuisances - len(self.stated), components])
 
     def _factors(self, components: tuple[Component, ...]) -> tuple[Array, Array]:
-        """Columns (R, m, F) whose outer products, times variances, sum to the covariance; (logs, F) says which count.
+        """Columns (R, m, F) whose outer products, times variances, sum to each row's covariance; and their groups.
 
-        Each column has the variance of the group to which it belongs.
+        The mask (logs, F) says to which variance each column belongs.
         """
         rows = self.rows
         m, often = rows.values.shape[1], np.sqrt(rows.repeats)[:, None, None]
@@ -239,7 +239,7 @@ class Likelihood:
         return value, np.where(near, -half * (1.0 - np.exp(-logs)), 0.0), np.where(near, half, 0.0)
 
     def _law(self, distance2: Array, logdet: Array) -> tuple[Array, Array]:
-        """Log density of squared distances, normal or Student's, and the weight of each in the gradient."""
+        """Log density of squared distances (normal or Student's t), and each row's weight in the gradient."""
         m, dof = self.rows.values.shape[1], self.tails
         if np.isinf(dof):
             return -0.5 * (distance2 + logdet + m * np.log(2.0 * np.pi)), np.ones_like(distance2)
@@ -405,7 +405,7 @@ def enough_rows(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[n
 
 @dataclass(eq=False)
 class _Search:
-    """Stepwise search for the most probable set of variance components."""
+    """Stepwise search for the most probable set of variance components; ``fits`` is the memo of the sets fitted."""
 
     likelihood: Likelihood
     chosen: tuple[Component, ...] = ()
@@ -416,7 +416,7 @@ class _Search:
         return ("visit", "pose") if self.likelihood.rows.contrasts else ("pose",)
 
     def fit(self, components: tuple[Component, ...]) -> tuple[Fitted, float]:
-        """Fit a set of components once; return it with its log evidence plus log prior."""
+        """Fit a set of components, memoised; return the fit and its log evidence plus log prior."""
         key = frozenset(components)
         if key not in self.fits:
             fitted = self.likelihood.fit(components)
@@ -427,7 +427,7 @@ class _Search:
         return self.fit(components)[1]
 
     def _prior(self, components: tuple[Component, ...]) -> float:
-        """Log prior of a set of joints for each kind (:func:`share_of_places`)."""
+        """Log prior of a set of components: for each kind, that it is at work, and in just so many joints."""
         n, at_work, total = len(self.likelihood.rows.lever), settings.PRIOR_PROBABILITY, 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
@@ -464,7 +464,7 @@ class _Search:
         self.chosen = max(before, self.chosen, key=self._posterior)
 
     def _added(self) -> bool:
-        """Forward step: add the component with the largest gain; whether one was added."""
+        """Forward step: add the component with the largest log posterior if that grows; tell whether one was added."""
         candidates, (fitted, log_posterior) = self._candidates(), self.fit(self.chosen)
         gain = self.likelihood.screen(fitted, candidates).max(axis=0) - fitted.value
         likely = [k for k in np.argsort(-gain)[: settings.FULLY_TRIED] if gain[k] > settings.CONVINCING]
@@ -474,7 +474,7 @@ class _Search:
         return better
 
     def _revised(self) -> bool:
-        """Backward or exchange step: drop a component or change its kind; whether that improved the set."""
+        """Backward or exchange step: drop a component or a whole kind, or change a kind; tell whether that improved."""
         others = [tuple(o for o in self.chosen if o != c) for c in self.chosen]
         moved = [(*rest, (k, c[1])) for rest, c in zip(others, self.chosen, strict=True) for k in self.kinds]
         others += [m for m in moved if len(set(m)) == len(m)]
@@ -548,10 +548,11 @@ Rows = NDArray[np.bool_]
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
-    """F test of each recorded quantity: name of the one that errors (K,) of weight 1/variance follow, or empty.
+    """Name the recorded quantity that errors (K,) of weight 1/variance follow by an F test of a smooth law, or empty.
 
-    The p-value is multiplied by their number (Bonferroni); a law must also explain a good part of the errors. ``pose``
-    (K,): where errors are those within a pose, the mean of each was taken out of them.
+    The smallest p-value, times the number of quantities (Bonferroni), must be significant; a law must also explain a
+    good part of the errors. ``pose`` (K,): where errors are those within a pose, the mean of each was taken out of
+    them.
     """
     root = np.sqrt(weight)
     number = np.zeros(len(errors), dtype=np.int64) if pose is None else np.unique(pose, return_inverse=True)[1]
@@ -567,9 +568,9 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
 
 @dataclass(frozen=True)
 class Steps:
-    """Step of an encoder, rad or m, and the log Bayes factor of quantisation against none.
+    """Step of an encoder, rad or m, and the log Bayes factor of quantisation by it against a normal error.
 
-    Without visible steps the distance is that implied by the size of the errors; the factor is 0 where it cannot be
+    Without visible steps the step is that implied by the size of the errors; the factor is 0 where it cannot be
     computed.
     """
 
@@ -578,7 +579,7 @@ class Steps:
 
 
 def period(errors: Array, variance: Array, command: Array, step: float) -> Steps:
-    """Periodogram of a sawtooth: distance of the lattice of positions at which an encoder lets a joint stand.
+    """Marginal-likelihood periodogram of an encoder's step: spacing of the positions at which it lets a joint stand.
 
     The joint stands at the multiple of the step s, from a first position φ on, that is nearest to its command. Its
     error (K,) is then a sawtooth of the command, u s with u from -½ to ½, seen with its variance v and a slack of the
@@ -600,9 +601,9 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
 
 
 def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tuple[Array, Array]:
-    """Frequencies, none where there are too many, and the marginal log likelihood of each over phase.
+    """Frequencies 1/s of steps near the implied one, and the log likelihood of each, averaged over phase.
 
-    All are in implied steps.
+    All are in implied steps; both arrays are empty where there are too many frequencies.
     """
     known = variance + slack**2
     width = 1.0 / (max(float(command.std()), 1.0) * np.sqrt(max(float((1.0 / known).sum()), (2.0 * np.pi) ** 2)))
@@ -625,9 +626,9 @@ def _normal(x: Array, mean: Array | float, variance: Array) -> Array:
 
 
 def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex128]:
-    """Fourier coefficients (K, H) of each row's log likelihood over the phase of the first position.
+    """Fourier coefficients (K, H) of each row's log likelihood as a function of the phase of the first position.
 
-    Of the positions around a command the nearest is taken, up to the slack.
+    The joint stands at the nearest of the positions around its command, with a slack in where the nearest changes.
     """
     u = np.arange(settings.STEP_PHASES) / settings.STEP_PHASES
     near = np.stack([u - 1.0, u, u + 1.0]) - 0.5
@@ -664,7 +665,7 @@ def stepped(log_factors: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class Kept:
-    """Variance component that is scatter, and the encoder step that it would imply, rad or m."""
+    """Variance component that is scatter, no law; and the encoder step of that size or period, rad or m."""
 
     component: JointScatter
     step: float
@@ -695,7 +696,7 @@ class RandomGap:
 
 
 def nothing_random(fit: Fit) -> RandomGap:
-    """Empty result, for a gap whose random part cannot be estimated."""
+    """Empty result, for a gap whose random part cannot be estimated: no components, and a p-value of 1."""
     noise = fit.explanation.whitening.noise
     return RandomGap((), False, 1.0, Scatter((), (), {}, noise, 0.0 * noise), {}, {})
 
@@ -746,7 +747,7 @@ def random_gap(fit: Fit) -> RandomGap:
 def _without_influential_rows(
     estimate: Callable[..., Scatter], scatter: Scatter, gap: Array, sensitivity: Array, used: Rows
 ) -> tuple[Scatter, Rows, list[int]]:
-    """Sensitivity of the scatter to its few most influential rows: real scatter is in all rows.
+    """Estimate the scatter again without its few most influential rows (deletion): real scatter is in all rows.
 
     Returns the scatter, the rows that count, and the joints whose scatter only a few rows supported; these rows are
     then left out.
@@ -766,7 +767,7 @@ def _without_influential_rows(
 
 
 def _in_joints(fit: Fit) -> list[Component]:
-    """Variance components, kind and joint, of a per-pose or per-visit discrepancy, if any."""
+    """List the variance components, kind and joint, of a fit's per-pose or per-visit discrepancy; empty without one."""
     kernel, names = fit.explanation.discrepancy.kernel, fit.campaign.robot.joint_names
     if kernel is None:
         return []
@@ -821,9 +822,10 @@ def _distance2(scatter: Scatter, gap: Array, sensitivity: Array) -> Array:
 def _judge(
     fit: Fit, scatter: Scatter, gap: Array, sensitivity: Array, pose: NDArray[np.int64], used: Rows, freedom: int
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Classify components: those that follow a law, and scatter; with the evidence for encoder steps of each joint.
+    """Classify components by an F test: those that follow a law, and scatter; with the log evidence for encoder steps.
 
-    The fitted parameters absorb a share of the per-pose errors: their number over that of the measurements.
+    Returns laws and evidence by joint, and the components that are scatter. The fitted parameters absorb a share of the
+    per-pose errors: their number over that of the measurements.
     """
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
@@ -853,7 +855,7 @@ def _judge(
 def _within_poses(
     errors: Array, variance: Array, sigma: float, recorded: Mapping[str, Array], number: NDArray[np.int64]
 ) -> str:
-    """F test as :func:`followed` of the deviations of visits, errors (N,), from the mean of their pose."""
+    """Name the quantity that deviations (N,) of visits from their pose's mean follow, as :func:`followed`, or empty."""
     weight, repeated = 1.0 / (variance + sigma**2), np.bincount(number)[number] > 1
 
     def within(values: Array) -> Array:
@@ -866,7 +868,7 @@ def _within_poses(
 def _chance_of_size(distance2: Array, m: int, freedom: int) -> tuple[float, bool]:
     """χ² test of squared distances (N,) in the rows' covariance; heavy tails reduce its degrees of freedom.
 
-    Returns the p-value, and whether the size is explained.
+    Returns the p-value, and whether the size is explained: not significant, or hardly more than one.
     """
     left = max(m * len(distance2) - freedom, 1)
     ratio2 = float(distance2.sum()) / left

@@ -51,7 +51,7 @@ class Noise:
 
 
 def distance_limit(measures: Figures, rows: int) -> Any:
-    """χ² quantile: the squared distance, in units of the noise, beyond which one of so many rows is a gross error."""
+    """Outlier limit of squared distances in units of the noise: a χ² quantile for so many rows, times a factor."""
     return settings.GROSS_FACTOR * chdtri(measures, settings.GROSS_LEVEL / max(rows, 1))
 
 
@@ -63,8 +63,9 @@ def robust_noise(
 ) -> Array:
     """One sigma per axis of positions and of orientations, from the median squared length of a residual.
 
-    The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
-    of the figures differs, ``relative`` (N, m) says how; where rows see fewer components, ``seen`` (N, m/3).
+    The ``leverage``, the share of the equations that the fit took up, has made the residual smaller: its square is
+    divided by 1 − leverage. Where the noise of the figures differs, ``relative`` (N, m) is their relative noise; where
+    rows see fewer components, ``seen`` (N, m/3) is their number.
     """
     remainder = remainder if relative is None else remainder / relative
     parts = remainder.reshape(len(remainder), -1, 3)
@@ -85,7 +86,7 @@ def noise_estimate(measured: Array, noise: Noise, measures: int) -> tuple[Array,
 
 
 def first_whitening(linear: Linear, noise: Noise) -> Whitening:
-    """Initialise the whitening: equal weights, and the stated noise or the gap's robust one, without its prior."""
+    """Start from unit weights, and noise as stated or robustly estimated from the gap, with no prior on it."""
     measured = robust_noise(linear.gap, relative=noise.relative, seen=noise.seen)
     sigma, _ = noise_estimate(measured, noise, linear.measures)
     return Whitening(np.ones(len(linear.gap)), sigma, 0.0, relative=noise.relative, seen=noise.seen)
@@ -109,10 +110,10 @@ def reweigh(remainder: Array, noise: Noise, leverage: float, measures: int) -> t
 def judged(
     remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
 ) -> tuple[Array, float, Array]:
-    """Noise and degrees of freedom as :func:`noise_estimate`, and squared distances (N,) of rows in its units.
+    """Noise and degrees of freedom as :func:`noise_estimate`, and squared distances (N,) in units of that noise.
 
     ``remainder`` (N, m) is scaled to equal noise; ``measured`` is its robust noise, one sigma for positions and one for
-    orientations.
+    orientations, which takes the place of a noise that is clearly smaller (:func:`outlier_scale`).
     """
     sigma, held = noise_estimate(measured, noise, measures)
     distance2 = ((remainder / outlier_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
@@ -120,11 +121,11 @@ def judged(
 
 
 def outlier_scale(measured: Array, sigma: Array) -> Array:
-    """Scale (m,) of outlier distances: the noise, or the residual's median where that is larger."""
+    """Scale (m,) of outlier distances: the noise, or the residual's robust noise where that is clearly larger."""
     return np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
 
 
 def huber_weight(distance2: Array, measures: Figures) -> Array:
-    """Huber's weight (1964) of rows at a squared distance in units of the noise: less in the tail."""
+    """Huber weights (1964) of rows by squared distance in units of the noise: 1 up to a χ² quantile, then falling."""
     bend = chdtri(measures, settings.BEND_LEVEL)
     return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))
