@@ -1,4 +1,4 @@
-"""Application of effects: sensitivities of the channels, and the displacement by fitted effects."""
+"""Application of effects: Jacobians of the channels, and the displacement by fitted effects."""
 
 from __future__ import annotations
 
@@ -102,9 +102,9 @@ def displacement(
 
 
 def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Columns of :func:`gate.reads` on which the displacement by a fitted effect depends.
+    """Return the columns of :func:`gate.reads` on which the displacement by a fitted effect depends.
 
-    A column counts if the effect's parameters change when it is removed or takes other values. Raises
+    A column counts unless the effect's parameters stay the same without it and with other values in it. Raises
     :class:`EffectError` if the effect breaks the contract.
     """
     campaign, own = observations.campaign, gate.checked(effect, observations)
@@ -128,7 +128,7 @@ def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
 
 
 def _alike(some: Sequence[Parameter], others: Sequence[Parameter]) -> bool:
-    """Whether parameters have the same names and responses."""
+    """Whether two lists of parameters have the same names and the same responses, value by value."""
     one, two = ([(p.name, r.channel, r.index, r.values) for p in own for r in p.responses] for own in (some, others))
     named = [p.name for p in some] == [p.name for p in others]
     pairs = zip(one, two, strict=False)

@@ -39,7 +39,7 @@ _PLAIN: dict[Any, Kind] = {
 
 
 def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
-    """Effect with arguments from a file; :class:`MisfitError` for one that its class does not take."""
+    """Make an effect from the arguments in a file; :class:`MisfitError` for one that its class does not take."""
     if "__dataclass_params__" in vars(effect):
         try:
             hints = get_type_hints(effect, include_extras=True)
@@ -57,7 +57,7 @@ def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
 
 
 def _kind(annotation: Any) -> Kind:
-    """Return a validator of an annotation; of any JSON value where there is none."""
+    """Return the validator that an annotation stands for; one of any JSON value where it says nothing."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return next((part for part in parts[1:] if callable(part)), _kind(parts[0]))

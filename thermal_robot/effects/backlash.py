@@ -68,7 +68,7 @@ class Backlash(Effect):
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Approach columns, unless at least one of them varies; ``order``, from which they would follow."""
+        """Approach columns, none if at least one varies; and ``order``, where approaches would follow from it."""
         columns = tuple(f"approach.{joint}" for joint in observations.robot.joint_names)
         if any(observations.varies(column) for column in columns):
             return ()
@@ -96,7 +96,7 @@ class Backlash(Effect):
 
     @property
     def weight(self) -> float:
-        """Prior weight: friction always wins as likely as not; more than one share of it is half as likely."""
+        """Prior weight: 1 if friction always wins, 1 for all its shares together; ½ if it grows or a carriage turns."""
         return 1.0 / len(_SHARES) if np.any(self.held) else 0.5 if self.grows or self.carriage else 1.0
 
     @property
@@ -106,7 +106,7 @@ class Backlash(Effect):
 
     @property
     def apart(self) -> int:
-        """Number of joints whose share differs from the common one."""
+        """Number of joints whose share of friction differs from the most common one, of those that may hang."""
         shares = [share for j, share in enumerate(self._shares.tolist()) if self._may_hang(j)]
         return len(shares) - max(map(shares.count, shares), default=0)
 
@@ -132,7 +132,7 @@ class Backlash(Effect):
         return (*found, *(replace(self, soft=film) for film in films))
 
     def _with(self, j: int, share: float) -> Effect:
-        """Copy with another share of one joint."""
+        """Copy with another share of friction in one joint."""
         shares = self._shares
         return replace(self, held=tuple(np.where(np.arange(len(shares)) == j, share, shares).tolist()))
 
@@ -171,7 +171,7 @@ class Backlash(Effect):
         return driving(observations, f"approach.{parameters[0].place}")
 
     def _side(self, observations: Observations, j: int, approach: Array) -> Array:
-        """Side (N,) of its play on which a joint rests."""
+        """Side (N,) of its play on which a joint rests, −1 to 1, by torque and approach; 0 where it never changes."""
         torque = observations.torque
         held = self.held[j] if isinstance(self.held, tuple) else self.held
         if not held or torque is None or not self._may_hang(j):
@@ -184,12 +184,12 @@ class Backlash(Effect):
         return np.asarray(0.5 * ((1.0 + approach) * up + (1.0 - approach) * down))
 
     def _may_hang(self, j: int) -> bool:
-        """Whether a joint carries enough load for gravity to take up its play."""
+        """Whether a joint's largest torque is 2 % or more of the largest of all: gravity can then take up its play."""
         return self.largest[j] >= _HANGS * max(self.largest)
 
 
 def _slides(observations: Observations) -> bool:
-    """Whether a joint is prismatic and its direction of approach is known."""
+    """Whether any prismatic joint has a direction of approach that varies."""
     robot = observations.robot
     sliding = (n for n, kind in zip(robot.joint_names, robot.joint_types, strict=True) if kind == "prismatic")
     return any(observations.varies(f"approach.{joint}") for joint in sliding)

@@ -22,12 +22,12 @@ _STEADY = 1e-9  # K
 
 
 def beams(robot: Robot) -> tuple[int, ...]:
-    """Segments that are long enough to bend."""
+    """Return the numbers of the segments that are longer than :data:`SHORTEST`, so that they can bend."""
     return tuple(s for s, segment in enumerate(robot.segments) if segment.length > SHORTEST)
 
 
 def shafts(robot: Robot) -> tuple[int, ...]:
-    """Beams along neither adjacent joint axis: along one, twist is joint compliance."""
+    """Return the beams that lie along neither adjacent joint axis: along one, twist is joint compliance."""
     chain, found = robot.chain, []
     for s in beams(robot):
         e, along = robot.segments[s].index, robot.segments[s].direction
@@ -106,7 +106,7 @@ class ThermalBending(Effect):
 
 
 def _columns(observations: Observations) -> tuple[str, ...]:
-    """Temperatures of the links that bend."""
+    """Return the temperature columns of the links that bend, recorded or not."""
     robot = observations.robot
     return tuple(dict.fromkeys(f"temperature.{robot.segments[s].parent_link}" for s in beams(robot)))
 

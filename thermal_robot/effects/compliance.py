@@ -31,12 +31,12 @@ _MASSES = "masses in the URDF"
 
 
 def tilts(*links: str) -> tuple[str, ...]:
-    """Inclinometer columns of some links, or of the base."""
+    """Return the names of the inclinometer columns, x and y, of some links, or of the base."""
     return tuple(f"tilt.{link}.{axis}" if link else f"tilt.{axis}" for link in links for axis in "xy")
 
 
 def measured_turn(observations: Observations, link: str = BASE) -> Array:
-    """Rotation (N, 3) about x and y by an inclinometer, rad; zero where it was not read."""
+    """Rotation vectors (N, 3) read by an inclinometer about x and y, rad; zero where it was not read."""
     read = np.zeros((observations.campaign.samples, 3))
     for k, column in enumerate(tilts(link)):
         read[:, k] = observations.covariates.get(column, 0.0)
@@ -44,13 +44,13 @@ def measured_turn(observations: Observations, link: str = BASE) -> Array:
 
 
 class _Yielding(Effect):
-    """Compliance under a load, or the rotation measured by inclinometers (``tilt``)."""
+    """Base class of compliances: deformation by a computed load, or the rotation by inclinometers (``tilt``)."""
 
     tilt: bool  # a field of each class
 
     @abstractmethod
     def _inclined(self, observations: Observations) -> tuple[str, ...]:
-        """Links, or the base, with an inclinometer reading."""
+        """Links, or the base, on which an inclinometer may stand, whether it was read or not."""
 
     @abstractmethod
     def _loaded(self, observations: Observations) -> bool:
@@ -62,24 +62,24 @@ class _Yielding(Effect):
         return () if self.tilt else ("gravity",)
 
     def _kinds(self, observations: Observations) -> list[bool]:
-        """Whether rotations are measured, one entry for each source of data."""
+        """Values of ``tilt`` that a campaign allows: False if a load varies, True if an inclinometer's reading does."""
         measured = any(observations.varies(column) for column in tilts(*self._inclined(observations)))
         return [*([False] if self._loaded(observations) else []), *([True] if measured else [])]
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Tilt columns where they are used, else the payload where it was recorded."""
+        """Return the recorded tilt columns where these are used (``tilt``), else the payload where it was recorded."""
         used = tilts(*dict.fromkeys((BASE, *self._inclined(observations)))) if self.tilt else ("payload",)
         return tuple(column for column in used if column in observations.covariates)
 
 
 def _tilt_read(observations: Observations, link: str) -> Driver | None:
-    """Inclinometer reading that varies most, as the driver of an effect."""
+    """Driver of an effect by tilt: the inclinometer column of a link with the largest range."""
     read = [column for column in tilts(link) if column in observations.covariates]
     return driving(observations, max(read, key=lambda column: float(np.ptp(observations.covariates[column]))))
 
 
 def _moment(name: str, moment: Array, error: Array) -> Driver:
-    """Moment (N, 3) about the axis with the best correlation to an error (N,)."""
+    """Driver of an effect: component of a moment (N, 3) along the axis that fits an error (N,) by least squares."""
     axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
     return name, "N·m", moment @ axis / (np.linalg.norm(axis) + 1e-300)
 
@@ -143,7 +143,7 @@ class BaseCompliance(_Yielding):
         return tuple(Parameter(*one, "base", "base", (at_base(twist),), positive=True) for one, twist in rows)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Tilt that varies most, or the moment about the axis that correlates best with the error."""
+        """Tilt with the largest range, or the moment about the axis that fits the error best."""
         if self.tilt:
             return _tilt_read(observations, BASE)
         return _moment("overturning moment", overturning(observations), error)
@@ -199,9 +199,10 @@ class LinkCompliance(_Yielding):
         return observations.robot.has_masses and any(np.ptp(turn) > _STEADY for turn in bent)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Columns that would give a load, unless a bending load or a measured tilt varies.
+        """Column of masses, unless a bending load by known masses or a measured tilt varies.
 
-        Where the arm's own masses are not known, what a payload bends it by stands in for their share, too.
+        A payload alone will not do: without the arm's own masses, what the payload bends would stand in for their
+        share.
         """
         return () if self._kinds(observations) else (_MASSES,)
 
@@ -233,7 +234,7 @@ class LinkCompliance(_Yielding):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Bending moment about the axis that correlates best with the error, or the tilt."""
+        """Bending moment about the axis that fits the error best, or the tilt with the largest range."""
         link = parameters[0].place
         if self.tilt:
             return _tilt_read(observations, link)

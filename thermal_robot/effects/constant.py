@@ -97,9 +97,10 @@ class Geometric(Effect):
 def _of_axis(
     before: tuple[Array, Array] | None, own: tuple[Array, Array], slides: bool
 ) -> Iterator[tuple[str, str, Array, Array]]:
-    """Yield label, unit and unit twist (shift of its origin, turn) of an axis (origin, direction), root frame.
+    """Yield label, unit and unit twist (shift of its origin, turn) of each Denavit-Hartenberg error of a joint axis.
 
-    Turns are about the foot of the common normal, so that the distance stays.
+    ``before`` and ``own`` are two successive axes (origin, direction), root frame. Turns are about the foot of the
+    common normal, so that the distance stays. A joint that ``slides`` has the turn θ, others the shift d.
     """
     origin, axis = own
     still = np.zeros(3)
@@ -180,7 +181,10 @@ class BaseFrame(Effect):
         return (self, *(replace(self, alone=component) for component, _ in TWIST))
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the declaration without which the base is fitted and no effect, or rows that say where it is."""
+        """Return what makes it untestable: no row that an instrument located, or a base that is not declared known.
+
+        A base that is not declared known is fitted, before any effect.
+        """
         campaign = observations.campaign
         if not instrument_rows(campaign).any() and not of_model(campaign):
             return (_LOCATED,)
@@ -220,7 +224,7 @@ class ToolFrame(Effect):
         return _ALONE if self.alone else 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the declaration without which the tool is fitted and no effect."""
+        """Return the declaration ``frames.tool = "known"`` where it lacks: an unknown tool is fitted as a frame."""
         campaign = observations.campaign
         # a simulator predicts the declared target: an unknown tool is not refitted to it
         return () if campaign.tool_known or campaign.simulated_position is not None else ('frames.tool = "known"',)
@@ -257,7 +261,7 @@ class InstrumentScale(Effect):
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would make it testable: an instrument."""
+        """Return the rows that it needs, of kind position or pose, where no instrument measured any."""
         return () if instrument_rows(observations.campaign).any() else (_LOCATED,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:

@@ -37,7 +37,7 @@ class Drift(Fading):
     size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return ``time`` and ``order``, of which either will do, unless one of them varies."""
+        """Return ``time`` and ``order``, of which either will do, unless the clock (time, or else order) varies."""
         return () if observations.clock is not None and np.ptp(observations.clock) > 0 else ("time", "order")
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
@@ -58,11 +58,11 @@ class Drift(Fading):
         return self if clock is None else replace(self, origin=float(clock.min()), found=())
 
     def delivered(self, observations: Observations) -> Effect:
-        """Copy with the start and the end of the campaign."""
+        """Copy with the campaign's first and last instant as the range, beyond which the drift stays what it was."""
         return self if observations.clock is None else replace(self, found=ends(observations.clock))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Neighbours of a setting: time constants times and over a factor; for the linear law, long time constants."""
+        """Neighbours of a setting: the time constant times and over a factor; for the linear law, long ones."""
         shares = (0.0, 1.0, 2.0) if self.time_constant == 0.0 else (1.0, factor, 1.0 / factor)
         base = self.time_constant or 1.0
         return tuple(replace(self, time_constant=base * share) for share in shares)

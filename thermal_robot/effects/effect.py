@@ -323,5 +323,5 @@ class Effect(ABC):
 
 
 def in_words(kind: str, place: str) -> str:
-    """Name of a place with its kind, unless the name says it."""
+    """Name of a place, preceded by its kind unless the name contains it."""
     return (place or kind) if not place or kind in place else f"{kind} {place}"

@@ -1,7 +1,7 @@
 """Validation of what effects return: all callers pass through here, and a breach of the contract is an error.
 
 An effect may be anybody's code. What it raises, and an answer of the wrong type or content, end in an ``EffectError``
-that names the effect and what was asked.
+that names the effect and the method called.
 """
 
 from __future__ import annotations
@@ -36,11 +36,12 @@ _FIELDS: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
 
 
 def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Return the validated parameters of an effect in its ``places`` but the ``excluded`` ones.
+    """Return the validated parameters of an effect in its ``places`` without the ``excluded`` ones.
 
-    Each has a name of its own, a kind of place, a place of that kind that the robot has (or none), a positive size, and
+    Each has a unique name, a kind of place, a place of that kind that the robot has (or none), a positive size, and
     finite responses of the shape that :class:`Response` states. Raises :class:`EffectError` otherwise, or if the effect
-    raises anything: the effect, the parameter, what was found and what was expected.
+    raises anything: the effect, the parameter, what was found and what was expected. The last few answers are memoised
+    with the observations.
     """
     if not _equal_by_fields(effect):
         return _kept(effect, _parameters(effect, observations), observations.robot)
@@ -53,7 +54,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
 
 
 def _equal_by_fields(effect: Any) -> bool:
-    """Whether equality of effects compares all of their fields, so that they can be hashed."""
+    """Whether an effect can be hashed and its equality compares all of its fields, so that answers may be memoised."""
     try:
         hash(effect)
     except TypeError:
@@ -62,7 +63,7 @@ def _equal_by_fields(effect: Any) -> bool:
 
 
 def placed(effect: Effect, places: tuple[str, ...] = (), excluded: tuple[str, ...] = ()) -> Effect:
-    """Copy of an effect in other places, whatever its constructor."""
+    """Copy of an effect with other ``places`` and ``excluded`` ones, without calling its constructor."""
     other = copy.copy(effect)
     object.__setattr__(other, "places", places)
     object.__setattr__(other, "excluded", excluded)
@@ -70,7 +71,7 @@ def placed(effect: Effect, places: tuple[str, ...] = (), excluded: tuple[str, ..
 
 
 def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Parameters of an effect without a check of their responses, which may be of any rows."""
+    """Return the parameters of an effect, checked for their type but not their responses, which may be of any rows."""
     with np.errstate(all="ignore"):
         answer = _asked(effect, "parameters", observations)
     if not isinstance(answer, (tuple, list)) or not all(isinstance(parameter, Parameter) for parameter in answer):
@@ -141,13 +142,13 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
 
 
 def at(effect: Effect, place: str, observations: Observations) -> Effect | None:
-    """Copy of an effect in one joint or link; ``None`` where it has no parameters there, or states its share."""
+    """Copy of an effect in one joint or link; ``None`` if it has no parameters there, or has a prior ``share``."""
     has = effect.share is None and place in places_of(checked(effect, observations))
     return placed(effect, (place,), effect.excluded) if has else None
 
 
 def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the copies of an effect in each single joint or link; empty where it has parameters in one or none."""
+    """Return the copies of an effect in each single joint or link; empty below two, or if it has a ``share``."""
     places = places_of(checked(effect, observations))
     single = places if len(places) > 1 and effect.share is None else ()
     return tuple(placed(effect, (place,), effect.excluded) for place in single)
@@ -181,7 +182,7 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
 
 
 def _broken(effect: Effect, what: str) -> EffectError:
-    """Error of a breach of contract: :class:`OwnEffectError` for the program's own effects."""
+    """Make the error of a breach of contract: :class:`OwnEffectError` for the program's own effects."""
     own = type(effect).__module__.split(".")[0] == __package__.split(".")[0]
     return (OwnEffectError if own else EffectError)(f"effect {effect.name!r}{what}")
 
@@ -201,7 +202,10 @@ def _settings(effect: Effect, question: str, answer: Any) -> tuple[Effect, ...]:
 
 
 def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
-    """Parameters in the effect's places, in all where it names none, but the excluded ones."""
+    """Filter parameters: those in the effect's ``places`` (all if it names none) that are not ``excluded``.
+
+    Raises :class:`EffectError` for a place that the robot does not have.
+    """
     known = (*robot.joint_names, *places_of(parameters))
     # what an effect does not do in a place of the robot may be excluded from there
     for field, among in (("places", known), ("excluded", (*known, *robot.urdf_joints, *robot.urdf_links))):
@@ -236,7 +240,7 @@ def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Para
 
 
 def _wrong(parameter: Any, observations: Observations) -> str:
-    """Describe what is wrong with a parameter; empty where nothing is."""
+    """Describe the first breach of contract in a parameter; empty where there is none."""
     for field, fits, expected in _FIELDS:
         if not fits(found := getattr(parameter, field)):
             return f"{field} is {found!r}, expected {expected}"

@@ -59,7 +59,7 @@ class JointCompliance(Effect):
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Columns that would give torques, where neither these nor the shapes of gravity's torque vary."""
+        """Columns that would give torques; none where a known torque or a shape of gravity's torque varies."""
         torque = observations.torque
         known = torque is not None and bool(np.any(np.ptp(torque, axis=0) > 1e-9))
         if known or any(np.ptp(shape) > 1e-9 for _, shape in self._set(observations)._shapes(observations)):
@@ -105,7 +105,7 @@ class JointCompliance(Effect):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Torque of the joint; with unknown masses the fitted one, 1 at its largest."""
+        """Torque of the joint; where masses are unknown, the fitted error scaled to 1 at its largest."""
         joint, robot = parameters[0].place, observations.robot
         if observations.torque is None:
             return f"fitted torque of {joint}", "relative", -error / max(float(np.abs(error).max()), 1e-300)
@@ -114,13 +114,19 @@ class JointCompliance(Effect):
 
 
 def _weighed(robot: Robot, q: Array) -> Array:
-    """Regressor of statics (N, n, 4 n): joint torques per unit weight in each body, at and about the next joint."""
+    """Regressor of statics (N, n, 4 n): joint torques by gravity per unit weight of each body, and per its moments.
+
+    The moments are those of a unit weight 0.1 m from the next joint, along each axis.
+    """
     regressor = static_regressor(robot, q) * np.array([1.0, _LEVER, _LEVER, _LEVER])
     return np.asarray(regressor.reshape(len(q), robot.n, -1))
 
 
 def _few_weights(robot: Robot) -> list[tuple[int, Array]]:
-    """Joint and weights (4n,) of each shape, over the range of the robot's joints."""
+    """Principal components of each joint's static regressor over the joint ranges: joint and weights (4n,) of each.
+
+    Kept are those with at least a tenth of the largest singular value; all are scaled so that the largest torque is 1.
+    """
     rng = np.random.default_rng(0)
     lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
     drawn = _weighed(robot, rng.uniform(lower, upper, (_DRAWN, robot.n)))

@@ -92,22 +92,22 @@ class Discovered(Fading):
 
     @property
     def share(self) -> float:
-        """Prior probability of one law among all that were tried."""
+        """Prior probability of one law among all that were tried, 1/``tried``."""
         return 1.0 / self.tried
 
     @property
     def sides(self) -> tuple[Discovered, ...]:
-        """The law itself; of one that bends also that with the other side of the bend."""
+        """The law itself; for a hinge also the law with the other side of the bend sloping."""
         return (self, replace(self, marks=(self.marks[0], -self.marks[1]))) if self.shape == "hinge" else (self,)
 
     @property
     def follows(self) -> str:
-        """Quantity, or product of two, as a diagnosis reports it."""
+        """Name of the quantity that the law follows, or of the product of two, as a diagnosis reports it."""
         return f"{self.quantity} * {self.by}" if self.by else self.quantity
 
     @property
     def modulated(self) -> Effect | None:
-        """Known effect that the quantity modulates, in the law's joint; ``None`` where it has joints of its own."""
+        """Known effect that the quantity modulates, in the law's joint; ``None`` without, or if it has a ``share``."""
         known = restored(self.of, self.of_arguments) if self.of else None
         return None if known is None or known.share is not None else gate.placed(known, (self.place,))
 
@@ -128,7 +128,7 @@ class Discovered(Fading):
         return tuple(name for name in dict.fromkeys(names) if name in observations.covariates)
 
     def values(self, observations: Observations) -> Array | None:
-        """Quantity (N,) as this law counts it; for the shape ``product`` the product of the two."""
+        """Values (N,) of the quantity (labels by number), or for a ``product`` of both; ``None`` if it is lacking."""
         first = self._first(observations)
         if self.shape != "product" or first is None:
             return first
@@ -146,7 +146,7 @@ class Discovered(Fading):
         return self._read(observations, self.quantity)
 
     def _read(self, observations: Observations, name: str) -> Array | None:
-        """Values (N,) of a quantity; of the order of rows that are to be predicted without one, its end."""
+        """Values (N,) of a quantity; for rows to be predicted without ``order``, that of the campaign's end."""
         campaign = observations.campaign
         if name == "order" and name not in observations.covariates and not campaign.measured:
             ends = (self.origin, self.span) if name == self.quantity else (self.by_origin, self.by_span)
@@ -154,7 +154,10 @@ class Discovered(Fading):
         return quantity(observations, name)
 
     def _followed(self, observations: Observations) -> Array | None:
-        """Argument of the shape at the rows; ``None`` where the campaign lacks it."""
+        """Argument of the basis functions at the rows: quantity, strains of stop operators, or time since a start.
+
+        It is (N,) or (N, K); ``None`` where the campaign lacks it.
+        """
         of, clock = SHAPES[self.shape].of, self.values(observations)
         if of == "quantity" or clock is None:
             return clock
@@ -203,7 +206,7 @@ class Discovered(Fading):
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Basis functions (N, K) at the rows, and a name for each; ``None`` where the campaign lacks them.
 
-        At an unknown label they are the mean over the known ones.
+        They fade outside the range where they were found. At an unknown label they are the mean over the known ones.
         """
         values, two = self._followed(observations), bool(self.by) and self.shape != "product"
         second = self._read(observations, self.by) if two else None
@@ -225,14 +228,14 @@ class Discovered(Fading):
         return list(zip(self.found[::2], self.found[1::2], strict=True))
 
     def _left(self, observations: Observations) -> Array:
-        """Fading factor (N,); what has changed by the end of the campaign stays."""
+        """Fading factor (N,) of the law, the product over its drivers; 1 along time, as what has changed stays."""
         left = np.ones(observations.campaign.samples)
         for (name, driver), (low, high) in zip(self._driven(observations), self._ranges, strict=False):
             left = left if name in CLOCK else left * left_at(driver, low, high)
         return left
 
     def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
-        """Drivers by name that bound the fading: the quantity, a second one, and their sum and difference."""
+        """Quantities, by name, whose ranges bound the fading: the first, the second, and sum and difference of both."""
         first, values = self._first(observations), self.values(observations)
         if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
             return []
@@ -246,7 +249,7 @@ class Discovered(Fading):
         return [(self.quantity, first), (self.by, second), (both, u + v), (both, u - v)]
 
     def delivered(self, observations: Observations) -> Effect:
-        """Copy with the range in which it was found, and its modulated effect with its own."""
+        """Copy for prediction, with the ranges where it was found and the means there; its modulated effect, too."""
         law, rows = self, self.at_rows(observations)
         if self.modulated is not None:
             kept = gate.arguments(gate.delivered(self.modulated, observations))
@@ -292,7 +295,7 @@ class Discovered(Fading):
         )
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return the copies with the mark shifted down and up by a share of the range."""
+        """Return the law itself, and copies with the mark shifted either way by part of the range, or its width scaled."""
         shape = SHAPES[self.shape]
         if not shape.mark:
             return (self,)
@@ -302,7 +305,7 @@ class Discovered(Fading):
         return self, self.shifted(shift), self.shifted(-shift), *wider
 
     def shifted(self, by: float) -> Discovered:
-        """Copy with its mark shifted; a step stays out of the time between sessions, a time above 0."""
+        """Copy with its first mark shifted; a step loses its session labels, a time constant stays positive."""
         if self.starts:
             return replace(self, marks=(abs(self.marks[0] + by), *self.marks[1:]))
         return replace(self, marks=(self.marks[0] + by, *self.marks[1:]), runs=())

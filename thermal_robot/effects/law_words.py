@@ -1,8 +1,8 @@
 """Laws in words and in size: short name, usual cause, and range.
 
-What is usual is the experience of calibration: Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*,
-1991, chapter 2 (geometry, gears, joints that yield), and ISO 230-1 and 230-3 (play, warming). It is never more than a
-hint, and is said as one.
+Usual causes are the experience of calibration: Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*,
+1991, chapter 2 (geometry, gears, joints that yield), and ISO 230-1 and 230-3 (play, warming). They are never more than
+a hint, and are reported as one.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 class Size:
     """Range of a law, or of an effect in one joint, over the measured rows, with its standard deviation; SI.
 
-    ``what`` it is the size of is ``step`` or ``range``; ``place`` is the joint, where the effect acts in several.
+    ``what`` names the figure (``step``, ``range``, ``peak to peak``, …); ``place`` is the joint, where the effect acts
+    in several.
     """
 
     what: str
@@ -158,7 +159,7 @@ _KINDS = {
 
 
 def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
-    """Class of a quantity as seen from a place, one of :data:`TELLS`; empty for a user's own quantity."""
+    """Class of a quantity as seen from a place, a key of :data:`TELLS`; empty for a user's own quantity."""
     column, _, of = quantity.partition(".")
     if quantity.startswith(TURN):
         return "memory"
@@ -168,7 +169,7 @@ def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
 
 
 def usually(law: Discovered, joints: Sequence[str]) -> str:
-    """Usual cause of a law of that place and that quantity; empty where none is known."""
+    """Usual cause of a law, in words, by kind of its place and of its quantity; empty where none is known."""
     names = ["session"] if is_event(law) else [law.quantity, law.by]  # what was set up anew, once or for a session
     kinds = [kind_of(name, law.place, joints) for name in names if name]
     found = (USUALLY.get((law.kind, kind)) or USUALLY.get(("", kind), "") for kind in kinds)
@@ -176,7 +177,7 @@ def usually(law: Discovered, joints: Sequence[str]) -> str:
 
 
 def called(law: Discovered) -> str:
-    """Short name of a law: place and quantity."""
+    """Short name of a law, in words: shape, place and quantity."""
     at = {"joint": law.place, "link": f"{law.place}'s placement"}.get(law.kind, f"the {law.kind}")
     own = law.kind == "joint" and law.quantity == law.place
     over = f"over {f'{law.quantity} times {law.by}' if law.by else 'its position' if own else law.quantity}"
@@ -194,7 +195,7 @@ def called(law: Discovered) -> str:
 
 
 def is_event(law: object) -> bool:
-    """Whether a law is an event: base, tool or a joint's zero displaced from a row on, or in a session."""
+    """Whether a law is an event: base, tool or a joint's zero displaced from a row on, for a while, or by session."""
     if not isinstance(law, Discovered) or law.by or law.of or law.kind == "link":
         return False
     in_time = law.quantity in CLOCK and law.shape in ("step", "run")

@@ -35,7 +35,7 @@ class OfPosition(Fading):
     """
 
     def _ended(self, observations: Observations, joint: int, order: float) -> tuple[Array, Array]:
-        """Positions (N,) clipped for functions of a joint, and the fading factor; order 0 is a gain."""
+        """Positions (N,) of a joint clipped to where the effect was found, and the fading factor; order 0 is a gain."""
         x, slides = observations.q[:, joint], observations.robot.joint_types[joint] == "prismatic"
         if not self.found:
             return x, np.ones(len(x))
@@ -68,7 +68,7 @@ class OfPosition(Fading):
         return position_of(observations, parameters[0].place)
 
     def elsewhere(self, observations: Observations) -> Effect:
-        """Copy without a range, for another campaign."""
+        """Copy for another campaign, without the range where it was found."""
         return replace(self, found=(), means=(), rests=())
 
     def delivered(self, observations: Observations) -> Effect:
@@ -157,7 +157,7 @@ class JointRipple(OfPosition):
 
     @property
     def share(self) -> float:
-        """Prior probability: the orders are some of many. Without waves nothing can be at work."""
+        """Prior probability 1/``tried``, as the orders were picked among many; next to none without waves."""
         return 1.0 / self.tried if self.orders else _NEVER
 
     def having(self, joint: str, order: float, tried: float) -> JointRipple:
@@ -173,7 +173,7 @@ class JointRipple(OfPosition):
 
 
 def _of_motor(order: float, ratio: float | None) -> str:
-    """Periods of a wave in a turn of the motor, in words, where that is a whole or a half number."""
+    """Say how often a wave comes round in a turn of the motor, if that is near a whole or half number; else empty."""
     if ratio is None:
         return ""
     times = Fraction(order / ratio).limit_denominator(2)

@@ -21,10 +21,9 @@ _ROUNDING = 1e-9  # relative: how far sums of floats are off
 
 
 def resolution(values: Array, unit: str) -> float:
-    """Resolution of a quantity, in its unit.
+    """Resolution of a quantity's values (N,): their smallest step, clipped to what instruments for its unit resolve.
 
-    The smallest step between two of its values (N,), within the resolutions of instruments for this unit. 0 for
-    quantities that are no readings, such as payload, label or direction of approach.
+    In its unit; 0 for quantities that are no readings, such as payload, label or direction of approach.
     """
     if unit not in settings.READS_TO:
         return 0.0
@@ -34,12 +33,12 @@ def resolution(values: Array, unit: str) -> float:
 
 
 def varies(values: Array, least: float = 0.0) -> bool:
-    """Whether values (N,) differ by more than a resolution."""
+    """Whether the range of values (N,) exceeds a resolution; never for none."""
     return bool(np.ptp(values) > least * (1.0 + _ROUNDING)) if len(values) else False
 
 
 def without_twins(readings: Mapping[str, Array], joints: tuple[str, ...]) -> dict[str, Array]:
-    """Remove redundant quantities: of two that agree the finer one is left out.
+    """Remove redundant quantities: readings that differ from another one by 1 % of its spread or less.
 
     An encoder reading that agrees with the command is removed, and a link temperature that agrees with the robot's.
     """
@@ -69,10 +68,10 @@ def unit(robot: Robot, name: str) -> str:
 def quantities(observations: Observations) -> dict[str, Array]:
     """Quantities by name, (N,) each, that vary by more than their resolution.
 
-    Of two readings of the same the coarser one stands for both (:mod:`thermal_robot.effects.quantities`). Recorded
-    covariates come first, the row's number where neither time nor order is recorded, the session as its number in the
-    alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place. What a joint
-    remembers (:data:`TURN`) is not among them: it bears on that joint alone.
+    Of two readings that agree only the general one is kept (:func:`without_twins`). Recorded covariates come first, the
+    row's number where neither time nor order is recorded, the session as its number in the alphabet, then each joint's
+    position, gravity's direction in the tool frame and the tool's place. The way since a joint's turning point
+    (:data:`TURN`) is not among them: it bears on that joint alone.
     """
     recorded = [name for name in observations.covariates if observations.varies(name)]
     names = [*recorded, *([] if set(CLOCK) & set(recorded) else ["order"]), "session"]
@@ -111,7 +110,7 @@ def quantity(observations: Observations, name: str) -> Array | None:
 
 
 def began(observations: Observations, clock: Array) -> dict[str, float]:
-    """Start time by session on a clock (N,), with its first row; under an empty name without sessions."""
+    """Start times by session on a clock (N,), those of its first row; without sessions one, under an empty name."""
     rows = observations.campaign.labels.get("session")
     if rows is None:
         return {"": float(clock.min())}

@@ -22,8 +22,8 @@ _SAME = 1e-6  # rad or m: commands nearer than this repeat each other
 class RandomEffect(Effect):
     """Variance component: its parameter is a standard deviation, which no correction removes.
 
-    It is estimated from the covariance of the residual, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j how joint j
-    moves the target and one σ_j (rad or m) a joint and component.
+    It is estimated from the covariance of the residual, cov(row) = noise² I + Σ_j σ_j² J_j J_jᵀ, with J_j the Jacobian
+    of the target by joint j, and one σ_j (rad or m) a joint and component.
     """
 
     random: ClassVar[bool] = True
@@ -39,7 +39,7 @@ class RandomEffect(Effect):
         return ()
 
     def joints(self, chain: tuple[str, ...]) -> tuple[str, ...]:
-        """Joints of a chain in which it may be, in their order."""
+        """Return the joints of a chain, in order, that are among ``places`` (all if empty) and not ``excluded``."""
         return tuple(j for j in chain if j in (self.places or chain) and j not in self.excluded)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
@@ -67,7 +67,7 @@ class EncoderResolution(RandomEffect):
     factor: ClassVar[float] = sqrt(12.0)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
-        """Distance (N,) of the nearest step from each command; only the encoder's zero is random."""
+        """Quantisation error (N,) of each command: nearest encoder position less the command; its zero is random."""
         first = size * rng.uniform()
         return first + size * np.round((command - first) / size) - command if size else np.zeros_like(command)
 
@@ -87,7 +87,7 @@ class ExcessRepeatability(RandomEffect):
     factor: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Column ``pose`` unless a pose is repeated; rows without a label stand alone."""
+        """Return the column ``pose`` unless some pose is repeated; rows with an empty label do not count."""
         labels = observations.campaign.pose_labels
         visits = np.round(observations.q / _SAME) if labels is None else labels[labels != ""]
         return () if len(np.unique(visits, axis=0)) < len(visits) else self.needs

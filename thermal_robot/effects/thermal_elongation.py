@@ -38,12 +38,12 @@ class History:
         return cls(tuple(instants[kept].tolist()), tuple(values[kept].tolist()))
 
     def followed(self, lag: float, times: Array, temperatures: Array) -> Array:
-        """(N,) temperature of a body that obeys dT/dt = (T_recorded − T) / lag, a first-order lag of ``lag`` s.
+        """Temperature (N,) of a body that follows the record with a first-order lag: dT/dt = (T_recorded − T) / lag.
 
-        It is in balance at the first point. Between two points the solution is exact: T = u(t) − r·lag + (T_i − u_i +
-        r·lag) exp(−(t − t_i)/lag), where u runs at the rate r. Rows are asked for by times and temperatures (N,), s and
-        °C: beyond the record the row's own is taken to have held since its end; before it the body is in balance with
-        it.
+        It is in balance at the first point; ``lag`` in s. Between two points the solution is exact: T = u(t) − r·lag +
+        (T_i − u_i + r·lag) exp(−(t − t_i)/lag), where u runs at the rate r. Rows are asked for by times and
+        temperatures (N,), s and °C: beyond the record the row's own is taken to have held since its end; before it the
+        body is in balance with it.
         """
         t, u = np.array(self.times), np.array(self.temperatures)
         rate = np.diff(u) / np.diff(t)
@@ -60,7 +60,7 @@ class History:
 
 @lru_cache(maxsize=_FOLLOWED)
 def _temperature_lag(history: History, lag: float) -> tuple[float, ...]:
-    """Temperature lag (K,) of a body behind the record at its points, K."""
+    """Excess (K,) of a lagging body's temperature over the record at its points, K; 0 at the first."""
     t, u = np.array(history.times), np.array(history.temperatures)
     behind = [0.0]
     for gain, decay in zip(np.diff(u) / np.diff(t) * lag, np.exp(-np.diff(t) / lag), strict=True):
@@ -156,7 +156,7 @@ class ThermalElongation(Effect):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One coefficient of expansion a segment, or one for all, with the segments' deviations from it; 1/K.
 
-        Then, where the links start out of balance, what they are longer by at each start.
+        Then, where the links start out of balance, one strain for each start, which decays with the lag.
         """
         reference, responses = observations.campaign.reference_temperature, {}
         for s, segment in enumerate(observations.robot.segments):
@@ -199,12 +199,12 @@ def _grown(observations: Observations, s: int, strain: Array) -> Response:
 
 
 def _follows(observations: Observations) -> bool:
-    """Whether the temperatures may lag behind the record: a single sensor, not one for each link."""
+    """Whether a lag may be fitted: a single sensor serves all links, and time was recorded and varies."""
     return observations.varies("time") and _columns(observations) == ("temperature",)
 
 
 def _columns(observations: Observations) -> tuple[str, ...]:
-    """Temperatures that apply to the segments."""
+    """Return the recorded temperatures that apply to segments: the links' own, and the robot's for all others."""
     links = dict.fromkeys(s.parent_link for s in observations.robot.segments if s.length > _LENGTH)
     own = [f"temperature.{link}" for link in links if f"temperature.{link}" in observations.covariates]
     general = ["temperature"] if len(own) < len(links) and "temperature" in observations.covariates else []

@@ -44,7 +44,7 @@ class TrackingLag(Effect):
         return () if any(observations.varies(column) for column in columns) else columns
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Velocities and accelerations of the joints that moved."""
+        """Return the velocity and acceleration columns of the joints that move."""
         moving, accelerating = self._joints(observations)
         return (*(f"velocity.{joint}" for joint in moving), *(f"acceleration.{joint}" for joint in accelerating))
 
