@@ -294,7 +294,7 @@ def select_exactly(
 
 
 def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
-    """Linearise at the exact model: its gap plus the displacement by its own effects, so that values are no steps."""
+    """Linear problem at the exact model; the displacement by its own effects is added back to the gap."""
     moved = (block(observations, effect).columns @ values for effect, values in held)
     gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
     return Linear(gap, frame_columns(observations)[0], tuple(blocks))

@@ -112,7 +112,7 @@ class ModelSearch:
 
     @staticmethod
     def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
-        """Yield the larger block of each nested pair whose smaller block has a signal-to-noise above a limit."""
+        """Yield the larger block of each nested pair whose smaller block the data see (information above a limit)."""
         for pair in inside:
             small, large = sorted(pair, key=lambda b: plain.ranks[b])
             own = plain.slices[small]
@@ -250,7 +250,7 @@ class ModelSearch:
         return self.kernels[max(asked)[1]] if asked else None
 
     def plausible_kernels(self, best: Combination) -> tuple[Kernel, ...]:
-        """Kernels whose log evidence with the best combination is within a limit of its own, at their best amplitude.
+        """Kernels whose log evidence, at their best amplitude, is at most :data:`settings.KERNEL_REACH` below the best.
 
         A kernel whose best amplitude is the smallest of the grid is noise, and is left out.
         """
@@ -564,7 +564,7 @@ class _Iteration:
         return float(min(followed / max(equations, 1), settings.MOST_LEVERAGE))
 
     def explanation(self, aside: NDArray[np.bool_]) -> Explanation:
-        """Explanation of this round.
+        """Build the explanation at this iteration's best combination: values, residual, probabilities.
 
         Settings and values are those of the best correction: with a smooth discrepancy, which no correction contains,
         the effects are refitted without it, at a noise that includes it.
@@ -642,7 +642,7 @@ def share_of_places(count: int, among: int) -> float:
 
 
 def residual_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
-    """Residual (N, m): gap less effects and frames."""
+    """Residual (N, m): gap less effects at given values, and less the unknown frames fitted to the rest."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
     left = linear.gap - sum(moved, np.zeros_like(linear.gap))
     return np.asarray(left - linear.frames @ frame_step(linear, whitening, left))

@@ -99,7 +99,7 @@ class _Sums:
         return np.asarray(runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))])
 
     def best_step(self) -> Runs:
-        """Best run that begins with the first row, or ends with the last."""
+        """Best run with one change point: it begins with the first row, or ends with the last."""
         rows = len(self.products)
         inner = np.arange(self.fewest, rows - self.fewest + 1)
         steps = [np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])]
@@ -238,10 +238,10 @@ class HeldOut:
         return cls(folds, stacks, np.array([own.T @ own for own in stacks]))
 
     def left(self, flat: int, prior: Array, further: Array | None = None) -> float:
-        """Held-out sum of squares over all folds, in units of the noise.
+        """Held-out sum of squares over all folds, each predicted by the others, in units of the noise.
 
-        The first ``flat`` columns have no prior, the others ``prior`` (K − flat,), 1/variance; ``further`` columns
-        (N, m, k) may join.
+        The first ``flat`` columns have no prior, the others ``prior`` (K − flat,), 1/variance; ``further`` columns (N,
+        m, k) may join.
         """
         products = self.products if further is None else self._with(further)
         whole, total = products.sum(axis=0), 0.0
@@ -303,7 +303,7 @@ class _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Pursuit:
-    """Matching pursuit: waves are added one after another.
+    """Orthogonal matching pursuit of joint ripple: waves are added one after another, all refitted.
 
     ``gap`` (N, m) is what effects and waves together are to explain; ``design`` (N, m, K) the columns of ``flat`` frame
     parameters and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried

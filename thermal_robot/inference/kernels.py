@@ -51,7 +51,7 @@ class DesignMatrix:
 
     @classmethod
     def of(cls, columns: Iterable[Array]) -> DesignMatrix:
-        """Stack of columns (N, m, ·) over all rows, unweighted."""
+        """Collect columns (N, m, ·) over all rows, unweighted, each distinct one stored once."""
         different: list[Array] = []
         number: list[int] = []
         seen: dict[bytes, int] = {}
@@ -86,7 +86,7 @@ class DesignMatrix:
         return replace(self, different=tuple(self.different[k] for k in kept), number=np.arange(len(kept)))
 
     def rows(self, which: slice | Numbers) -> Array:
-        """Distinct columns (r, m, U) of some rows."""
+        """Distinct columns (r, m, U) of some of the rows in use, times ``root``."""
         rows, root = self.used[which], self.root[which]
         found = np.empty((*root.shape, len(self.different)))
         for k, own in enumerate(self.different):

@@ -184,7 +184,7 @@ def _reduced(rows: Array, bases: Sequence[Array]) -> Array:
 
 
 def _log_det(matrix: Array, rank: int) -> float:
-    """Logarithm of the product of the largest ``rank`` eigenvalues."""
+    """Log pseudo-determinant: logarithm of the product of the largest ``rank`` eigenvalues."""
     if not rank:
         return 0.0
     return float(np.log(np.linalg.eigvalsh(matrix)[-rank:]).sum())

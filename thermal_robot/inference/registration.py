@@ -195,7 +195,10 @@ def frames_known(campaign: Campaign) -> bool:
 
 
 def found_frames(campaign: Campaign) -> Frames:
-    """Return the initial registration, close enough to linearise; :class:`EstimationError` below three rows."""
+    """Return frames registered robustly on a sample of rows, close enough to linearise; declared ones stay.
+
+    Raises :class:`EstimationError` for fewer than three rows of positions.
+    """
     frames, rows = Frames.declared(campaign), campaign.samples
     if campaign.position is None:
         return _turned(campaign, _found_by_instrument(campaign, frames))
@@ -206,7 +209,7 @@ def found_frames(campaign: Campaign) -> Frames:
 
 
 def _found_by_instrument(campaign: Campaign, frames: Frames) -> Frames:
-    """Register the base on the rows that an instrument measured; without any it stands as declared."""
+    """Register the base on the rows that an instrument measured; with fewer than three it stays as declared."""
     rows = np.flatnonzero(instrument_rows(campaign))
     if campaign.base_known or len(rows) < 3:
         return frames

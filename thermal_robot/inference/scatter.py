@@ -427,7 +427,7 @@ class _Search:
         return self.fit(components)[1]
 
     def _prior(self, components: tuple[Component, ...]) -> float:
-        """Log prior of a set of components: for each kind, that it is at work, and in just so many joints."""
+        """Log prior of a set of components: for each kind, that it is at work, and in exactly these joints."""
         n, at_work, total = len(self.likelihood.rows.lever), settings.PRIOR_PROBABILITY, 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
@@ -665,7 +665,7 @@ def stepped(log_factors: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class Kept:
-    """Variance component that is scatter, no law; and the encoder step of that size or period, rad or m."""
+    """Variance component classified as scatter, and the step of an encoder that would cause it, rad or m."""
 
     component: JointScatter
     step: float

@@ -1,6 +1,6 @@
 """Screening of candidate laws, each a quantity at a place, against a residual by an information criterion.
 
-The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`bic_gain`).
+The residual is a projection (:class:`Target`), the score the Bayesian information criterion (:func:`bic_gain`).
 Screened are laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
 """
 
@@ -38,9 +38,9 @@ from thermal_robot.observations import Observations
 class Score:
     """Score of further columns: p-value of their F test, share of the residual explained, and gain of log evidence.
 
-    ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayes information
-    criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, S₀ and S₁ the residual sums of squares without and with the k columns, ν the
-    degrees of freedom.
+    ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayesian
+    information criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, S₀ and S₁ the residual sums of squares without and with the k
+    columns, ν the degrees of freedom.
     """
 
     p_value: float
@@ -52,7 +52,7 @@ NOTHING = Score(1.0, 0.0, -np.inf)
 
 
 def bic_gain(total: Array | float, explained: Array | float, rank: Array | float, freedom: float) -> Array:
-    """Gain of log evidence by the Bayes information criterion (Schwarz 1978), ½ ν ln(S₀/S₁) − ½ k ln ν.
+    """Gain of log evidence by the Bayesian information criterion (Schwarz 1978), ½ ν ln(S₀/S₁) − ½ k ln ν.
 
     ``total`` S₀ and S₀ − S₁ ``explained`` are sums of squares, ``rank`` k the number of columns, ``freedom`` ν the
     degrees of freedom without them; −∞ without columns, and where these would leave too few degrees of freedom.
@@ -430,7 +430,7 @@ def periodogram(statistics: PlaceStatistics, q: Array, at: Array) -> Array:
 
 
 def peak(statistics: PlaceStatistics, q: Array, grid: Array) -> float:
-    """Order of the largest gain, refined between grid points (K,)."""
+    """Wave order at the maximum of the periodogram over a grid (K,), refined by ever finer grids about it."""
     best = float(grid[np.argmax(periodogram(statistics, q, grid))])
     step = settings.ORDER_STEP * 2.0 * np.pi / float(np.ptp(q))
     for _ in range(settings.ORDER_ZOOMS):
@@ -470,7 +470,7 @@ def _chunk(statistics: PlaceStatistics, q: Array, at: Array) -> Array:
 
 
 def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
-    """Complex waves (N, K) e^(i k q) of equidistant orders, by recurrence."""
+    """Complex waves (N, K) e^(i k q) of equidistant orders k, as products of coarse and fine ones."""
     fine = int(np.ceil(np.sqrt(len(at))))
     step = at[1] - at[0] if len(at) > 1 else 0.0
     small = np.exp(1j * np.outer(q, step * np.arange(fine)))
@@ -581,7 +581,7 @@ def _varying_joints(effect: Effect, observations: Observations) -> tuple[str, ..
 
 
 def _driver(effect: Effect, observations: Observations, joint: str) -> str:
-    """Quantity that drives an effect in a joint; empty if none is recorded."""
+    """Name of the quantity that drives an effect in a joint; empty if none is recorded."""
     own = [p for p in gate.checked(effect, observations) if p.kind == "joint" and p.place == joint]
     driver = gate.driver(effect, observations, own, np.zeros(observations.campaign.samples))
     return driver[0] if driver else ""
@@ -621,7 +621,7 @@ def interactions(observations: Observations, kinds: Sequence[str]) -> list[Disco
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Hysteresis of each joint by its last turning point (smooth, or stop operators), and relaxation after starts."""
+    """Candidate laws with memory: hysteresis of each joint since its last turning point, relaxation after starts."""
     found, past, known = [], observations.campaign.since_turn, quantities(observations)
     clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:
@@ -727,7 +727,7 @@ def scan(
 
 
 def _candidates(cache: ScanCache, effects: Iterable[Effect] | None) -> dict[str, list[Discovered]]:
-    """Candidate laws by kind, without waves of arbitrary order."""
+    """List candidate laws by kind: plain, wave, memory, modulated, product; without waves of arbitrary order."""
     observations = cache.observations
     first = laws(observations, ("joint", "base", "tool"))
     plain = [law for law in first if law.shape != "harmonic"]
@@ -760,7 +760,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
 
 
 def _gains_by_shape(cache: ScanCache, t: int, law: Discovered) -> list[Scanned]:
-    """Gain of log evidence of a law in each functional form."""
+    """Score a law in each functional form: its gain of log evidence, and the number of forms tried."""
     observations = cache.observations
     whole = replace(law, shape="product") if law.by else law
     values = None if law.quantity == "none" else whole.values(observations)

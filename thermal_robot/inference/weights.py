@@ -34,7 +34,7 @@ class Noise:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Noise:
-        """Return the noise that a campaign states."""
+        """Return the noise that a campaign states; for poses that a model computed, else the digits they have."""
         seen, place, turn = seen_components(campaign), campaign.noise_position, campaign.noise_orientation
         if of_model(campaign):  # what is computed has no noise: it is written to some digits
             place, turn = place or settings.WRITTEN_TO, turn or settings.WRITTEN_TO
@@ -93,9 +93,10 @@ def first_whitening(linear: Linear, noise: Noise) -> Whitening:
 
 
 def reweigh(remainder: Array, noise: Noise, leverage: float, measures: int) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Huber weights at the residual's noise, and outliers (N,), at most a quarter of the rows.
+    """Whitening with Huber weights at the residual's noise, and mask of outliers (N,), at most a quarter of the rows.
 
-    ``leverage`` is the share of the equations that was fitted.
+    Outliers are the farthest rows beyond :func:`distance_limit`; their weight is 0. ``leverage`` is the share of the
+    equations that was fitted.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
     rows, figures = len(remainder), noise.figures(measures)
