@@ -82,7 +82,7 @@ class Backlash(Effect):
         return (*recorded, *torque_columns(observations)) if np.any(self.held) or self.grows else recorded
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Grid of settings: friction holds the joint, constant or growing with torque, or gravity turns it."""
+        """Grid of settings: friction always holds the teeth, or below a share of torque; play that grows; carriages."""
         turning = tuple(replace(self, carriage=sits) for sits in _CARRIAGES if _slides(observations))
         torque = observations.torque
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):

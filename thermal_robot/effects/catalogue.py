@@ -99,12 +99,12 @@ def library() -> dict[str, Effect]:
 
 @cache
 def _installed() -> tuple[EntryPoint, ...]:
-    """Entry points of installed packages, read once: a hundredth of a small diagnosis each time."""
+    """Entry points of installed packages for effects, read once: reading takes a hundredth of a small diagnosis."""
     return tuple(entry_points(group="thermal_robot.effects"))
 
 
 def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
-    """Raise unless an object is an effect that can be added to the known ones."""
+    """Raise :class:`EffectError` unless an object is an effect, not random, with a name that no known one has."""
     if not isinstance(effect, Effect) or not isinstance(effect.name, str) or not effect.name:
         raise EffectError(f"{effect!r} is not an effect with a name; expected an instance of a subclass of Effect")
     if effect.random:
@@ -115,7 +115,7 @@ def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
 
 @cache
 def restored(name: str, arguments: str) -> Effect:
-    """Effect of the library by its name and its JSON arguments; :class:`EffectError` if not installed, or not taken."""
+    """Effect of the library by its name and JSON arguments; :class:`EffectError` if unknown or not accepted."""
     known = library()
     if name not in known:
         raise EffectError(f"no effect is named {name!r} here")
@@ -151,7 +151,7 @@ def named(name: str) -> Effect:
 
 
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
-    """Entry of an answer for one effect; :class:`UnknownEffectError` suggests the name that was meant."""
+    """Look an effect up in a mapping by name; :class:`UnknownEffectError` suggests the name that was meant."""
     if name not in answers:
         raise UnknownEffectError(f"no effect named {name!r} was considered{_meant(str(name), answers)}")
     return answers[name]

@@ -119,7 +119,7 @@ class BaseCompliance(_Yielding):
         return tuple(replace(self, below=below, tilt=tilt) for tilt, below in every) or (self,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Two compliances about each horizontal axis, rad/(N·m) and m/(N·m), or gain and depth of the tilt."""
+        """One compliance about each horizontal axis, rad/(N·m), if ``below`` also in m/(N·m); or those of the tilt."""
         gravity = observations.robot.gravity
         up = -gravity / max(float(np.linalg.norm(gravity)), _STEADY)
         if self.tilt:
@@ -211,7 +211,7 @@ class LinkCompliance(_Yielding):
         return tuple(replace(self, tilt=tilt) for tilt in self._kinds(observations)) or (self,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Two bending compliances and torsion for each segment, 1/(N·m²); or gains of measured rotations."""
+        """Two bending compliances a segment, with ``twist`` a torsional one, 1/(N·m²); or gains of measured tilts."""
         if self.tilt:
             return _by_tilt(observations)
         robot = observations.robot

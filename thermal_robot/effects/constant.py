@@ -173,7 +173,7 @@ class BaseFrame(Effect):
 
     @property
     def weight(self) -> float:
-        """Prior weight: one registration in ten is off in a single component."""
+        """Prior weight: 1 for all components together, 1/60 for one alone, as one registration in ten is off in one."""
         return _ALONE if self.alone else 1.0
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
@@ -220,7 +220,7 @@ class ToolFrame(Effect):
 
     @property
     def weight(self) -> float:
-        """Prior weight: one target in ten is off in a single component."""
+        """Prior weight: 1 for all components together, 1/60 for one alone, as one target in ten is off in one."""
         return _ALONE if self.alone else 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:

@@ -38,7 +38,7 @@ class Fading(Effect):
     fades: bool = field(default=True, kw_only=True)
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor arguments for saving; the range only where it has one."""
+        """Return the constructor arguments for saving; those of the fading only where it has a range."""
         return {k: v for k, v in super().arguments().items() if self.found or k not in _OF_A_MODEL}
 
     def faded(self, functions: Array, left: Array) -> Array:

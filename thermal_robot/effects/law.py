@@ -295,7 +295,7 @@ class Discovered(Fading):
         )
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return the law itself, and copies with the mark shifted either way by part of the range, or its width scaled."""
+        """Return the law itself, and copies with its mark shifted either way by part of the range, or width scaled."""
         shape = SHAPES[self.shape]
         if not shape.mark:
             return (self,)

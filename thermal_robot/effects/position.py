@@ -46,7 +46,7 @@ class OfPosition(Fading):
         return np.clip(x, low, high), left_at(x, low, high)
 
     def curves(self, observations: Observations, of: Sequence[tuple[str, float, str, float]]) -> tuple[Parameter, ...]:
-        """Parameters by joint, order, words and expected size: two amplitudes a wave, one gain for order 0."""
+        """Make parameters by joint, order, words and size: amplitudes of sine and cosine, or one gain for order 0."""
         robot, parts = observations.robot, []
         found: list[Parameter] = []
         for joint, order, words, size in of:

@@ -43,7 +43,7 @@ class RandomEffect(Effect):
         return tuple(j for j in chain if j in (self.places or chain) and j not in self.excluded)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
-        """Random deviations (N,) of a joint from its commands, rad or m: normal, standard deviation ``size``.
+        """Random deviations (N,) of a joint from its commands, rad or m: normal, with deviation ``size``/``factor``.
 
         ``pose`` (N,) is the number of the commanded pose that each row is a visit to.
         """

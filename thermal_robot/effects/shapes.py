@@ -46,7 +46,7 @@ Curves = Callable[[Array, Marks, float, float], list[Any]]
 
 @dataclass(frozen=True)
 class Shape:
-    """Basis of one shape of a law, the functions φ of the table above, and its words.
+    """Basis functions φ of one shape of a discovered law (see the module's table), and the words for it.
 
     ``curves`` names its functions but for the one that stands ``beside`` them: a ``constant``, or for a share the
     ``rest`` of it. ``labels`` name those that do not belong to one of the marks ``each``; ``{start}`` and ``{range}``

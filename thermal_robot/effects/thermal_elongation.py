@@ -128,7 +128,7 @@ class ThermalElongation(Effect):
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def elsewhere(self, observations: Observations) -> ThermalElongation:
-        """Copy with that campaign's temperatures; without the lag where it has no times."""
+        """Copy for another campaign, with its temperature record; without the lag where it has no times."""
         if not self.lag:
             return self
         if not _follows(observations):
