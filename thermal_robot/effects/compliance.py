@@ -201,7 +201,7 @@ class LinkCompliance(_Yielding):
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Column of masses, unless a bending load by known masses or a measured tilt varies.
 
-        A payload alone will not do: without the arm's own masses, what the payload bends would stand in for their
+        A payload alone is not enough: without the arm's own masses, bending by the payload would include their
         share.
         """
         return () if self._kinds(observations) else (_MASSES,)

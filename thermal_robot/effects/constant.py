@@ -157,7 +157,7 @@ class BaseFrame(Effect):
     """Registration error of the base: its declared pose is off by a constant twist in the root frame.
 
     Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"`` and a reading says where it is:
-    an unknown base is fitted before any effect is asked for, and one that nothing but the arm tells is not observable.
+    an unknown base is fitted before any effect, and without an instrument its error is not observable.
     It is a twist of the first joint's placement, too (:class:`Geometric`), and about that joint's axis its zero offset.
     ``alone`` names the one component that is off.
     """

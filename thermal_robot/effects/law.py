@@ -57,7 +57,7 @@ class Discovered(Fading):
     0.1 mrad elsewhere. ``quantity`` is a column, joint or derived quantity, ``origin`` and ``span`` those in the
     campaign where it was found.
 
-    A law may depend on a second quantity y (``by``): then each φ_k stands beside φ_k·v with v = (y − by_origin) /
+    A law may depend on a second quantity y (``by``): then φ_k·v is added to each φ_k, with v = (y − by_origin) /
     by_span, so that a straight law holds 1, u, v and u·v. It may be the size of a known effect (``of``, with arguments
     as JSON text) that follows x: then the φ_k multiply the unit response of each of the effect's parameters in that
     joint, of the effect's own expected size.

@@ -140,7 +140,7 @@ class JointRipple(OfPosition):
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number.
     Expected size 0.1 mrad: strain-wave gears are rated for 1 to 2 minutes of arc peak to peak, most of it twice a turn
     of the motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. An order near a whole or half
-    multiple of a stated gear ratio is said to be the motor's.
+    multiple of a stated gear ratio is reported as the motor's.
 
     ``orders`` (rad per rad; rad/m where the joint slides) are looked for in what remains, joint by joint
     (:mod:`thermal_robot.inference.generate`); ``tried`` is among how many waves all of these were picked, the product

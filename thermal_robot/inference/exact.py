@@ -1,6 +1,7 @@
 """Model selection at the exact fit: choose effects, refine their constants, refit, and choose once again.
 
-A third choice would be among refined copies of what the first two chose: on real robots it finds more, and holds less.
+A third choice would be among refined copies of the first two: on real robots it finds more effects, fewer of which hold
+out of sample.
 
 The exact fit is by Levenberg-Marquardt over frames and parameters, at fixed prior scales. Nonlinear constants, such as
 a lag, are refined by coordinate search on the evidence.

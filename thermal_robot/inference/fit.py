@@ -200,7 +200,7 @@ def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[
 def _exact(
     start: Observations, explanation: Explanation, progress: Callable[[str], None]
 ) -> tuple[Explanation, Observations, Held]:
-    """Alternate exact refits and explanations until outliers and noise converge."""
+    """Alternate exact refits and explanations until outliers stay and the noise hardly falls, or for a few rounds."""
     observations, held = start, [(b.effect, np.zeros(len(b.sizes))) for b in explanation.linear.blocks]
     for revision in range(1, settings.REVISIONS + 1):
         progress(f"exact fit, revision {revision}")

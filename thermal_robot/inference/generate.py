@@ -453,7 +453,7 @@ class _Pursuit:
         return Target.of(self.gap, self._columns(found), self.changed, relative, like, seen)
 
     def _moves(self, joint: str) -> tuple[Array, Array]:
-        """Positions (N,) of a joint, and its displacement (N, m, 1) of the target per unit."""
+        """Positions (N,) of a joint, and the target's displacement (N, m, 1) per unit of it (Jacobian column)."""
         j = self.observations.robot.joint_names.index(joint)
         return self.observations.q[:, j], self.observations.joint_sensitivity[:, : self.gap.shape[1], j, None]
 
@@ -547,8 +547,8 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[D
     """Candidate laws by log evidence, best first; possible events before all others.
 
     Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
-    have absorbed an unlisted cause. A bend comes with its other side: the two differ by a straight line, which a known
-    effect may have absorbed. A law is called ``discovered.<number>``.
+    have absorbed an unlisted cause. A hinge comes with its mirror image: the two differ by a straight line, which a
+    known effect may have absorbed. A law is called ``discovered.<number>``.
     """
     sample = RowSample.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))

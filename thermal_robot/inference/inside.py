@@ -27,7 +27,7 @@ class Portion:
     """Part of a fitted effect that a contained effect accounts for, or the rest of it.
 
     (k,) value, posterior (``spread``) and ``prior`` standard deviation of each parameter, in its unit; ``unseen`` are
-    those that the data do not tell from the ones before, or from the frames.
+    those that are collinear, in these data, with the ones before or with the frames.
     """
 
     effect: str

@@ -6,8 +6,8 @@ mean one on its diagonal, so that τ is the discrepancy's rms over the noise:
 * ``tool``: the target moves by a smooth function of all joint positions and conditions together;
 * ``places``: each joint, the base and the tool err by a sum of smooth functions of single quantities,
   K = Σ_p J_p k_p J_pᵀ;
-* ``poses``: what a pose brings, anew for each pose and the same at every visit, to the target or in one joint; or what
-  a visit brings, in one joint.
+* ``poses``: an independent error of each pose, the same at every visit, of the target or in one joint; ``visits``:
+  an independent error of each visit, in one joint.
 
 Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; low rank: Rasmussen and Williams,
 *Gaussian Processes for Machine Learning*, 2006, 8.1.

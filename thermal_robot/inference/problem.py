@@ -210,7 +210,7 @@ def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array
 
 
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
-    """Nested pairs of blocks: the smaller lies, as far as the data can tell, in the span of the larger.
+    """Nested pairs of blocks: the columns of the smaller lie in the span of the larger, up to what the data resolve.
 
     The two exclude each other; the smaller is preferred where it suffices. A block with non-negative parameters
     contains none, as it does not span its columns.

@@ -243,7 +243,7 @@ def _median_distance(campaign: Campaign, frames: Frames) -> float:
 
 
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
-    """Return the frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
+    """Apply a step (f,) of the parameters of :func:`~thermal_robot.inference.columns.frame_columns` to the frames."""
     own = np.array(names, dtype=object)
     base_step, tool_step = (step[own == name] for name in ("base", "tool"))
     shared = {name: each for name, each in frames.artefacts.items() if name in names}

@@ -84,8 +84,8 @@ def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], fre
 class Fitted:
     """Posterior mode of the variances of some components, and the log density there (``value``).
 
-    ``logs``: of variances over squares of the noise: instrument (one for every three axes), what visits of a pose have
-    in common from no joint (where there are repeats), then the components; ``spread`` is their covariance.
+    ``logs``: of variances over squares of the noise: the instrument's (one for every three axes), that common to all
+    visits of a pose but of no joint (where there are repeats), then the components; ``spread`` is their covariance.
     ``covariance`` (R, m, m) of each row.
     """
 
@@ -628,7 +628,7 @@ def _normal(x: Array, mean: Array | float, variance: Array) -> Array:
 def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex128]:
     """Fourier coefficients (K, H) of each row's log likelihood as a function of the phase of the first position.
 
-    The joint stands at the nearest of the positions around its command, with a slack in where the nearest changes.
+    The joint is at the position nearest to its command, with a ``slack`` in steps for where the nearest one changes.
     """
     u = np.arange(settings.STEP_PHASES) / settings.STEP_PHASES
     near = np.stack([u - 1.0, u, u + 1.0]) - 0.5
@@ -691,7 +691,7 @@ class RandomGap:
 
     @property
     def stepped(self) -> float:
-        """Probability that the per-pose errors are quantisation by encoders."""
+        """Posterior probability that the per-pose errors are quantisation by encoders (:func:`stepped`)."""
         return stepped(self.steps.values())
 
 

@@ -422,8 +422,8 @@ def periodogram(statistics: PlaceStatistics, q: Array, at: Array) -> Array:
 
     The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
     periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
-    steps (K,). Gains are those of :meth:`PlaceStatistics.gains`; orders that the design can do, or
-    whose sine and cosine the positions cannot tell apart, gain −∞.
+    steps (K,). Gains are those of :meth:`PlaceStatistics.gains`; orders collinear with the
+    design, or whose sine and cosine are collinear at these positions, gain −∞.
     """
     found = [_chunk(statistics, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]
     return np.concatenate([*found, np.zeros(0)])
@@ -588,7 +588,7 @@ def _driver(effect: Effect, observations: Observations, joint: str) -> str:
 
 
 def _varying_responses(parameter: Parameter) -> Iterator[Response]:
-    """Yield the responses of a parameter that vary by row."""
+    """Yield the responses of a parameter that are stated row by row, not once for all rows."""
     yield from (r for r in parameter.responses if r.values.ndim == (1 if r.channel == "joint" else 2))
 
 
@@ -703,8 +703,8 @@ def scan(
 
     Candidates are a smooth and a straight law of each quantity at each place; waves of any order and memory of each
     joint; known effects modulated in one joint; products of two quantities. At segments, whose laws have six
-    components, only the best quantities are tried. Dropped are laws no better than what they contain: a modulated
-    effect than the effect itself, a product than one of its quantities.
+    components, only the best quantities are tried. Dropped are laws that gain no more than one nested in them: a
+    modulated effect than the effect itself, a product than one of its quantities.
     """
     cache = ScanCache(observations, targets)
     kinds = _candidates(cache, effects)
