@@ -185,7 +185,7 @@ class ModelSearch:
         return (hyper, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _best_amplitude(self, kernel: int, blocks: tuple[int, ...]) -> tuple[Hyperparameters, float]:
-        """Maximise the log evidence of one combination over a kernel's grid of amplitudes, in which it is unimodal."""
+        """Most probable amplitude of a kernel for one combination, taken as unimodal, and the log evidence there."""
         k = settings.TAUS.index(self._amplitudes.get(kernel, 1.0))
         best = self._log_evidence((kernel, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:

@@ -544,7 +544,7 @@ class Discovery:
 
 
 def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[Discovered, ...]:
-    """Candidate laws by log evidence, best first; possible events before all others.
+    """Candidate laws: possible events, then the best of each scanned residual in turn by net gain, then the next.
 
     Scanned are the residuals of the explanation, of its laws alone, and without each effect, since known effects may
     have absorbed an unlisted cause. A hinge comes with its mirror image: the two differ by a straight line, which a
