@@ -202,11 +202,19 @@ class Observations:
         """Lever arm (N, 3) from the tool frame's origin to the target, root frame axes, m."""
         return self.chain.tool_rotation @ self.frames.tool[:3, 3]
 
+    @property
+    def _jacobian(self) -> Array:
+        return frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+
     @cached_property
     def joint_sensitivity(self) -> Array:
         """Geometric Jacobian (N, 6, n) at the target, linear first, root frame axes, as far as each row sees it."""
-        found = frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
-        return self.sight.sees(found)
+        return self.sight.sees(self._jacobian)
+
+    @property
+    def joint_sensitivity_there(self) -> Array:
+        """The same (N, 6, n) at the predicted target, where rows look at it elsewhere."""
+        return self.sight.sees(self._jacobian, there=True)
 
     @cached_property
     def segment_sensitivity(self) -> Array:

@@ -92,6 +92,22 @@ def test_what_moves_all_stands_is_an_alias_of_them(ur10):
     assert np.abs(without(equations_of(seen.joint_sensitivity[:, :3, 1:5]), basis)).max() > 0.01
 
 
+@pytest.mark.parametrize("tool", ["unknown", "known"])
+@pytest.mark.parametrize(("kind", "scale"), [("socket", 1.0), ("socket", 5.0), ("plane", 1.0)])
+def test_the_zero_of_the_last_joint_is_an_alias_of_an_unknown_tool(ur10, kind, scale, tool):
+    """To turn the last joint is to move the ball about its axis: said, and no interval is given, whatever the gap."""
+    true = offsets(ur10, scale * np.array([0.0, 3e-3, -2e-3, 1e-3, 2e-3, 2e-3]))
+    at = {"tool": (0.05, 0.02, 0.1), "tool_known": tool == "known"}
+    found = tr.diagnose(tr.simulate(ur10, true, rows=90, measures=kind, noise=5e-5, seed=3, **at))
+    (told,) = (said for said in found.warnings if said.startswith("the zero of"))
+    assert ("'wrist_3_joint'" in told) == (tool == "unknown")
+    assert "'shoulder_pan_joint'" in told
+    assert "'wrist_2_joint'" not in told
+    (offset,) = (effect for effect in found.effects if effect.name == "joint_offset")
+    last = [p for p in offset.parameters if p.name.endswith("wrist_3_joint")]
+    assert any(p.identified for p in last) == (tool == "known")
+
+
 @pytest.mark.parametrize("spacings", [{}, {"place 0": 1e-5}, {"place 0": 1e-3}, {"place 0": 1e-3, "place 2": 1e-3}])
 def test_the_scale_is_known_as_well_as_the_lengths(ur10, spacings):
     """Relative variance of a length: its own, and that of two sockets from 15 rows each; lengths add information."""
@@ -138,7 +154,7 @@ def test_without_a_length_it_is_said_and_a_wrong_one_of_large_noise_does_no_harm
         told, (base,) = " ".join(own.warnings), [f for f in own.effects if f.name == "base_frame"]
         assert ("scale of the robot is not observable" in told) != length
         assert "direction of the base are not observable" in told
-        assert "the zero of 'shoulder_pan_joint' is not observable" in told
+        assert "the zero of 'shoulder_pan_joint', 'wrist_3_joint' is not observable" in told
         assert base.status == "not_testable"  # and no effect that data could tell from others
     told = ([p for f in own.effects if f.name == "joint_offset" for p in f.parameters] for own in (alone, soft))
     for one, other in list(zip(*told, strict=True))[1:5]:

@@ -10,7 +10,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import listed
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
-from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.columns import frame_columns, hidden_joints
 from thermal_robot.inference.fit import Fit
 from thermal_robot.kinematics import point_jacobian
 
@@ -37,9 +37,7 @@ def unseen(fit: Fit) -> Iterator[str]:
             "nothing but the arm says where its root stands: place and direction of the base are not observable, and "
             "predictions are in the frame of the commands"
         )
-    zeros = np.linalg.norm(seen.joint_sensitivity[:, :3], axis=(0, 1))
-    alike = [fit.campaign.robot.joint_names[j] for j in hidden(seen.joint_sensitivity, zeros)]
-    if alike:
+    if alike := hidden_joints(seen):
         yield f"the zero of {listed(alike)} is not observable: what rows share, or the tool, takes it up"
     places = np.concatenate([seen.position, np.zeros_like(seen.position)], axis=1)[:, :, None]
     if hidden(seen.sight.sees(places), np.array([np.linalg.norm(seen.position)])):

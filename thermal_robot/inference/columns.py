@@ -16,6 +16,7 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.settings import SIZE_MOST
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.observables import components, of_model, tool_width
 from thermal_robot.observations import Observations, observe
 
@@ -112,6 +113,23 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     if not parts:
         return np.zeros((campaign.samples, measures, 0)), ()
     return np.concatenate(parts, axis=2), (*names, *artefacts)
+
+
+def hidden_joints(observations: Observations) -> tuple[str, ...]:
+    """Return the joints whose zeros are gauge freedoms: their columns lie in the span of those of frames and artefacts.
+
+    A turn of all sockets is such about the sockets, one of the target on the tool about the predicted target.
+    """
+    frames = frame_columns(observations)[0]
+    basis, found = orthonormal(equations_of(frames)), np.zeros(observations.robot.n, dtype=bool)
+    looks = [observations.joint_sensitivity]
+    if observations.campaign.position is None:
+        looks.append(observations.joint_sensitivity_there)
+    for own in looks:
+        flat = equations_of(own[:, : frames.shape[1]])
+        left = np.linalg.norm(without(flat, basis), axis=0)
+        found |= left <= settings.ALIAS * np.linalg.norm(flat, axis=0)
+    return tuple(np.array(observations.robot.joint_names)[found].tolist())
 
 
 def unknown_frames(campaign: Campaign) -> tuple[str, ...]:

@@ -19,8 +19,8 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import equations_of, orthonormal, whitener, without
-from thermal_robot.inference.columns import Block, block, frame_columns
+from thermal_robot.inference.algebra import whitener
+from thermal_robot.inference.columns import Block, block, frame_columns, hidden_joints
 from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, explain, log_odds
 from thermal_robot.inference.kernels import discrepancy_kernels
@@ -345,14 +345,7 @@ def _testable_blocks(
     Left out are constant effects in a joint that the frames absorb, or on a link outside the moving chain, and settings
     of several places of which one moves nothing. Those ``kept`` stay in any case.
     """
-    frames, names = frame_columns(observations)[0], observations.robot.joint_names
-    basis = orthonormal(equations_of(frames))
-    flat = equations_of(observations.joint_sensitivity[:, : frames.shape[1]])
-    left = np.linalg.norm(without(flat, basis), axis=0)
-    hidden = {
-        n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen
-    }
-    segments = observations.robot.segments
+    hidden, segments = {*hidden_joints(observations)}, observations.robot.segments
     # before the first joint a segment is the base, behind the last one the tool
     hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
     every = [setting for own in variants.values() for setting in own]

@@ -151,22 +151,23 @@ class Sight:
             whole[seen.rows, : found.shape[1]] = found
         return whole
 
-    def sees(self, twists: Array) -> Array:
-        """(N, 6, K) what rows see of twists (N, 6, K) of the target."""
-        found = self._sees(twists)
+    def sees(self, twists: Array, there: bool = False) -> Array:
+        """(N, 6, K) what rows see of twists (N, 6, K) of the target; ``there``, where it is predicted."""
+        found = self._sees(twists, there)
         if self.size is None:
             return found
         found = found.copy() if found is twists else found
         found[:, : self.measures] += (self.size.free * self._gap)[:, :, None] * self.size.grows(twists[:, :3])
         return found * self.size.relative[:, :, None]
 
-    def _sees(self, twists: Array) -> Array:
-        if len(self.parts) == 1:
-            own, seen = self.parts[0]
-            return own.sees(seen, self.artefacts, twists)
+    def _sees(self, twists: Array, there: bool) -> Array:
+        looks = [(own, seen, own.sees_there if there else own.sees) for own, seen in self.parts]
+        if len(looks) == 1:
+            _, seen, look = looks[0]
+            return look(seen, self.artefacts, twists)
         whole = np.zeros_like(twists)
-        for own, seen in self.parts:
-            found = own.sees(seen, self.artefacts, twists[seen.rows])
+        for own, seen, look in looks:
+            found = look(seen, self.artefacts, twists[seen.rows])
             whole[seen.rows] = found if own.turns else np.concatenate([found[:, :3], 0.0 * found[:, 3:]], axis=1)
         return whole
 

@@ -152,6 +152,10 @@ class Observable(ABC):
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
         """(n, 6, K) what rows see of twists (n, 6, K) of the target, root frame axes."""
 
+    def sees_there(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
+        """:meth:`sees` of the target where it is predicted, for a kind that looks where it should be."""
+        return self.sees(seen, artefacts, twists)
+
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
         """(n, 3, w) derivative of predicted − measured by the w parameters of one artefact, root frame axes."""
         raise NotImplementedError(f"{self.kind} has no artefact {name}")

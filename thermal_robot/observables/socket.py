@@ -5,7 +5,9 @@ and Automation* 11, 1995, on implicit loops). How far two of a stand are apart i
 (:mod:`~thermal_robot.observables.spacing`).
 
 The twist of the target is taken about the socket, not about the predicted point, which it should meet: what moves all
-sockets like a rigid body is then exactly an alias of the points, whatever is left of the rows.
+sockets like a rigid body is then exactly an alias of the points, whatever is left of the rows. What turns the target
+about the tool, as the last joint's zero does, is an alias of its place about the predicted point instead
+(:meth:`Socket.sees_there`); both are where a row leaves nothing.
 """
 
 from __future__ import annotations
@@ -96,6 +98,10 @@ class Socket(Observable):
         moved = twists.copy()
         moved[:, :3] += np.cross(twists[:, 3:], self.gap(seen, artefacts)[:, :, None], axis=1)
         return moved
+
+    def sees_there(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
+        """(n, 6, K) displacement at the predicted target: v."""
+        return twists
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
         """(n, 3, w) what the points of the stand do to predicted − socket."""

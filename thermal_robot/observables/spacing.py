@@ -55,6 +55,8 @@ class Spacing(Socket):
         """(n, 6, K) nothing: the robot is not there."""
         return np.zeros_like(twists)
 
+    sees_there = sees
+
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
         """(n, 3, w) what the points of the stand do to fitted − read."""
         along = self._lines(seen, artefacts)[1]
