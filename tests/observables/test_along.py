@@ -137,3 +137,21 @@ def test_a_series_of_distances_shows_the_zero_that_moved(ur10):
     (alarm,) = tr.wear(series, effects=["joint_offset"]).alarms
     assert (alarm.place, alarm.kind) == ("elbow_joint", "jump")
     assert alarm.change == pytest.approx(1e-3, abs=4.0 * alarm.change_std)
+
+
+@pytest.mark.parametrize(
+    ("kind", "what", "fewest"), [("distance", "anchor", 5), ("plane", "plane", 3), ("pixel", "camera", 6)]
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_an_artefact_with_few_rows_is_placed_or_named(ur10, kind, what, fewest, seed):
+    """With too few rows it could stand anywhere, and registration left millimetres, metres or nothing finite."""
+    made = tr.simulate(ur10, rows=60, noise=5e-5, measures=kind, tool=[0.0, 0.0, 0.1], tool_known=False, seed=seed)
+    label = made.labels[what]
+    last, before = np.flatnonzero(label == label[-1]), np.flatnonzero(label != label[-1])
+    for count in (1, fewest - 1, fewest, fewest + 1):
+        campaign = made.take(np.sort(np.append(before, last[:count])))
+        if count < fewest:
+            with pytest.raises(tr.EstimationError, match=f"{what} {label[-1]} has {count} row"):
+                tr.diagnose(campaign)
+        else:
+            assert np.abs(observe(campaign, register(campaign)).gap).max() < 2e-3

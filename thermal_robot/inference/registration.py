@@ -21,7 +21,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
-from thermal_robot.observables import instrument_rows, tool_width
+from thermal_robot.observables import instrument_rows, kinds_of, tool_width
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
 
@@ -222,8 +222,7 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
     """Register the rotation of the target on the tool, if measured, from the best of the 24 rotations of a cube."""
     if campaign.tool_known or tool_width(campaign) == 3:
         return frames
-    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.START_ROWS)).astype(np.int64)
-    some, found = campaign.take(rows), list[tuple[float, Frames]]()
+    some, found = campaign.take(_some(campaign)), list[tuple[float, Frames]]()
     for turn in CUBE:
         tool = frames.tool.copy()
         tool[:3, :3] = turn
@@ -234,6 +233,18 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
     tried = [refined_frames(some, begun, robust=True) for _, begun in nearest]
     best = min(tried, key=lambda one: _median_distance(some, one))
     return replace(best, artefacts={})
+
+
+def _some(campaign: Campaign) -> NDArray[np.int64]:
+    """Rows to start with, evenly from those of each kind and artefact, and of each enough to place it."""
+    groups = list[tuple[int, NDArray[np.int64]]]()
+    for own, rows in kinds_of(campaign):
+        rows = np.arange(campaign.samples) if rows is None else rows
+        number = campaign.numbered[own.label][1][rows] if own.label else np.zeros(len(rows))
+        groups += [(own.fewest, rows[number == k]) for k in np.unique(number)]
+    each = settings.START_ROWS // len(groups)
+    evenly = (rows[np.linspace(0, len(rows) - 1, min(len(rows), max(each, few))).astype(int)] for few, rows in groups)
+    return np.sort(np.concatenate([*evenly]))
 
 
 def _median_distance(campaign: Campaign, frames: Frames) -> float:

@@ -127,7 +127,7 @@ class Sight:
             names = own.shares(seen)
             given = {name: each for name, each in {**artefacts, **known}.items() if name in names}
             given = {name: each for name, each in given.items() if own.covers(seen, name, each)}
-            begun = {} if len(given) == len(names) else own.artefacts(seen, known)
+            begun = {} if len(given) == len(names) else own.artefacts(seen, {**known, **given})
             known |= {name: given.get(name, begun.get(name)) for name in names}
             shared[own.kind] = names
             free[slice(None) if seen.rows is None else seen.rows] = not own.has_length(seen)

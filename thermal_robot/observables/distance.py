@@ -42,6 +42,7 @@ class Distance(Along):
     kind: ClassVar[str] = "distance"
     says: ClassVar[str] = "distance to a point"
     label: ClassVar[str] = "anchor"
+    fewest: ClassVar[int] = 5  # unknowns of its linear start, one a row
 
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
         """Return the anchor by trilateration: |p|² − L² = 2 p·a − 2 z L − (|a|² − z²), linear but for the last term."""

@@ -8,7 +8,7 @@ twist is zero there, in the gap as in every column.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.errors import EstimationError
 
 Rows = NDArray[np.int64]
 
@@ -114,6 +115,8 @@ class Observable(ABC):
         Whether what is read is another model's word of the same joints: a difference is then the model's.
     label
         Column that says which rows share an artefact; empty where none do.
+    fewest
+        Rows that its linear start needs at least to place an artefact.
     """
 
     kind: ClassVar[str]
@@ -124,6 +127,7 @@ class Observable(ABC):
     locates: ClassVar[bool] = False
     of_model: ClassVar[bool] = False
     label: ClassVar[str] = ""
+    fewest: ClassVar[int] = 1
 
     def has_length(self, seen: Seen) -> bool:
         """Whether a gap of these rows is told in metres that something else than the robot defines."""
@@ -136,9 +140,26 @@ class Observable(ABC):
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
         """Return by name what the rows share, where the predicted poses put it; nothing by default.
 
-        ``known`` are artefacts that rows of other kinds have told.
+        ``known`` are those that need none: artefacts of before, and those that rows of other kinds have told.
         """
         return {}
+
+    def unplaced(self, seen: Seen, known: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Yield the artefacts that nothing has placed yet, by name, with the mask (n,) of their rows.
+
+        Raises :class:`EstimationError` where these are fewer than ``fewest``: they would place it anywhere.
+        """
+        names, number = seen.shared(self.label)
+        for k, name in enumerate(names):
+            here = number == k
+            if name not in known and here.sum() < self.fewest:
+                rows = f"{here.sum()} row{'s' if here.sum() > 1 else ''}"
+                raise EstimationError(
+                    f"{name} has {rows} of kind {self.kind}, and at least {self.fewest} say where it is: measure more "
+                    "there, or leave these out"
+                )
+            if name not in known:
+                yield name, here
 
     def covers(self, seen: Seen, name: str, artefact: Any) -> bool:
         """Whether an artefact of this name holds all that the rows have to do with; that of fewer rows may not."""
@@ -171,8 +192,7 @@ class Along(Observable):
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
         """Return what the rows share, where the predicted poses put it."""
-        names, number = seen.shared(self.label)
-        return {name: self.start(seen, number == k, name) for k, name in enumerate(names)}
+        return {name: self.start(seen, here, name) for name, here in self.unplaced(seen, known)}
 
     @abstractmethod
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:

@@ -60,6 +60,7 @@ class Pixel(Observable):
     kind: ClassVar[str] = "pixel"
     says: ClassVar[str] = "a point in an image"
     label: ClassVar[str] = "camera"
+    fewest: ClassVar[int] = 6  # a projective map has eleven unknowns, and a row says two
     places: ClassVar[int] = 2
     turned: ClassVar[bool] = True
 
@@ -76,10 +77,9 @@ class Pixel(Observable):
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
         """Return the cameras, or what they see, by linear resection."""
-        names, number = seen.shared("camera")
         found = dict[str, Artefact]()
-        for k, name in enumerate(names):
-            here, facts = number == k, self._facts(seen, name)
+        for name, here in self.unplaced(seen, known):
+            facts = self._facts(seen, name)
             lens = np.array([facts[key] for key in ("fx", "fy", "cx", "cy")], dtype=float)
             rays = _rays(seen.readings("u", "v")[here], lens)
             points, base = self._points(seen)[here], seen.base[:3, :3]

@@ -53,6 +53,7 @@ class OnPlane(Along):
     kind: ClassVar[str] = "plane"
     says: ClassVar[str] = "a tip on a plane"
     label: ClassVar[str] = "plane"
+    fewest: ClassVar[int] = 3
 
     def has_length(self, seen: Seen) -> bool:
         """Whether heights were read: the rest of it is no length."""
