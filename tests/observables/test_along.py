@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import jsonschema
 import numpy as np
 import pytest
 
 import thermal_robot as tr
+from thermal_robot import report
 from thermal_robot.effects import library
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
@@ -14,6 +16,7 @@ from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.registration import moved, register
 from thermal_robot.observables import seen_components
 from thermal_robot.observations import observe
+from thermal_robot.report import words
 
 ANCHORS = np.array([[1.5, 0.2, 0.1], [-0.3, 1.6, 0.2], [0.1, -0.2, 1.8], [-1.4, -0.6, 0.6]])
 ZERO = 0.12
@@ -155,3 +158,34 @@ def test_an_artefact_with_few_rows_is_placed_or_named(ur10, kind, what, fewest, 
                 tr.diagnose(campaign)
         else:
             assert np.abs(observe(campaign, register(campaign)).gap).max() < 2e-3
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_noise_floor_of_several_kinds_is_that_of_each(ur10, stated):
+    """A wire three times as noisy as the tracker beside it: what each kind leaves is its own noise, stated or not."""
+    sigmas = {"position": 2e-5, "plane": 2e-5, "distance": 6e-5}
+    campaign = read_as(measured(ur10, noise=2e-5, rows=240), tuple(sigmas))
+    kind, reading = campaign.labels["kind"], campaign.readings["distance"]
+    jitter = np.sqrt(6e-5**2 - 2e-5**2) * np.random.default_rng(0).normal(size=campaign.samples)
+    readings = {**campaign.readings, "distance": reading + (kind == "distance") * jitter}
+    noise = np.array([sigmas[own] for own in kind])
+    found = tr.diagnose(
+        replace(campaign, readings=readings, noise_of_rows=noise if stated else None, noise_position=None)
+    )
+    told = {own.kind: own for own in found.gap.kinds}
+    for own, expected in {"position": np.sqrt(3.0) * 2e-5, "plane": 2e-5, "distance": 6e-5}.items():
+        assert told[own].noise_floor == pytest.approx(expected, rel=1e-9 if stated else 0.3)
+        assert told[own].rms_after == pytest.approx(expected, rel=0.3)
+        assert told[own].unit == "m"
+    jsonschema.validate(found.to_dict(), report.schema())
+    assert sum(own.rows for own in told.values()) == found.samples - len(found.outliers)
+    assert [said.split()[0] for said in words.noise(found).split("; ")[:3]] == list(told)
+
+
+def test_a_camera_leaves_pixels(ur10):
+    """Noise of 50 µm across the line of sight, at its distance, told in pixels."""
+    campaign = tr.simulate(ur10, rows=120, measures="pixel", noise=5e-5, tool=[0.05, 0.0, 0.1], seed=2)
+    (own,) = tr.diagnose(campaign).gap.kinds
+    camera = next(iter(observe(campaign, register(campaign)).frames.artefacts.values()))
+    assert own.unit == "px"
+    assert own.noise_floor == pytest.approx(np.sqrt(2.0) * 5e-5 * 1000.0 / camera.far, rel=0.05)

@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 from report.cases import case
 
+import thermal_robot as tr
 from thermal_robot.report import schema
 
 
@@ -142,4 +143,8 @@ def test_a_real_diagnosis_is_valid_and_writes_all_that_is_declared(validator, dr
     remainder = keys(json.loads(json.dumps(case("unexplained").to_dict())))
     law = keys(json.loads(json.dumps(case("law").to_dict())))
     deployed = keys(json.loads(json.dumps(zeros.to_dict())))
-    assert declared(schema(), schema()) - keys(real) - by_hand - remainder - law - deployed == set()
+    film = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=60, measures="pixel", noise=5e-5, tool=[0.0, 0.0, 0.1])
+    filmed = json.loads(json.dumps(tr.diagnose(film).to_dict()))
+    validator.validate(filmed)
+    told = keys(real) | by_hand | remainder | law | deployed | keys(filmed)
+    assert declared(schema(), schema()) - told == set()

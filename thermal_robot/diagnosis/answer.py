@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from thermal_robot.diagnosis.next_measurement import wanted
 from thermal_robot.diagnosis.residual_tests import ResidualAnalysis
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.uncertainty import registered, uncertainty
-from thermal_robot.diagnosis.values import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
+from thermal_robot.diagnosis.values import Finding, Gap, KindGap, Misfit, Refused, Rows, Sensitivity, Unexplained
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
@@ -203,7 +203,7 @@ def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...]
 def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
     before, after = (seen.gap[~fit.explanation.outliers] for seen in (fit.nominal, fit.corrected))
     turned, schemes = before.shape[1] == 6, worst_folds(fit)
-    return Gap(
+    whole = Gap(
         rms_before=rms(before[:, :3]),
         rms_after=rms(after[:, :3]),
         noise_floor=float(np.sqrt(figures_of_a_row(fit.campaign)[0]) * left.floor),
@@ -215,6 +215,24 @@ def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
         hardest=hardest(schemes, shrinkage.overall),
         worse=harmed(schemes),
     )
+    return replace(whole, kinds=tuple(_by_kind(fit, left.floor, whole)))
+
+
+def _by_kind(fit: Fit, sigma: float, whole: Gap) -> Iterator[KindGap]:
+    """Yield the gaps of each kind of measurement in its unit; nothing where there is one alone, read in metres."""
+    campaign, looked = fit.campaign, fit.corrected.sight
+    if len(looked.parts) == 1 and looked.parts[0][0].unit == "m":
+        return
+    relative = np.ones(campaign.samples) if campaign.relative_noise is None else campaign.relative_noise[:, 0]
+    for own, seen in looked.parts:
+        used, scale = seen.own(~fit.explanation.outliers), own.per_metre(seen, looked.artefacts)[:, None]
+        if not used.any():
+            continue
+        before, after = (rms((scale * seen.own(o.gap[:, :3]))[used]) for o in (fit.nominal, fit.corrected))
+        floor = sigma * rms((np.sqrt(own.places) * scale * seen.own(relative)[:, None])[used])
+        if not whole.noise_known and whole.rms_after > 0.0:  # that of a kind is then told by its own remainder
+            floor = after * whole.noise_floor / whole.rms_after
+        yield KindGap(own.kind, own.unit, int(used.sum()), before, after, floor)
 
 
 def model_of(fit: Fit, floor: float | None) -> CorrectedModel:

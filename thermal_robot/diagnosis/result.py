@@ -394,7 +394,9 @@ class Diagnosis(RenderedPage):
 
 def _gap_as_json(gap: Gap) -> dict[str, Any]:
     turned = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+    kinds = {"kinds": [asdict(kind) for kind in gap.kinds]} if gap.kinds else {}
     return {
+        **kinds,
         "rms_before": gap.rms_before,
         "rms_after": gap.rms_after,
         "noise_floor": gap.noise_floor,

@@ -254,8 +254,27 @@ class FoldScheme:
 
 
 @dataclass(frozen=True)
+class KindGap:
+    """Rms gaps of the rows of one ``kind`` that are not outliers, in the ``unit`` in which it is read: m or px.
+
+    ``noise_floor`` is what noise alone would leave of these rows.
+    """
+
+    kind: str
+    unit: str
+    rows: int
+    rms_before: float
+    rms_after: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
 class Gap:
     """Rms distances, m, over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
+
+    ``kinds`` tell them apart by kind of measurement where there are several, or one that is not read in metres: the
+    other figures are then taken over all rows alike, in metres across what each sees.
+
 
     ``schemes`` are other ways of holding rows out, the hardest first; ``hardest`` is the first of them where it leaves
     clearly more than ``held_out`` does, ``worse`` that by session or region where the correction harms; else ``None``.
@@ -271,6 +290,7 @@ class Gap:
     schemes: tuple[FoldScheme, ...] = ()
     hardest: FoldScheme | None = None
     worse: FoldScheme | None = None
+    kinds: tuple[KindGap, ...] = ()
 
     @property
     def noise_known(self) -> bool:
@@ -338,7 +358,7 @@ class Wanted:
     of the column (of repeats: that labels them) or frame. It tells effects ``apart``; ``untested`` could then be
     tested, ``whether`` is the cause that a column would show or rule out. ``place`` and ``follows``, of a remainder
     that a column would tell of, where known. ``position`` and ``conditions`` of a pose: by name, rad or m, and further
-    columns, SI.
+    columns, SI; ``labels``: to what it goes, by column.
     """
 
     kind: Literal["column", "frame", "pose", "range", "repeats"]
@@ -350,6 +370,7 @@ class Wanted:
     follows: str = ""
     position: Mapping[str, float] = field(default_factory=dict)
     conditions: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

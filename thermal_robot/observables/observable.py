@@ -115,6 +115,8 @@ class Observable(ABC):
         Whether what is read is another model's word of the same joints: a difference is then the model's.
     label
         Column that says which rows share an artefact; empty where none do.
+    unit
+        In what it is read: gaps in metres times :meth:`per_metre`.
     fewest
         Rows that its linear start needs at least to place an artefact.
     """
@@ -127,11 +129,16 @@ class Observable(ABC):
     locates: ClassVar[bool] = False
     of_model: ClassVar[bool] = False
     label: ClassVar[str] = ""
+    unit: ClassVar[str] = "m"
     fewest: ClassVar[int] = 1
 
     def has_length(self, seen: Seen) -> bool:
         """Whether a gap of these rows is told in metres that something else than the robot defines."""
         return True
+
+    def per_metre(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
+        """(n,) units of a reading to a metre of the gap."""
+        return np.ones(len(seen.position))
 
     def shares(self, seen: Seen) -> tuple[str, ...]:
         """Return the names of what the rows share; nothing without a ``label``."""

@@ -60,6 +60,7 @@ class Pixel(Observable):
     kind: ClassVar[str] = "pixel"
     says: ClassVar[str] = "a point in an image"
     label: ClassVar[str] = "camera"
+    unit: ClassVar[str] = "px"
     fewest: ClassVar[int] = 6  # a projective map has eleven unknowns, and a row says two
     places: ClassVar[int] = 2
     turned: ClassVar[bool] = True
@@ -113,6 +114,11 @@ class Pixel(Observable):
         inside = np.einsum("nji,nj->ni", axes, np.where(hand[:, None], board, away))
         lens, far = (np.array(values)[number] for values in ([v.lens for v in views], [v.far for v in views]))
         return inside, axes, arm, np.where(hand, -1.0, 1.0), lens, far
+
+    def per_metre(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
+        """(n,) pixels to a metre across the line of sight: focal length over the distance that is held."""
+        *_, lens, far = self._looked(seen, artefacts)
+        return np.asarray(lens[:, 0] / far)
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
         """(n, 3) read − predicted across the line of sight, root frame axes, m."""

@@ -35,9 +35,10 @@ def numbers(diagnosis: Diagnosis) -> list[Number]:
     if gap.orientation_before is not None:
         pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
         turned = [f"orientation {value}" for value in pair]
+    kinds = [f"noise floor, {k.kind} {units.quantity(k.noise_floor, k.unit)}" for k in gap.kinds]
     return [
         ("before", "Gap before, rms", before, [turned[0]]),
-        ("after", "Gap after, rms", after, [turned[1], f"noise floor {floor}"]),
+        ("after", "Gap after, rms", after, [turned[1], *([f"noise floor {floor}"] if len(kinds) < 2 else []), *kinds]),
         _shrinkage("rows", gap.held_out, "m"),
     ]
 

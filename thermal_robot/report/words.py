@@ -13,7 +13,7 @@ from thermal_robot.report import units
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.diagnosis.values import AnotherModel, Finding, Misfit, Unexplained, Wanted
+    from thermal_robot.diagnosis.values import AnotherModel, Finding, Gap, Misfit, Unexplained, Wanted
     from thermal_robot.motion.result import MotionDiagnosis
 
 
@@ -58,7 +58,7 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.misfit is not None:
         yield from misfit_sentences(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
-        floor = length(diagnosis.gap.noise_floor)
+        floor = _floor(diagnosis.gap)
         if diagnosis.gap.noise_known:
             yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
         else:
@@ -231,8 +231,14 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     yield f"correcting leaves {leaves} on held-out data{more}{hard}"
 
 
+def _floor(gap: Gap) -> str:
+    """Gap that noise alone would leave, by kind of measurement where there are several."""
+    kinds = [f"{k.kind} {units.quantity(k.noise_floor, k.unit)}" for k in gap.kinds]
+    return ", ".join(kinds) if len(kinds) > 1 else length(gap.noise_floor)
+
+
 def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
-    gap, floor = diagnosis.gap, length(diagnosis.gap.noise_floor)
+    gap, floor = diagnosis.gap, _floor(diagnosis.gap)
     if not remaining.flagged:
         if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
             return f", which is noise ({floor})" if gap.noise_known else _UNKNOWN
@@ -438,8 +444,10 @@ def noise(diagnosis: Diagnosis, floor: str = "") -> str:
     """
     gap = diagnosis.gap
     floor = floor or units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2]
-    parts = [floor, _SOURCES.get(gap.noise_source, gap.noise_source)]
-    if gap.noise_floor > 0.0:
+    own = (units.together((k.noise_floor, k.rms_after), k.unit) for k in gap.kinds)
+    kinds = [f"{k.kind} {least}, {left} left" for k, (least, left) in zip(gap.kinds, own, strict=True)]
+    parts = [*([floor] if len(kinds) < 2 else []), *kinds, _SOURCES.get(gap.noise_source, gap.noise_source)]
+    if gap.noise_floor > 0.0 and len(kinds) < 2:
         parts.append(f"the gap after correction is {gap.rms_after / gap.noise_floor:.2f} times that")
     return "; ".join(filter(None, parts))
 
@@ -665,4 +673,5 @@ def _pose(diagnosis: Diagnosis, wanted: Wanted) -> str:
         for name, value in zip(names, units.together([wanted.position[n] for n in names], unit), strict=True)
     }
     said |= {name: units.quantity(value, known.get(name, "")) for name, value in wanted.conditions.items()}
-    return ", ".join(f"{name} {value}" for name, value in said.items()).replace("-", "−")
+    told = [f"{name} {value}".replace("-", "−") for name, value in said.items()]
+    return ", ".join([*(f"{name} {value}" for name, value in wanted.labels.items()), *told])
