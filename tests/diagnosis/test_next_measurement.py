@@ -8,6 +8,7 @@ import pytest
 from conftest import ARMS
 from simulate import commands, random_motion, simulate
 
+import thermal_robot as tr
 from thermal_robot import diagnose
 from thermal_robot.campaign import Campaign, Units
 from thermal_robot.diagnosis import settings
@@ -16,6 +17,7 @@ from thermal_robot.diagnosis.values import Dependence, Finding, Location, Unexpl
 from thermal_robot.effects import choose, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference.fit import fit
+from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import Frames, observe
 
 NOISE = 25e-6
@@ -450,3 +452,36 @@ def test_a_load_is_asked_for_where_it_tells_what_yields(rv_m2):
     assert sum((w.kind, w.name) == ("column", "payload") for w in asked) >= len(asked) / 3
     assert {w.kind for w in asked} <= {"column", "range", "pose"}
     assert all(w.apart and set(w.apart) <= set(group) for w in asked)
+
+
+@pytest.mark.parametrize("kind", ["socket", "plane"])
+def test_a_ball_is_led_to_what_is_there(kind):
+    """The robot as it really is, at the proposed joints, has its ball in the socket, or on the plane, that is named."""
+    robot = tr.load_robot("example-robot-data:ur10", "tool0")
+    true, ball = np.array([0.0, 3e-3, -2e-3, 2e-3, 1e-3, 0.0]), np.array([0.05, 0.02, 0.1])
+    effects = {"joint_offset": dict(zip(robot.joint_names, true, strict=True))}
+    campaign = tr.simulate(robot, effects, rows=60, measures=kind, noise=2e-5, tool=ball, tool_known=True, seed=3)
+    found = tr.diagnose(campaign)
+    samples = found.next_samples(6)
+    assert len(samples.samples) == 6
+    poses = tool_poses(robot, samples.commands.q + true)
+    places = poses[:, :3, 3] + poses[:, :3, :3] @ ball
+    for sample, place in zip(samples.samples, places, strict=True):
+        artefacts = found.model.frames.artefacts
+        if kind == "plane":
+            own = artefacts[f"plane {sample.labels['plane']}"]
+            away = own.normal @ place - own.offset
+        else:
+            own = artefacts[f"stand {sample.labels['stand']}"]
+            away = place - own.points[own.sockets.index(sample.labels["socket"])]
+        assert np.abs(away).max() < 3e-4
+    (first, *_) = samples.to_list()
+    assert set(first["labels"]) == ({"plane"} if kind == "plane" else {"stand", "socket"})
+    assert set(first["labels"]) < set(samples.to_table().columns)
+
+
+def test_a_sample_that_goes_nowhere_has_no_label():
+    campaign = tr.simulate(
+        "builtin:rv_m2", {"joint_offset": {"joint_2": 2e-3}}, tool_frame="tool0", rows=40, noise=2e-5
+    )
+    assert all("labels" not in told for told in tr.diagnose(campaign).next_samples(2).to_list())

@@ -9,14 +9,14 @@ factor of i against j of
 (Box and Hill, *Technometrics* 9, 1967; Hill, Hunter and Wichern, *Technometrics* 10, 1968). What is maximised is that
 of the true explanation against its nearest rival, Σ_i p_i min_j KL(i, j), with p the posterior probabilities. Samples
 are chosen greedily, one after the other. Where one explanation is settled, or no sample could tell it from another,
-they are D-optimal for its parameters, with the frames unknown. Collisions and the line of sight of the instrument are
-not checked.
+they are D-optimal for its parameters, with the frames unknown. Where the robot is led to sockets or planes, samples are
+postures in which it reaches those that are there. Collisions and the line of sight of the instrument are not checked.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.names import APART, CLOCK, KIND, KINDS, TOUCHED
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.values import Finding, Unexplained, Wanted, is_frame
@@ -39,6 +39,7 @@ from thermal_robot.inference.problem import Linear, products
 from thermal_robot.inference.settings import FEW_LEVELS, IN_ITS_PLACE
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import joint_range
+from thermal_robot.simulation.brought import closed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +94,8 @@ class NextSample:
     """Proposed sample of the optimal design.
 
     ``position``: joint positions by name, rad or m. ``conditions`` that the explanations depend on, by column, SI;
-    ``time`` is a proposal, any later one will do. ``separates``: the explanations that it tells apart best, each a
+    ``time`` is a proposal, any later one will do. ``labels`` say to what the sample goes, such as a stand and a socket,
+    by column. ``separates``: the explanations that it tells apart best, each a
     tuple of effects (empty: noise alone); a single one if that is settled and the sample improves its parameters.
     ``gain`` of this sample and those before it, nats: the expected log Bayes factor of the true explanation against its
     nearest rival, or the information about the parameters of a single one.
@@ -103,6 +105,7 @@ class NextSample:
     conditions: dict[str, float]
     separates: tuple[Effects, ...]
     gain: float
+    labels: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +126,7 @@ class NextSamples:
                 "conditions": dict(sample.conditions),
                 "separates": [list(effects) for effects in sample.separates],
                 "gain": sample.gain,
+                **({"labels": dict(sample.labels)} if sample.labels else {}),
             }
             for sample in self.samples
         ]
@@ -139,6 +143,7 @@ class NextSamples:
             for name, value in sample.conditions.items():
                 column, _, joint = name.partition(".")
                 row[name] = value / scale[joint] if column in ("velocity", "acceleration") else value
+            row |= sample.labels
             row["separates"] = " | ".join(" + ".join(effects) or "nothing" for effects in sample.separates)
             rows.append({**row, "gain": sample.gain})
         return pd.DataFrame(rows)
@@ -153,6 +158,8 @@ def next_samples(fit: Fit, count: int = 10, seed: int = 0, loads: Sequence[float
         expected = "a whole number above 0"
         raise CampaignError("next_samples()", "cannot propose so many", found=repr(count), expected=expected)
     offered = candidates(fit, seed, loads)
+    if not offered.samples:
+        return NextSamples((), offered)
     leading, probability = _leading(fit)
     models = _predictive(fit, observe(offered, fit.corrected.frames), leading)
     count = min(int(count), offered.samples)
@@ -169,6 +176,7 @@ def next_samples(fit: Fit, count: int = 10, seed: int = 0, loads: Sequence[float
             {name: float(offered.covariates[name][row]) for name in read},
             tuple(names[k] for k in pair),
             gain,
+            _labels(offered, row),
         )
         for row, pair, gain in zip(chosen, pairs, gains, strict=True)
     )
@@ -182,12 +190,14 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
     range of the campaign is always included. Temperatures are the campaign's lowest and highest, and 5 K beyond them,
     alike for all links. Payloads are those of the campaign, or none and ``loads``, kg, where these are given. Joints
     are approached from either side. Times follow the campaign, for as long as it lasted. Other columns are copied from
-    a random row; torques and encoder readings from the row with the nearest pose.
+    a random row; torques and encoder readings from the row with the nearest pose. Where rows touch something, the robot
+    as fitted is led from these joint positions to what the random row touched; what it does not reach is left out.
     """
     from scipy.spatial import cKDTree
 
     campaign, rng = fit.campaign, np.random.default_rng(seed)
-    rows = rng.integers(campaign.samples, size=pool)
+    there = np.flatnonzero(~np.isin(_kind_of_rows(campaign), APART))
+    rows = there[rng.integers(len(there), size=pool)]
     low, high = _range(campaign)
     q = rng.uniform(low, high, (pool, campaign.robot.n))
     alike = cKDTree(campaign.q / (high - low + 1e-9)).query(q / (high - low + 1e-9))[1]
@@ -211,7 +221,7 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
     if loads:
         covariates["payload"] = rng.choice([0.0, *loads], pool)
     # orientation only says what is measured; the simulator knows nothing of new poses, and columns do not ask it
-    return replace(
+    offered = replace(
         campaign.take(rows),
         q=q,
         position=None,
@@ -222,6 +232,30 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
         missing={},
         rows=np.arange(2, pool + 2),
     )
+    return _led(fit, offered)
+
+
+def _kind_of_rows(campaign: Campaign) -> NDArray[np.str_]:
+    """(N,) kind of measurement of each row."""
+    return np.asarray(campaign.labels.get(KIND, np.full(campaign.samples, campaign.measures)))
+
+
+def _led(fit: Fit, offered: Campaign) -> Campaign:
+    """Candidates with the joint positions (N, n) in which the robot as fitted touches what they name."""
+    touched = np.flatnonzero(np.isin(_kind_of_rows(offered), TOUCHED))
+    if not len(touched):
+        return offered
+    led, reached = closed(offered.take(touched), fit.corrected.frames, fit.effects)
+    q, kept = offered.q.copy(), np.ones(offered.samples, dtype=bool)
+    q[touched], kept[touched] = led.q, reached
+    found = replace(offered, q=q).take(np.flatnonzero(kept))
+    return replace(found, rows=np.arange(2, found.samples + 2))
+
+
+def _labels(offered: Campaign, row: int) -> dict[str, str]:
+    """Return what a candidate has to do with beside the robot, by column."""
+    own = KINDS.get(str(_kind_of_rows(offered)[row]), ((), ()))[1]
+    return {name: str(offered.labels[name][row]) for name in own}
 
 
 def _range(campaign: Campaign) -> tuple[Array, Array]:
@@ -404,7 +438,7 @@ def _pose(fit: Fit, group: Effects) -> Wanted | None:
     sample = plain.samples[0]
     # when it is measured, and from where the joints come, matters less than where they are
     set_up = {name: v for name, v in sample.conditions.items() if name.partition(".")[0] not in (*CLOCK, *_OF_JOINTS)}
-    return Wanted("pose", apart=apart, position=sample.position, conditions=set_up)
+    return Wanted("pose", apart=apart, position=sample.position, conditions=set_up, labels=sample.labels)
 
 
 def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:

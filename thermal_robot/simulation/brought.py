@@ -28,13 +28,13 @@ SWAY, BETWEEN, NEARBY, LED = 1.0, 0.05, 0.1, 2.0
 much, rad or m, each joint turns towards it; rad at most to which a joint is led."""
 
 
-def brought(
+def closed(
     plan: Campaign,
     frames: Frames,
     effects: Sequence[tuple[Effect, Array]] = (),
     away: Array | None = None,
     near: Array | None = None,
-) -> Campaign:
+) -> tuple[Campaign, NDArray[np.bool_]]:
     """Inverse kinematics by Newton's method within the limits: commands with which each row reads what it says.
 
     Parameters
@@ -50,27 +50,35 @@ def brought(
     near
         (N, n) postures that are nearer to it, from which rows begin that are not reached otherwise.
 
-    Raises
-    ------
-    CampaignError
-        Rows that the robot cannot bring there.
+    Returns
+    -------
+    tuple
+        The commands, and (N,) the rows in which the robot reaches what they say.
     """
     begun, starts = plan.q, STARTS if near is not None else 1
     for number in range(ROUNDS * starts):
         seen = corrected_observations(plan, frames, effects)
         left = seen.gap / (seen.sight.size.relative if seen.sight.size else 1.0)
         left = np.nan_to_num(left if away is None else left - away, nan=1.0)
-        if np.abs(left).max() < CLOSED:
-            return plan
+        reached = np.abs(left).max(axis=1) < CLOSED
+        if reached.all() or number == ROUNDS * starts - 1:
+            break
         slopes = seen.joint_sensitivity[:, : left.shape[1]]
         step = np.linalg.pinv(slopes, rcond=LEAST) @ left[:, :, None]
         low, high = plan.robot.lower, plan.robot.upper
         plan = replace(plan, q=np.clip(plan.q + np.clip(step[:, :, 0], -SWAY, SWAY), low, high))
         if near is not None and number % ROUNDS == ROUNDS - 1:  # what is not reached is begun nearer
             begun = 0.5 * (begun + near)
-            lost = np.abs(left).max(axis=1) >= CLOSED
-            plan = replace(plan, q=np.where(lost[:, None], begun, plan.q))
-    raise CampaignError(plan.name, "the robot does not reach what it is to touch", expected="another place or seed")
+            plan = replace(plan, q=np.where(reached[:, None], plan.q, begun))
+    return plan, reached
+
+
+def brought(plan: Campaign, *given: Any) -> Campaign:
+    """Return :func:`closed` rows; :class:`CampaignError` where the robot does not reach what one of them says."""
+    found, reached = closed(plan, *given)
+    if not reached.all():
+        raise CampaignError(plan.name, "the robot does not reach what it is to touch", expected="another place or seed")
+    return found
 
 
 STANDS, SOCKETS, PLANES, ANCHORS, CAMERAS = 3, 2, 3, 4, 2
