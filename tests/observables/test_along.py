@@ -189,3 +189,28 @@ def test_a_camera_leaves_pixels(ur10):
     camera = next(iter(observe(campaign, register(campaign)).frames.artefacts.values()))
     assert own.unit == "px"
     assert own.noise_floor == pytest.approx(np.sqrt(2.0) * 5e-5 * 1000.0 / camera.far, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", [3, 10, 14, 19])
+def test_gross_errors_do_not_carry_an_anchor_off(ur10, seed):
+    """Three of 20 rows of a wire are 20 mm wrong: its linear start is off, and the other rows bring it back."""
+    campaign = tr.simulate(
+        ur10, rows=80, noise=5e-5, measures="distance", tool=(0.05, 0.02, 0.1), tool_known=False, seed=seed
+    )
+    own = np.flatnonzero(campaign.labels["anchor"] == "0")
+    lengths, wrong = campaign.readings["distance"].copy(), own[[2, 9, 15]]
+    lengths[wrong] += 0.02
+    campaign = replace(campaign, readings={"distance": lengths})
+    left = np.abs(observe(campaign, register(campaign)).gap).max(axis=1)
+    assert np.median(left[np.setdiff1d(own, wrong)]) < 2e-4
+    assert left[wrong].min() > 0.01
+
+
+def test_rows_set_aside_leave_an_anchor_where_it_is(ur10):
+    """With one row kept of a wire nothing says where it leaves its box: it stays where all rows put it."""
+    campaign = tr.simulate(ur10, rows=80, noise=5e-5, measures="distance", tool=(0.05, 0.02, 0.1), seed=1)
+    keep = np.ones(80, dtype=bool)
+    keep[np.flatnonzero(campaign.labels["anchor"] == "0")[1:]] = False
+    before, after = register(campaign), register(campaign, keep)
+    assert np.abs(after.artefacts["anchor 0"].place - before.artefacts["anchor 0"].place).max() < 1e-3
+    assert np.abs(observe(campaign.take(np.flatnonzero(keep)), after).gap).max() < 1e-3

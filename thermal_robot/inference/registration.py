@@ -6,6 +6,7 @@ Starts run side by side, each until its own median distance converges, independe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations, product
 from typing import NamedTuple, Protocol
@@ -184,6 +185,8 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
     if frames_known(campaign):
         return Frames.declared(campaign)
     used = campaign if keep is None or keep.all() else campaign.take(np.flatnonzero(keep))
+    if used is not campaign and campaign.position is None:  # rows that are kept may not say where each artefact is
+        return refined_frames(used, register(campaign), robust=False)
     return refined_frames(used, found_frames(used), robust=keep is None)
 
 
@@ -237,14 +240,28 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
 
 def _some(campaign: Campaign) -> NDArray[np.int64]:
     """Rows to start with, evenly from those of each kind and artefact, and of each enough to place it."""
-    groups = list[tuple[int, NDArray[np.int64]]]()
-    for own, rows in kinds_of(campaign):
-        rows = np.arange(campaign.samples) if rows is None else rows
-        number = campaign.numbered[own.label][1][rows] if own.label else np.zeros(len(rows))
-        groups += [(own.fewest, rows[number == k]) for k in np.unique(number)]
+    groups = _alike(campaign)
     each = settings.START_ROWS // len(groups)
     evenly = (rows[np.linspace(0, len(rows) - 1, min(len(rows), max(each, few))).astype(int)] for few, rows in groups)
     return np.sort(np.concatenate([*evenly]))
+
+
+def _alike(campaign: Campaign) -> list[tuple[int, NDArray[np.int64]]]:
+    """Rows of each kind and artefact, and how many of them place it at least."""
+    found = list[tuple[int, NDArray[np.int64]]]()
+    for own, rows in kinds_of(campaign):
+        rows = np.arange(campaign.samples) if rows is None else rows
+        number = campaign.numbered[own.label][1][rows] if own.label else np.zeros(len(rows))
+        found += [(own.fewest, rows[number == k]) for k in np.unique(number)]
+    return found
+
+
+def _robust_weights(distance: Array, groups: Sequence[NDArray[np.int64]]) -> Array:
+    """Cauchy weights (N,) at the median of each group: rows of an artefact that starts astray bring it back."""
+    weights = np.empty_like(distance)
+    for rows in groups:
+        weights[rows] = cauchy_weights(distance[rows])
+    return weights
 
 
 def _median_distance(campaign: Campaign, frames: Frames) -> float:
@@ -270,13 +287,14 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
     Rows have Cauchy weights where ``robust``, equal weights otherwise.
     """
     relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
+    groups = [rows for _, rows in _alike(campaign)]
     for _ in range(settings.START_ROUNDS):
         observations = observe(campaign, frames)
         (columns, names), gap = frame_columns(observations), observations.gap
         root_weight = np.zeros_like(gap)
         for part in (slice(0, 3), slice(3, 6))[: gap.shape[1] // 3]:
             distance = np.linalg.norm(gap[:, part], axis=1)
-            weight = np.sqrt(cauchy_weights(distance)) if robust else np.ones(len(distance))
+            weight = np.sqrt(_robust_weights(distance, groups)) if robust else np.ones(len(distance))
             root_weight[:, part] = weight[:, None] / (middle(distance) + settings.UNSEEN)
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])
