@@ -23,9 +23,10 @@ _TOOL = """<link name="tool"/><joint name="to_tool" type="fixed"><parent link="{
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A serial arm that points up at zero, and its servos, SI.
+    """Serial arm that points straight up at zero joint angles, with its servos, SI.
 
-    ``urdf`` its text; ``servos`` by joint; ``rated`` kg that the weakest joint holds beside the arm, stretched out.
+    ``urdf`` its text; ``servos`` by joint; ``rated`` the largest payload at the tool, kg, that the torque limits of all
+    joints hold with the arm stretched out level.
     """
 
     urdf: str
@@ -34,12 +35,12 @@ class Arm:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names in the order of the chain."""
+        """Names of the joints in the order of the chain."""
         return tuple(self.servos)
 
 
 def draw_arm(rng: np.random.Generator, joints: int) -> Arm:
-    """Draw a serial chain of cylinders: lengths, masses and axes; stiffness and limit follow gravity's torque."""
+    """Draw a serial arm of cylindrical links; stiffness and torque limits are proportional to gravity's torques."""
     length, radius = rng.uniform(*sizes.LENGTH, joints), rng.uniform(*sizes.RADIUS, joints)
     mass = np.sort(_geometric(rng, sizes.MASS, joints))[::-1]
     beside = radius[:, None] * rng.uniform(-1.0, 1.0, (joints, 2))
@@ -68,13 +69,13 @@ def draw_arm(rng: np.random.Generator, joints: int) -> Arm:
 
 
 def _geometric(rng: np.random.Generator, between: tuple[float, float], count: int) -> Array:
-    """Log-uniform random numbers (count,)."""
+    """Draw log-uniform random numbers (count,) between two bounds."""
     low, high = np.log(between)
     return np.asarray(np.exp(rng.uniform(float(low), float(high), count)))
 
 
 def _axes(rng: np.random.Generator, joints: int) -> list[str]:
-    """Axes of the joints, ``100``, ``010`` or ``001``, no two twists in succession, at least one across gravity."""
+    """Draw joint axes as text, ``100``, ``010`` or ``001``: never z (along the links) twice in a row, nor z for all."""
     found: list[str] = []
     for _ in range(joints):
         allowed = ("100", "010") if found and found[-1] == "001" else ("100", "010", "001")
@@ -85,7 +86,7 @@ def _axes(rng: np.random.Generator, joints: int) -> list[str]:
 
 
 def _stretched(length: Array, mass: Array) -> tuple[Array, Array]:
-    """Gravity's torque on each joint of an arm stretched out level, N·m, and the tool's distance from it, m."""
+    """Gravity's torque (J,) on each joint of an arm stretched out level, N·m, and its distance to the tool (J,), m."""
     starts = np.concatenate([[0.0], np.cumsum(length)])
     middles = starts[:-1] + length / 2
     levers = np.clip(middles - starts[:-1, None], 0.0, None)

@@ -36,7 +36,7 @@ _WHOLE = ("delay", "payload", "table")
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """Motion of the fault-free arm: position and torque (n, J), height of the tool (n,)."""
+    """Simulated motion of an arm: joint positions and torques (n, J), rad and N·m, and heights of the tool (n,), m."""
 
     position: Array
     torque: Array
@@ -45,9 +45,9 @@ class Sound:
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """A fault with its size, SI, and the number of its joint; -1 where it is the whole arm's.
+    """Fault with its size (SI) and the index of its joint; -1 for a fault of the whole arm.
 
-    ``turn`` rad is a phase, or a direction where positive.
+    ``turn`` is the number of cycles a turn of a ripple, the phase (rad) of uneven friction, the sign of an end stop.
     """
 
     name: str
@@ -56,7 +56,10 @@ class Fault:
     turn: float = 0.0
 
     def built(self, spec: Any, arm: Arm) -> None:
-        """Change a ``mujoco.MjSpec`` whose actuators are the arm's servos, in the order of its joints."""
+        """Put a fault of friction, inertia, gain, limit, payload or table into ``spec``; other faults change nothing.
+
+        ``spec`` is a ``mujoco.MjSpec`` whose actuators are the arm's servos, in the order of its joints.
+        """
         joint, servo = spec.joint(arm.joints[self.joint]), spec.actuators[self.joint]
         match self.name:
             case "coulomb" | "uneven friction":
@@ -80,7 +83,10 @@ class Fault:
                 _add_table(spec, self.size)
 
     def commanded(self, command: Array, position: Array) -> Array:
-        """Command (J,) as the servos receive it, their joints being at a position."""
+        """Return the command (J,) that the servos receive: changed by a zero offset, a gain error or a dead zone.
+
+        The dead zone acts on the difference between the command and ``position``, the joints' positions (J,), rad.
+        """
         own, j = command.copy(), self.joint
         match self.name:
             case "zero":
@@ -93,7 +99,7 @@ class Fault:
         return own
 
     def acts(self, model: Any, position: Array, torque: Array) -> None:
-        """Add the torques of a step to ``torque`` (J,), or change friction, at a position (J,)."""
+        """Write a ripple's or spring's torque at a position (J,) into ``torque`` (J,), or set friction in ``model``."""
         j = self.joint
         match self.name:
             case "ripple":
@@ -106,12 +112,12 @@ class Fault:
 
     @property
     def delay(self) -> float:
-        """Dead time of the command, s."""
+        """Dead time of the command, s; 0 unless the fault is a delay."""
         return self.size if self.name == "delay" else 0.0
 
 
 def _add_table(spec: Any, height: float) -> None:
-    """Add a plane, m above the base, and a tip of the tool that touches it."""
+    """Add a table plane and a tool-tip sphere, in contact where the sphere's centre is at ``height`` (m)."""
     import mujoco
 
     own = {"condim": 3, "friction": [sizes.FRICTION, 0.0, 0.0]}
@@ -121,7 +127,10 @@ def _add_table(spec: Any, height: float) -> None:
 
 
 def draw_fault(rng: np.random.Generator, name: str, arm: Arm, sound: Sound, larger: float = 1.0) -> Fault:
-    """Draw a fault of a name: its joint, and its size by a lognormal law, or from what the sound arm did."""
+    """Draw a fault's joint, and its size: lognormal about the usual size times ``larger``, or from the sound motion.
+
+    Table, torque limit and end stop are placed at a quantile of the sound arm's heights, torques and positions.
+    """
     first = 1 if name == "spring" else 0
     j = -1 if name in (*_WHOLE, NOTHING) else int(rng.integers(first, len(arm.joints)))
     factor = larger * float(np.exp(sizes.SPREAD * rng.normal()))

@@ -9,7 +9,7 @@ LENGTH = (0.08, 0.3)
 MASS = (0.1, 1.0)
 """Mass of a link, kg, with its motor."""
 RADIUS = (0.03, 0.08)
-"""Radius of a link, m, which is a cylinder; its centre of mass lies beside its axis by up to that."""
+"""Radius of a link, m, which is a cylinder; its centre of mass lies beside its axis by up to that in x and in y."""
 DROOP = (0.01, 0.06)
 """Deflection of a servo by gravity, rad, when the arm is stretched: cobots and hobby servos."""
 LAG = (0.02, 0.08)

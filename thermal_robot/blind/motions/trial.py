@@ -34,11 +34,12 @@ class Case:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of one case.
+    """True fault and diagnosis of one case.
 
-    ``size`` and ``joint`` of the fault; ``verdict`` effects by share; ``groups`` what each is confounded with;
-    ``places`` the joints of each; ``shares``; ``flagged`` whether something stays unexplained; rms before, after and
-    held out, encoder counts; ``seconds``; ``failure`` what was raised.
+    ``size`` (SI) and ``joint`` of the fault; ``verdict`` the effects named, largest share first; ``groups`` what each
+    is confounded with; ``places`` the joints of each; ``shares`` of the gap; ``flagged`` whether something stays
+    unexplained; ``rms`` of the gap before, after and held out, encoder counts; ``seconds`` of the diagnosis;
+    ``failure`` why there was none.
     """
 
     case: Case
@@ -55,36 +56,36 @@ class Answer:
 
     @property
     def reported(self) -> tuple[tuple[str, ...], ...]:
-        """Effects of the verdict, each with its group, without those of every servo."""
+        """Effects of the verdict, each with those confounded with it; without lag and droop if servos are unstated."""
         usual = frozenset() if self.case.stated else ALWAYS
         pairs = zip(self.verdict, self.groups, strict=True)
         return tuple((name, *group) for name, group in pairs if name not in usual)
 
     @property
     def named(self) -> bool:
-        """Whether the right effect, or its group, is reported; without a fault, whether nothing is."""
+        """Whether a right effect, or one confounded with it, is reported; where no effect is right, whether none is."""
         right = FAULTS.get(self.case.fault, ())
         return any(set(right) & set(names) for names in self.reported) if right else not self.reported
 
     @property
     def first(self) -> bool:
-        """Whether the right effect is the first by share."""
+        """Whether a right effect, or one confounded with it, has the largest share of those reported."""
         return bool(self.reported) and bool(set(FAULTS.get(self.case.fault, ())) & set(self.reported[0]))
 
     @property
     def alone(self) -> bool:
-        """Whether the right effect alone is reported."""
+        """Whether the answer is right (:attr:`named`), and no other effect is reported."""
         return self.named and len(self.reported) <= 1
 
     @property
     def placed(self) -> bool:
-        """Whether the right effect is reported in the right joint; true for a fault of the whole arm."""
+        """Whether a right effect is in the verdict, located in the fault's joint; true for a fault without a joint."""
         own = zip(self.verdict, self.places, strict=True)
         return not self.joint or any(n in FAULTS.get(self.case.fault, ()) and self.joint in p for n, p in own)
 
 
 def ask(case: Case) -> Answer:
-    """Run one case: draw its world, diagnose its log and return the answer."""
+    """Run one case: simulate its log, diagnose it and return the answer; no diagnosis if no drawn fault is visible."""
     rng = np.random.default_rng([case.seed, EVERYTHING.index(case.fault), case.joints])
     world = draw_world(rng, case.joints, case.motions)
     try:
@@ -112,7 +113,7 @@ def ask(case: Case) -> Answer:
 def plan(
     seed: int, count: int, faults: Iterable[str] = EVERYTHING, *, joints: int = 0, stated: bool = True
 ) -> list[Case]:
-    """Return so many cases of each fault; arms of two to seven joints in turn, unless a number is given."""
+    """Return ``count`` cases of each fault, seeded from ``seed`` on; ``joints`` 0 takes two to seven joints in turn."""
     low, high = sizes.JOINTS
     return [
         Case(fault, seed + number, joints or low + (seed + number) % (high - low + 1), stated=stated)
@@ -132,7 +133,7 @@ def run(cases: Sequence[Case], workers: int = 1, progress: Callable[[Answer], No
 
 
 def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
-    """Score by fault: how many were asked, and shares named, first, alone, in the right joint and flagged."""
+    """Score by fault: number of diagnosed cases, and shares named, first, alone, in the right joint and flagged."""
     rows = []
     for fault in EVERYTHING:
         own = [one for one in answers if one.case.fault == fault and not one.failure]
@@ -143,7 +144,7 @@ def table(answers: Sequence[Answer]) -> list[dict[str, object]]:
 
 
 def text(answers: Sequence[Answer]) -> str:
-    """Format the result of the trial: a table of faults, and the wrong answers."""
+    """Format the score of the trial: a table by fault, summary shares, and the wrong or failed answers one by one."""
     lines = [f"{'fault':16} asked  named  first  alone  place  unexplained"]
     for row in table(answers):
         shares = "".join(f"{100 * float(str(row[mark])):6.0f}%" for mark in MARKS)

@@ -19,15 +19,16 @@ from thermal_robot.robot import load_robot
 
 
 class Unseen(Exception):
-    """Error: a fault moves no encoder of the arm that was drawn for it."""
+    """Error: no size drawn for a fault moves the encoders of its arm visibly."""
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """An arm, the commands (M, n, J) that it gets, rad, and how it is simulated and read.
+    """Arm, commands (M, n, J), rad, of M motions, and settings of their simulation and of the encoders.
 
-    ``kinds`` (M,) of the motions; ``rate`` Hz; ``step`` s; ``explicit`` whether by Runge-Kutta; ``count`` rad of the
-    encoders; ``sticks`` whether friction holds a joint at rest, or lets it creep, as MuJoCo's usual one does.
+    ``kinds`` (M,) of the motions; sampling ``rate``, Hz; time ``step``, s; ``explicit`` Runge-Kutta integration, else
+    implicit; ``count``, the encoders' resolution, rad; ``sticks`` whether dry friction holds a joint at rest, instead
+    of letting it creep, as MuJoCo's usual friction does.
     """
 
     arm: Arm
@@ -40,7 +41,7 @@ class World:
     sticks: bool = False
 
     def spec(self, fault: Fault) -> Any:
-        """Return the ``mujoco.MjSpec`` of the arm with a fault."""
+        """Build the ``mujoco.MjSpec`` of the arm with its position servos and a fault."""
         mujoco = mujoco_or_error()
         spec = mujoco.MjSpec.from_string(self.arm.urdf)
         spec.compiler.fusestatic, spec.compiler.boundmass, spec.compiler.boundinertia = False, 1e-9, 1e-12
@@ -64,7 +65,7 @@ class World:
         return str(spec.to_xml())
 
     def simulated(self, fault: Fault) -> Sound:
-        """Simulate all motions, each from rest: (M n, J) positions and torques, and heights of the tool."""
+        """Simulate all motions with a fault, each from rest: positions and torques (M n, J), heights of the tool."""
         mujoco, model = mujoco_or_error(), self.spec(fault).compile()
         held = round(1.0 / (self.rate * self.step))
         before = round(sizes.SETTLE * self.rate)
@@ -87,7 +88,7 @@ class World:
         return Sound(position.reshape(flat, -1), torque.reshape(flat, -1), height.ravel())
 
     def log(self, found: Sound, stated: bool = True) -> MotionLog:
-        """Return what command and encoder recorded, the servos being stated or not."""
+        """Return the log of commands and of positions rounded to encoder counts, with servo gains if ``stated``."""
         read = (self.count * np.round(found.position / self.count)).reshape(self.commands.shape)
         time = np.arange(self.commands.shape[1]) / self.rate
         motions = tuple(
@@ -99,7 +100,7 @@ class World:
 
 
 def draw_world(rng: np.random.Generator, joints: int, motions: int) -> World:
-    """Draw an arm, commands of several kinds, and how it is simulated."""
+    """Draw an arm, its commands, kinds of motion in turn, and settings of encoders, integrator and friction."""
     arm, rate = draw_arm(rng, joints), float(rng.choice(sizes.RATES))
     kinds = tuple(list(MOVES)[m % len(MOVES)] for m in range(motions))
     time = np.arange(round(sizes.SECONDS * rate)) / rate
@@ -117,12 +118,12 @@ def draw_world(rng: np.random.Generator, joints: int, motions: int) -> World:
 
 
 def draw_log(rng: np.random.Generator, world: World, name: str, stated: bool = True) -> tuple[MotionLog, Fault]:
-    """Return the log of a world with a fault of a name that its encoders can see, and the fault.
+    """Draw a visible fault of a name, and return the log of the world with it, and the fault.
 
     Raises
     ------
     Unseen
-        If no size of it that was drawn moves a joint by an encoder count.
+        If in no draw the largest rms displacement of a joint lies between an encoder count and 0.8 rad.
     """
     sound = world.simulated(Fault("nothing"))
     if name == "nothing":
@@ -148,7 +149,7 @@ def _centre(rng: np.random.Generator) -> float:
 
 
 def _points(rng: np.random.Generator, time: Array) -> tuple[Array, Array]:
-    """Random waypoints: instants from the first to after the last, s, and positions, rad."""
+    """Draw waypoints: instants from 0 to beyond the last of ``time``, s, and positions, rad."""
     at = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 2 * int(time[-1]) + 2))])
     return at, _centre(rng) + sizes.REACH * rng.uniform(-1.0, 1.0, len(at))
 
@@ -163,13 +164,13 @@ def _ramps(rng: np.random.Generator, time: Array) -> Array:
 
 
 def _random(rng: np.random.Generator, time: Array) -> Array:
-    """Minimum-jerk motion through random points."""
+    """Position (n,), rad, of a motion through random waypoints by minimum-jerk (quintic) steps."""
     at, places = _points(rng, time)
     return _joined(at, places, time, lambda s: s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def _trapezoids(rng: np.random.Generator, time: Array) -> Array:
-    """Trapezoidal velocity profiles, a third each of acceleration, cruise and deceleration, with pauses."""
+    """Position (n,), rad, of trapezoidal velocity profiles (thirds: accelerate, cruise, decelerate), with pauses."""
     at, places = _points(rng, time)
     places[1::2] = places[:-1:2][: len(places[1::2])]
     third = lambda s: np.where(s < 1 / 3, 2.25 * s**2, np.where(s > 2 / 3, 1 - 2.25 * (1 - s) ** 2, 1.5 * s - 0.25))  # noqa: E731
