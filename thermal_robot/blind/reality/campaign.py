@@ -111,7 +111,7 @@ def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -
 
 
 def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None:
-    """Add the columns that a fault follows, and at random the same columns as decoys."""
+    """Add columns of humidity, motor temperature and speed where a fault follows them; the last two at random, too."""
     if "humidity" in wants and "humidity" not in setting.extra:
         setting.extra["humidity"] = humidity(setting.samples, rng)
     if "motor_temperature" in wants or rng.random() < 0.2:
@@ -149,10 +149,10 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
 
 
 def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.random.Generator) -> Array:
-    """Draw a fault and scale it to the size that the case asks for.
+    """Draw a fault's values, scaled to a log-uniform residual rms per axis over the noise, as the case asks for.
 
-    Where the cause is outside the library, removed from it, or hidden, the size is that after the best imitation by two
-    other effects.
+    Where the cause is outside the library, removed from it, or hidden, that is the residual after the best imitation by
+    two other effects; :class:`Unseen` if they imitate 85 % of it.
     """
     wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
     rough = sized(gauge, fault, fault.draw(gauge.setting, rng), wanted)
@@ -167,7 +167,7 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
 
 
 def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
-    """Raise :class:`Unseen` where another effect can imitate one of several, so that the case is redrawn."""
+    """Raise :class:`Unseen` if another of several effects imitates one to less than half the noise, rms per axis."""
     if len(done) < 2:
         return
     for fault, values in done:
@@ -196,7 +196,7 @@ _SENSORS = ("robot", "links")
 
 
 def draw_days(case: Case, world: World, count: int, rng: np.random.Generator) -> list[Day]:
-    """Draw campaigns of positions with unknown base and target.
+    """Draw ``count`` days, each a campaign of positions with its own poses, instrument place, target and outliers.
 
     All days share the instrument's noise, whether it is stated, and the temperature sensors.
     """
@@ -224,7 +224,7 @@ _DRAWS = 20
 def draw_fleet(
     case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
 ) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
-    """Draw the faults of a fleet: labels by name, faults of each robot, truth; a day is one robot."""
+    """Draw a fleet, a robot for each day: its labels (``robot``, ``hall``), the faults of each robot, and the truth."""
     count = len(days)
     robots = [f"r{number + 1:02d}" for number in range(count)]
     # halls of equal size, but for one
@@ -252,7 +252,7 @@ def draw_fleet(
 def _drawn(
     case: Case, day: Day, name: str, taken: list[FaultParameter], rng: np.random.Generator
 ) -> tuple[FaultParameter, Array]:
-    """Draw a fault at one place that has none of its kind, scaled to the size that the case asks for."""
+    """Draw a fault in one place not in ``taken``, add it there, and scale it to the residual rms that the case asks."""
     fault, gauge = FAULTS[name], day.gauge
     for _ in range(_DRAWS):
         values = fault.draw(gauge.setting, rng)
@@ -278,7 +278,7 @@ _LARGEST = 10.0  # × noise: a change that must leave more to be told is not ask
 
 
 def make_several(case: Case, several: Several, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
-    """Generate the campaigns of a case in a folder, and return its answers."""
+    """Simulate several campaigns of one robot or of a fleet, write them with their list, and return the answers."""
     count = int(rng.integers(several.campaigns[0], several.campaigns[1] + 1))
     days = draw_days(case, world, count, rng)
     if case.kind == "fleet":
@@ -321,7 +321,7 @@ def _followed(
 def _moving(
     several: Several, days: Sequence[Day], done: AtWork, time: Array, rng: np.random.Generator
 ) -> tuple[list[AtWork], dict[str, Any]]:
-    """Change one number of a fault over time; return the faults on each day, and the change."""
+    """Change one size of a fault from a day on, or linearly in time; return each day's faults, and the true change."""
     own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
     fault, values = done[own]
     others = [item for k, item in enumerate(done) if k != own]
@@ -337,7 +337,10 @@ def _moving(
 
 
 def _tells(several: Several, days: Sequence[Day], spot: FaultParameter, values: Array, others: AtWork) -> float:
-    """Return the standard deviation of a parameter's estimated change; :class:`Unseen` if it is too large."""
+    """Return the standard deviation of a fault's size by one campaign; for ``changes``, of the difference of two.
+
+    :class:`Unseen` if the largest change asked for would leave more than ten times the noise.
+    """
     noise = days[0].instrument.noise
     told = days[:2] if several.how == "changes" else days[:1]
     found = [deviation(day.gauge, spot, values, others, noise) for day in told]

@@ -28,22 +28,22 @@ class Fault:
     name
         As in formats.md, or a name of its own.
     draw
-        (setting, rng) → (P, D) how large it is in each of P places, D numbers each, in no particular scale: the trial
-        makes it as large as it wants.
+        (setting, rng) → (P, D) values in each of P places, D numbers each, in no particular scale: the trial scales
+        them.
     act
-        (body, setting, values) does it to the robot.
+        (body, setting, values) applies the fault to the body, in place.
     places
         (setting) → the P places.
     few
-        Whether it sits in few places, so that asking where makes sense.
+        Whether it sits in few places, so that the diagnosis is asked which.
     wants
         What the campaign must be like: ``moving``, ``repeats``, ``sessions``, ``sensor:links``, ``base_known`` ...
     quantities
-        (setting, places) → names of columns, each a right answer to what it follows.
+        (setting, places) → names of columns, each a right answer to the question which quantity the fault follows.
     random
         Whether it scatters anew at every visit.
     also
-        Names of other effects that do part of it by definition, each with the columns of the values that do.
+        Names of other effects that are part of it by definition, each with the columns of the values that belong to it.
     known_as
         (setting, values) → true parameters by the names that the diagnosis has for them, in its units and with its
         signs, where formats.md leaves no doubt what is meant.
@@ -64,7 +64,7 @@ class Fault:
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def scaled(self, values: Array, factor: float) -> Array:
-        """Scale the size of a fault's values."""
+        """Copy of the fault's values (P, D) times a factor, but for the :attr:`fixed` columns, which are no sizes."""
         result = values * factor
         for column, _ in self.fixed:
             result[:, column] = values[:, column]
@@ -72,24 +72,24 @@ class Fault:
 
 
 def joints(setting: Setting) -> list[Place]:
-    """All joints."""
+    """Places of a fault: every commanded joint of the chain."""
     return [("joint", name) for name in setting.world.names]
 
 
 def segments(setting: Setting) -> list[Place]:
-    """Link of every segment."""
+    """Places of a fault: the link of every segment."""
     return [("link", link) for link in setting.world.links]
 
 
 def parents(setting: Setting) -> list[Place]:
-    """Link that carries each joint of the chain."""
+    """Places of a fault: the parent link of each joint of the chain, fixed ones too."""
     return [("link", joint.parent) for joint in setting.world.chain]
 
 
 def adds(
     to: str, name: str, draw: Draw, what: Does, places: Callable[[Setting], Sequence[Place]], **more: Any
 ) -> Fault:
-    """Fault that adds to one attribute of the body."""
+    """Fault that adds ``what(setting, values)`` to the attribute ``to`` of a :class:`~.world.Body`."""
 
     def act(body: Body, setting: Setting, values: Array) -> None:
         setattr(body, to, getattr(body, to) + what(setting, values))
@@ -98,7 +98,7 @@ def adds(
 
 
 def in_joints(name: str, draw: Draw, err: Does, **more: Any) -> Fault:
-    """Fault of few joints by an error in each row and joint, (N, n) or broadcastable, rad or m."""
+    """Fault of few joints: ``err(setting, values)`` adds to their positions, (N, n) or broadcastable, rad or m."""
     return adds("joints", name, draw, err, joints, few=True, **more)
 
 
@@ -112,12 +112,12 @@ def at(where: str, name: str, draw: Draw, twist: Does, **more: Any) -> Fault:
 
 
 def own_position(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Position of that joint as the quantity that it follows."""
+    """Right quantities of a fault that follows its own joint's position: the columns of the joints at fault."""
     return [name for _, name in places]
 
 
 def follows(*columns: str) -> Quantities:
-    """Fixed quantities, whatever the place."""
+    """Right quantities that are the same in every place: these columns."""
     return lambda setting, places: columns
 
 
@@ -126,32 +126,32 @@ clock = follows("time", "order")
 
 
 def weights(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """Quantities that moments of gravity follow: payload, and joint positions."""
+    """Right quantities of a fault that follows moments of gravity: payload, and all joint positions."""
     return ["payload", *setting.world.names]
 
 
 def warmths(setting: Setting, places: Sequence[Place]) -> list[str]:
-    """All temperatures that may be recorded of a robot."""
+    """Right quantities of a thermal fault: the columns of all temperatures that may be recorded of a robot."""
     return ["temperature", *(f"temperature.{link}" for link in dict.fromkeys(setting.world.links))]
 
 
 def each_joint(label: str, of: Callable[[Array], Array] = lambda values: np.abs(values[:, 0])) -> Known:
-    """One parameter for each joint: a function of the (n, D) values, by default the size."""
+    """True parameters ``label, joint``, one a joint: ``of`` the values (n, D), by default the size's absolute value."""
     return lambda setting, values: {
         f"{label}, {name}": float(value) for name, value in zip(setting.world.names, of(values), strict=True)
     }
 
 
 def twist(where: str) -> Known:
-    """Components of a twist in the first row of the values: translation, then rotation."""
+    """True parameters of the base or tool frame: the first row of the values, translation (m), then rotation (rad)."""
     names = [f"{kind} {axis}, {where}" for kind in ("translation", "rotation") for axis in "xyz"]
     return lambda setting, values: dict(zip(names, values[0].tolist(), strict=True))
 
 
 def some(size: float, numbers: int = 1, *, first: bool = True, positive: bool = False, turning: bool = False) -> Draw:
-    """Draw values of one to three joints, not the last, and not the first where frames would hide it.
+    """Draw normal values of one to three joints, never the last, nor the first unless ``first``; zeros for the others.
 
-    ``turning`` leaves out those that slide.
+    ``size`` is their standard deviation, and added to the magnitude in one joint; ``turning`` leaves out sliding ones.
     """
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
@@ -175,7 +175,7 @@ Number = Callable[[Setting, int, np.random.Generator], float]
 
 
 def one(*numbers: Number) -> Draw:
-    """Draw one joint, neither the first nor the last, and its values; the first value is its size."""
+    """Draw one joint, neither the first nor the last, and a value by each of ``numbers``; zeros for other joints."""
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
         values = np.zeros((setting.world.n, len(numbers)))
@@ -202,9 +202,9 @@ def within(low: float, high: float) -> Number:
 
 
 def waves(name: str, orders: tuple[float, float]) -> Fault:
-    """Fault of one joint by a wave of its own position, of an order drawn between two.
+    """Fault of one joint by a sine wave of its own position, of a log-uniform order (waves a turn) between two bounds.
 
-    Teeth, balls or a motor's wheel come round; a joint that slides has rad/m. Evenly over the order's logarithm.
+    Teeth, balls or a motor's wheel come round; of a joint that slides the order is in rad/m.
     """
 
     def ripple(setting: Setting, values: Array) -> Array:
@@ -243,7 +243,7 @@ _HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
 def _wheels(setting: Setting, values: Array) -> Array:
-    """Encoder reading error of an eccentric disc plus an oval wheel, in exact geometry.
+    """Encoder reading error (N, n), rad, of an eccentric disc plus an oval wheel, in exact geometry.
 
     The disc turns with the joint, or ``ratio`` times as fast with its motor.
     """
@@ -269,7 +269,7 @@ def _draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _harmonics(setting: Setting, values: Array) -> dict[str, float]:
-    """Fourier amplitudes of the wheels: a disc of eccentricity e adds eᵏ/k in order k, an oval one nearly order 2."""
+    """True parameters of :func:`_wheels`: Fourier amplitudes of orders ``ratio`` and twice that, to second order."""
     found = {}
     for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
         disc = complex(along, -across)
@@ -281,7 +281,7 @@ def _harmonics(setting: Setting, values: Array) -> dict[str, float]:
 
 
 def _play(setting: Setting, values: Array) -> Array:
-    """Backlash: teeth rest on the side to which the torque through them presses.
+    """Backlash error (N, n) of joints, rad or m: teeth rest on the side to which the torque through them presses.
 
     A joint that arrived on its way s = ±1 is pushed there against dry friction F (N·m) while gravity wants the
     torque τ: its teeth carry τ + F s. The grease between them is pressed out gradually, over a share of F. One that
@@ -328,7 +328,7 @@ def ratings(setting: Setting) -> Array:
 
 
 def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw the compliance of every joint; at random one worn gear among stiff ones."""
+    """Draw the compliance (n, 1) of every joint, rad/(N·m) or m/N; with chance 0.4 one soft gear among stiff ones."""
     values = np.abs(rng.normal(1.0, 0.5, (setting.world.n, 1))) * 1e-5
     if rng.random() < 0.4:  # one worn gear
         values *= 0.05
@@ -338,7 +338,7 @@ def _draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _servo(setting: Setting, values: Array) -> Array:
-    """Servo lag: delay and dry friction.
+    """Lag error (N, n) of servos, rad or m: by delay to second order, and by dry friction.
 
     Of the delay T a share p is the loop's, which has a bandwidth, the rest the clock's, which is a dead time:
     exp(−(1 − p) T s) / (1 + p T s) = 1 − T s + ((1 + p²) / 2) T² s² − …
@@ -349,7 +349,7 @@ def _servo(setting: Setting, values: Array) -> Array:
 
 
 def _lags(setting: Setting, values: Array) -> dict[str, float]:
-    """Delay, friction and coefficient of acceleration of each joint."""
+    """True parameters of :func:`_servo`: delay, friction and coefficient of acceleration of each joint."""
     delay, friction, loop = values.T
     each = (("delay", delay), ("friction", friction), ("effect of acceleration", (1.0 + loop**2) / 2.0 * delay**2))
     return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(setting.world.names, of, strict=True)}
@@ -364,14 +364,14 @@ def _draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _ticks(setting: Setting, values: Array) -> Array:
-    """Quantisation: the joint stands at the nearest step."""
+    """Quantisation error (N, n): a joint stands at the nearest multiple of its step; 0 without a step."""
     step = np.abs(values[:, 0])
     known = np.where(step > 0.0, step, 1.0)
     return np.where(step > 0.0, np.round(setting.q / known) * step - setting.q, 0.0)
 
 
 def _scatter(setting: Setting, values: Array) -> Array:
-    """Random scatter of each joint at every visit; the same draw at any size, another in any campaign."""
+    """Normal scatter (N, n) of joints at every visit, rad or m; its seed follows from the campaign's times alone."""
     chance = np.random.default_rng(int(setting.time.sum() * 10) % 2**32)
     return np.asarray(chance.normal(size=setting.q.shape) * np.abs(values[:, 0]))
 
@@ -385,7 +385,7 @@ def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _strains(setting: Setting, values: Array) -> dict[str, float]:
-    """Strain per kelvin, only where each link's temperature is recorded."""
+    """True strain per kelvin of each segment; empty unless each link's temperature is recorded."""
     if setting.sensor != "links":
         return {}
     placed = zip((setting.world.chain[k] for k in setting.world.segments), values[:, 0], strict=True)
@@ -393,13 +393,13 @@ def _strains(setting: Setting, values: Array) -> dict[str, float]:
 
 
 def _creep(setting: Setting, values: Array) -> Array:
-    """Warm-up of a stand or floor after a change of the hall's temperature: Newton's law of cooling."""
+    """Twist (N, 6) of the base by a stand or floor that settles exponentially in time: Newton's law of cooling."""
     grown = -np.expm1(-(setting.time - setting.time[0]) / values[0, 6])
     return np.asarray(grown[:, None] * values[0, :6])
 
 
 def _crept(setting: Setting, values: Array) -> Mapping[str, float]:
-    """Displacement of the base in the last measured row."""
+    """True parameters of :func:`_creep`: the twist of the base in the last measured row."""
     last = setting.time[setting.given][-1] - setting.time[0]
     return twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6]))
 
@@ -418,7 +418,7 @@ def _draw_tip(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _tipped(setting: Setting, values: Array) -> dict[str, float]:
-    """Spring compliances, and the base's shift by the moment about a lower point."""
+    """True parameters of :func:`_tip`: spring compliances, and shifts by the moment about a point below the base."""
     depth = float(values[0, 2])
     found = {}
     for axis, spring in zip("xy", np.abs(values[0, :2]).tolist(), strict=True):

@@ -22,12 +22,12 @@ from thermal_robot.files import write_text
 
 @dataclass(frozen=True)
 class Instrument:
-    """Simulated instrument with its target and noise.
+    """Simulated instrument: its pose, target, noise and outliers, and what the campaign's file declares of them.
 
     Attributes
     ----------
     pose
-        (4, 4) the robot's root as the instrument sees it.
+        (4, 4) pose of the robot's root frame in the instrument's frame.
     target, declared
         (3,) the target in the tool frame: where it is, and where the file says it is, m.
     noise, turning
@@ -37,7 +37,7 @@ class Instrument:
     tails
         Degrees of freedom of Student's law that the noise has, more than 2; infinite for Gauss'.
     spoilt
-        Share of rows that are grossly wrong.
+        Probability that a row is an outlier, by 20 to 200 times the noise.
     """
 
     pose: Array
@@ -61,23 +61,23 @@ class Day:
 
     @cached_property
     def gauge(self) -> Gauge:
-        """Sensitivity of the given rows to displacements."""
+        """Gauge of the target's displacements on measured rows, aligned to the frames that the file leaves unknown."""
         known = self.instrument
         return Gauge(self.setting, self.rows, known.target, not known.base_known, not known.tool_known)
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """Row numbers (M,) that are given to the diagnosis."""
+        """Indices (M,) of the rows that are measured and given to the diagnosis."""
         return np.flatnonzero(self.setting.given)
 
 
 def measure(
     day: Day, faults: Sequence[tuple[Fault, Array]], rng: np.random.Generator
 ) -> tuple[Array, pd.DataFrame, list[int]]:
-    """Simulate the measurement of a robot with faults.
+    """Simulate the measurement of a robot with faults: exact positions, plus normal or Student noise, plus outliers.
 
-    Returns (N, 3) where the target really is, m, the columns x, y, z (m) and, of a pose, the quaternion of the rows
-    that are given, and the table's row numbers that are spoilt.
+    Returns all rows' positions (N, 3) without noise, m; of the given rows the columns x, y, z (m) and, if orientations
+    are measured, the quaternion; and the line numbers of the outliers in the table (its head is line 1).
     """
     instrument, count = day.instrument, len(day.rows)
     seen, turned = place(day.setting, faults, instrument.target, instrument.pose)
@@ -95,9 +95,9 @@ def measure(
 
 
 def registered(day: Day, position: Array, spoilt: Sequence[int]) -> Array:
-    """Position (N, 3) of the sound robot's target after registration to (M, 3) measured positions.
+    """Positions (N, 3) of the sound robot's target, with unknown frames fitted to (M, 3) measured positions, m.
 
-    Gauss–Newton from the true frames, spoilt rows left out; by least squares of the positions.
+    Least squares by Gauss–Newton steps from the true base and the declared target, outliers left out.
     """
     setting, instrument = day.setting, day.instrument
     good = np.delete(np.arange(len(day.rows)), np.array(spoilt, dtype=int) - 2)
@@ -124,7 +124,7 @@ def write_folder(
 ) -> None:
     """Write campaign.toml, robot.urdf, measurements.csv and, with samples to predict, fresh.csv.
 
-    Gears are the transmission ratios by joint.
+    Hidden columns are left out of both tables. ``gears`` are the transmission ratios by joint.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "robot.urdf", case.robot.urdf)

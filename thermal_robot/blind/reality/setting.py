@@ -19,18 +19,21 @@ _MOTOR = (300.0, 3000.0)  # s for a motor to reach its temperature, from a wrist
 
 
 def time_constant(rng: np.random.Generator) -> float:
-    """Draw the thermal time constant of a link, s: ρ c d / h of a wall cooled on one side."""
+    """Draw a link's thermal time constant, s: heat capacity by volume × wall thickness / heat transfer coefficient."""
     return float(rng.uniform(*_HOLDS) * rng.uniform(*_WALL) / rng.uniform(*_FILM))
 
 
 def hall(time: Array, rng: np.random.Generator) -> Array:
-    """Air temperature (N,) °C: oscillation and drift."""
+    """Draw the hall's air temperature (N,), °C, over time (s): a constant, a sine wave and a linear drift."""
     swing = rng.uniform(1.0, 4.0) * np.sin(time / time[-1] * rng.uniform(1.5, 9.0) + rng.uniform(0, 6.0))
     return np.asarray(21.0 + swing + rng.uniform(-1.0, 5.0) * time / time[-1])
 
 
 def warmed(world: World, time: Array, air: Array, session: NDArray[np.int64] | None, rng: np.random.Generator) -> Array:
-    """Link temperature (N, S) °C: first-order lag behind the air, with heat from the motor."""
+    """Draw the temperature (N, S), °C, of each segment's link: a first-order lag behind the air plus its motor's heat.
+
+    Motors warm up exponentially from the start of each session; without sessions they are warm throughout.
+    """
     since = np.full_like(time, np.inf)  # without sessions the motors have been on for long
     for s in np.unique(session) if session is not None else ():  # cold at the start of each session
         rows = session == s
@@ -44,7 +47,7 @@ def warmed(world: World, time: Array, air: Array, session: NDArray[np.int64] | N
 
 
 def followed(time: Array, drive: Array, constant: float, start: float | None = None) -> Array:
-    """First-order lag (N,) °C, T' = (drive − T) / constant, in steps of a second on a piecewise linear drive.
+    """Response (N,), °C, of a first-order lag T' = (drive − T) / constant to a piecewise linear drive, in 1 s steps.
 
     Time, increasing, and constant are in s; ``start`` is the temperature at the first row, the drive's where absent.
     """
@@ -68,8 +71,8 @@ class Setting:
     Attributes
     ----------
     given
-        (N,) whether a row is measured; the others are commands of which a prediction is asked: the same day over again,
-        spent on other poses.
+        (N,) whether a row is measured; the others, scattered among them in time, are commands whose positions are to be
+        predicted. Either kind is visited as if the other were not there.
     q, velocity, acceleration
         (N, n) joint positions at the instant of measurement, and how they change there (zero where it stands still).
     time, payload, speed
@@ -79,7 +82,7 @@ class Setting:
     air, links
         (N,) temperature of the hall and (N, S) of each segment's link, °C.
     sensor
-        What is recorded of it: ``robot`` (one sensor on the robot), ``links`` (one on each) or ``air``.
+        Temperature that is recorded: ``robot`` (one sensor on the robot), ``links`` (one on each) or ``air``.
     moving
         Whether poses are measured in passing.
     pose, session
@@ -87,7 +90,7 @@ class Setting:
     extra
         Further columns by name, (N,) each.
     torque, poses
-        (N, n) what holds the sound robot's joints, N·m, and (N, 4, 4) poses of its tool frame.
+        (N, n) static torques that hold the sound robot's joints, N·m or N, and (N, 4, 4) poses of its tool frame.
     """
 
     world: World
@@ -189,16 +192,16 @@ def draw_setting(
 
 
 def humidity(samples: int, rng: np.random.Generator) -> Array:
-    """Relative humidity (N,) % of the hall's air: a random walk of some 9 % a day."""
+    """Draw the air's relative humidity (N,), %: 45 plus a random walk with standard deviation 9 at the last row."""
     return np.round(45.0 + np.cumsum(rng.normal(0.0, _WANDERS / np.sqrt(samples), samples)), 1)
 
 
 def _visits(
     world: World, samples: int, fresh: int, visits: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.bool_], Array, NDArray[np.int64] | None]:
-    """Mask (N,) of measured rows, commands (N, n) in the order of visits, and pose numbers if some repeat.
+    """Draw the mask (N,) of measured rows, the commands (N, n) of all, and pose numbers (N,), ``None`` without repeats.
 
-    The first row is measured: from it drift counts. What is to be predicted is never a pose that was measured.
+    The first row is measured: from it drift counts. No pose to be predicted is measured, too.
     """
     given = np.zeros(samples + fresh, dtype=bool)
     given[np.append(0, 1 + rng.permutation(samples + fresh - 1)[: samples - 1])] = True
@@ -211,7 +214,7 @@ def _visits(
 
 
 def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Array, NDArray[np.int64] | None]:
-    """Time (N,) s from the first row on, and the session number of each row."""
+    """Draw times (N,), s from the first row on, over 1.5 to 6 hours, and session numbers, ``None`` without sessions."""
     length = rng.uniform(1.5, 6.0) * 3600.0
     steps = rng.gamma(4.0, 1.0, samples)
     time = np.cumsum(steps) - steps[0]
@@ -224,7 +227,10 @@ def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Arra
 
 
 def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.random.Generator) -> Array:
-    """Link temperatures (N, S) °C of a robot for which the available sensor is informative."""
+    """Replace link temperatures (N, S), °C, by such as the recorded sensor determines.
+
+    One sensor on the robot: nearly the mean in all links; in the air: one lag behind it; on each link: unchanged.
+    """
     if sensor == "robot":  # one casting: its links warm nearly alike, or one sensor would be of no use
         common = links.mean(axis=1, keepdims=True)
         return np.asarray(common + 0.06 * (links - common))
@@ -234,7 +240,7 @@ def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.rando
 
 
 def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
-    """Random commands (count, n) within a share of the limits, without the third nearest to the root."""
+    """Draw uniform commands (count, n) within 75 % of the ranges, without the 30 % whose tool is nearest the root."""
     lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
     middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
     drawn = rng.uniform(middle - half, middle + half, (2 * count + 60, world.n))

@@ -22,12 +22,12 @@ _IMITATED = 1e-3  # of the largest: what a fault can do to less than that is rou
 
 
 class Unseen(Exception):
-    """A fault has no effect on the measurements of its campaign."""
+    """Error: a fault leaves nothing in the measurements of its campaign, or nothing that other faults cannot do."""
 
 
 @dataclass
 class Gauge:
-    """Displacements of the target on the (M,) rows given to the diagnosis, aligned to unknown frames.
+    """Displacements of the target by faults on (M,) rows, and their residuals after alignment to the unknown frames.
 
     Attributes
     ----------
@@ -52,21 +52,21 @@ class Gauge:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """Derivatives of the sound robot."""
+        """Derivatives of the target's position, on these rows, about the sound robot."""
         return slopes(self.setting.world, self.setting.q[self.rows], self.setting.payload[self.rows], self.target)
 
     def moved(self, fault: Fault, values: Array) -> Array:
-        """Displacement (3M,) of the target by one fault alone."""
+        """Displacement (3M,) of the target by one fault alone, m, of the exact model."""
         return (place(self.setting, [(fault, values)], self.target, rows=self.rows)[0] - self.sound).ravel()
 
     def slope(self, fault: Fault, values: Array) -> Array:
-        """First-order displacement (3M,) of the target by one fault alone."""
+        """First-order displacement (3M,) of the target by one fault alone, m."""
         body = self.setting.world.sound(self.setting.samples)
         fault.act(body, self.setting, values)
         return (self.slopes.place(body.take(self.rows)) - self.sound).ravel()
 
     def left(self, moved: Array) -> Array:
-        """Residual (3M,) or (3M, K) of displacements after alignment."""
+        """Residual (3M,) or (3M, K) of displacements after orthogonal projection off the unknown frames' columns."""
         return np.asarray(moved - self.frames @ (self.frames.T @ moved))
 
     def rms(self, moved: Array) -> float:
@@ -78,7 +78,7 @@ class Gauge:
         return self.rms(self.left(self.moved(fault, values)))
 
     def basis(self, fault: Fault) -> Array:
-        """Orthonormal basis (3M, K) of all displacements by this kind of fault beyond the frames, to first order."""
+        """Orthonormal basis (3M, K) of a kind of fault's first-order displacements in all places, after alignment."""
         if fault.name in self.bases:
             return self.bases[fault.name]
         draw = fault.draw(self.setting, np.random.default_rng(0))
@@ -95,7 +95,10 @@ class Gauge:
         return found
 
     def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
-        """Residual rms per axis of a displacement after the best imitation by one or several (``together``) faults."""
+        """Residual rms per axis, m, of a displacement after alignment and least squares by other faults' :meth:`basis`.
+
+        One value for each combination of ``together`` testable faults of ``others``, by their names.
+        """
         left = self.left(moved)
         known = [FAULTS[name] for name in others if name != fault.name and not FAULTS[name].random]
         bases = {other.name: self.basis(other) for other in known if testable(other, self)}
@@ -109,7 +112,7 @@ class Gauge:
 
 
 def testable(fault: Fault, gauge: Gauge) -> bool:
-    """Whether this campaign can reveal a fault of this kind."""
+    """Whether a campaign meets all conditions that a fault wants: motion, repeats, sessions, sensors, known frames."""
     setting = gauge.setting
     known = {
         "moving": setting.moving,
@@ -123,9 +126,10 @@ def testable(fault: Fault, gauge: Gauge) -> bool:
 
 
 def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
-    """Scale values until the residual after alignment has the wanted size.
+    """Scale a fault's values until its residual rms per axis after alignment is ``wanted`` (m), within 1 %.
 
-    Displacements are nearly linear in the values, but for an encoder's steps; the nearest iteration is returned.
+    Displacements are nearly linear in the values, but for an encoder's steps: of eight iterations at most the nearest
+    is returned. :class:`Unseen` if the fault leaves nothing.
     """
     nearest = np.inf, values
     for _ in range(_ROUNDS):
@@ -140,7 +144,7 @@ def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
 
 
 def shares(gauge: Gauge, fault: Fault, values: Array) -> list[tuple[Place, int, float]]:
-    """Places of a fault with their numbers and residual rms, largest first."""
+    """Places of a fault, each with its index and the first-order residual rms per axis (m) of it alone, descending."""
     found = []
     for p, where in enumerate(fault.places(gauge.setting)):
         alone = fault.scaled(values, 0.0)
@@ -156,10 +160,10 @@ def place(
     instrument: Array | None = None,
     rows: NDArray[np.int64] | None = None,
 ) -> tuple[Array, Array]:
-    """Target positions (N, 3) and orientations (N, 3, 3) with these faults, in the instrument's frame.
+    """Target positions (N, 3), m, and orientations (N, 3, 3) with these faults, as the instrument reads them.
 
-    ``instrument`` is the (4, 4) pose of the robot's root in it; where it is left out the two are one. ``rows`` are all
-    where they are left out.
+    ``instrument`` is the (4, 4) pose of the robot's root in its frame, the identity where absent. ``rows`` are the
+    indices of rows to compute, all where absent.
     """
     world = setting.world
     body = world.sound(setting.samples)
@@ -187,7 +191,7 @@ def truth(
     background: Sequence[tuple[Fault, Array]],
     noise: float,
 ) -> dict[str, Any]:
-    """Truth in the format of :mod:`thermal_robot.blind.cases`, without the outliers.
+    """Right answers to a case, as the ``truth`` of :mod:`thermal_robot.blind.cases`, without the outliers.
 
     It covers the faults asked for and those in the background; ``noise`` is one sigma per axis, m.
     """
@@ -241,7 +245,7 @@ def near(world: World, places: Sequence[Place]) -> list[Place]:
 
 
 def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[Place]:
-    """Add the joints to displaced placements, which are as much the joint's as the link's."""
+    """Movable joints with these numbers in the chain, if the fault displaces joints' placements; else none."""
     chain = setting.world.chain
     if len(fault.places(setting)) != len(chain) or fault.places(setting)[0][0] != "link":
         return []
@@ -264,19 +268,19 @@ _SEEN = 1e-6  # of a column: what less is left of is rounding
 
 @dataclass(frozen=True, eq=False)
 class FaultParameter:
-    """One number of a fault, by its place, with its name and value in the words and units of formats.md."""
+    """Size of a fault in one place, the row ``number`` of its values."""
 
     fault: Fault
     number: int
 
     def moved(self, values: Array, by: float) -> Array:
-        """Values with this number increased."""
+        """Copy of the fault's values (P, D) with the size in this place increased by ``by``."""
         result = values.copy()
         result[self.number, SIZE] += by
         return result
 
     def change(self, setting: Setting, values: Array, by: float) -> tuple[dict[str, Any], float]:
-        """Effect, place and name of the parameter of formats.md, and its change as this number grows."""
+        """Effect, place and name of the parameter in formats.md, and its change, SI, if this size grows by ``by``."""
         before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
         [name] = [key for key in after if after[key] != before[key]]
         [place] = _named([self.fault.places(setting)[self.number]])
@@ -284,9 +288,9 @@ class FaultParameter:
 
 
 def draw_fault_parameter(fault: Fault, values: Array, rng: np.random.Generator) -> FaultParameter:
-    """Draw a place at which a fault is at work; of joint zeros and idle faults any but the first and the last.
+    """Draw one of the places where a fault's size is not zero; for joint zeros and all-zero faults any inner joint.
 
-    Frames take up what the first and the last joint's zero do.
+    The frames take up what zeros of the first and the last joint do.
     """
     size = values[:, SIZE]
     inner = np.arange(1, len(size) - 1)
@@ -325,7 +329,7 @@ def deviation(
 
 
 def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
-    """Yield each size parameter of a fault with its unit displacement (3M,) of the target."""
+    """Yield the index of each size parameter of a fault, and the derivative (3M,) of the target's position by it."""
     fixed = {column for column, _ in fault.fixed}
     now = gauge.slope(fault, values)
     for p, d in np.ndindex(*values.shape):
@@ -337,6 +341,6 @@ def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[
 
 
 def _span(columns: Array, floor: float) -> Array:
-    """Orthonormal basis (E, R) of columns (E, K) by SVD, without directions below a share of the largest."""
+    """Orthonormal basis (E, R) of columns (E, K) by SVD, of singular values above ``floor`` times the largest."""
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(left[:, size > floor * size.max(initial=0.0)])

@@ -59,7 +59,7 @@ def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
 
 
 def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Quantities:
-    """Right quantities of a modulated effect: the condition, or its product with the effect's driver."""
+    """Right quantities of an effect that a condition modulates: the condition, or that times the effect's driver."""
 
     def quantities(setting: Setting, places: Sequence[Place]) -> list[str]:
         known = conditions(setting, places)
@@ -69,14 +69,14 @@ def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Qua
 
 
 def _running(setting: Setting) -> Array:
-    """Time (N,) s since the robot was switched on."""
+    """Time (N,), s, since the first row of the same session."""
     assert setting.session is not None  # the fault asks for sessions
     first = np.array([setting.time[setting.session == s][0] for s in range(setting.session.max() + 1)])
     return np.asarray(setting.time - first[setting.session])
 
 
 def _nest(setting: Setting, values: Array) -> Array:
-    """Magnetic nest with play: gravity tips the target to one side along one axis."""
+    """Twist (N, 6) of a target in a magnetic nest with play: a shift along one axis to the side that gravity takes."""
     axis = int(values[0, 1])
     twist = np.zeros((setting.samples, 6))
     twist[:, axis] = values[0, 0] * np.tanh(-setting.poses[:, 2, axis] / 0.15)
@@ -84,12 +84,12 @@ def _nest(setting: Setting, values: Array) -> Array:
 
 
 def _remounted(setting: Setting, values: Array) -> Array:
-    """Target that is removed between two sessions and comes back elsewhere."""
+    """Twist (N, 6) of a target that is mounted anew, with another shift, in each session."""
     return np.pad(values, ((0, 0), (0, 3)))[setting.session]
 
 
 def _bolt(setting: Setting, values: Array) -> Array:
-    """Loose bolt: from one moment on a link's far end is tilted."""
+    """Loose bolt: from one moment on the placements (N, S', 6) of the chain's joints are displaced by constants."""
     late = setting.time > values[:, 6].max() * setting.time[-1]
     return np.asarray(late[:, None, None] * values[None, :, :6])
 
@@ -105,7 +105,7 @@ def _draw_bolt(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def _tilt(turned: float = 0.0) -> Draw:
-    """Draw a tilt of the base, and how far it turns about the vertical, as a share."""
+    """Draw a rotation of the base: about 1 mrad about x and y, and ``turned`` times as much about the vertical."""
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
         about = rng.normal(size=2), [turned * rng.normal() if turned else 0.0]
@@ -204,13 +204,13 @@ _ALONE = (
 
 
 def deviation(values: Array) -> Array:
-    """Normalised deviation from the middle of the range, −1 to 1; zeros where values do not vary."""
+    """Min-max scaling along the first axis to −1 to 1; zeros where values do not vary."""
     low, high = values.min(axis=0), values.max(axis=0)
     return np.asarray((2.0 * values - low - high) / np.where(high > low, high - low, 1.0))
 
 
 def _at_and_around(size: float) -> Draw:
-    """Draw one joint's effect at the middle of a condition, and its change towards the ends."""
+    """Draw one joint's size at mid-range of a condition, 1 to 1.5 × ``size``, and its change to an end, ± ``size``."""
     drawn = one(part(*_MIDDLE), lambda setting, j, rng: float(rng.choice([-1.0, 1.0])))
     return lambda setting, rng: size * drawn(setting, rng)
 
@@ -226,7 +226,7 @@ def _own_warmth(setting: Setting) -> Array:
 
 
 def _product(first: Array, second: Array) -> Array:
-    """Product (N, 1) of two deviations."""
+    """Product (N, 1) of two conditions, each scaled to −1 to 1 over its range."""
     return np.asarray((deviation(first) * deviation(second))[:, None])
 
 
@@ -293,9 +293,9 @@ INTERPLAY = (
 
 
 def _jenkin_elements(setting: Setting, values: Array) -> Array:
-    """Parallel Jenkin elements (friction in series with springs): each follows the joint until it slips.
+    """Hysteresis error (N, n) of joints by parallel Jenkin elements (friction in series with springs).
 
-    What they hold depends on where the joint turned round, and not only on its last direction.
+    Each follows the joint until it slips: their strain depends on where the joint turned round, too.
     """
     moved = np.zeros_like(setting.q)
     for j in np.flatnonzero(values[:, 0]):
@@ -308,8 +308,8 @@ def _jenkin_elements(setting: Setting, values: Array) -> Array:
 def slipped(q: Array, before: NDArray[np.int64], slips: Array) -> Array:
     """Strain (N, E) of each Jenkin element over its slip limit; 0 at the start.
 
-    Of (N,) places of the joint, the row that each came from, the first one's own, and (E,) how far the joint goes
-    before an element slips.
+    ``q`` (N,) positions of the joint; ``before`` the row that each came from, the first one's own; ``slips`` (E,) how
+    far the joint goes before an element slips.
     """
     strained = np.zeros((len(q), len(slips)))
     for row, last in enumerate(before):
@@ -319,7 +319,7 @@ def slipped(q: Array, before: NDArray[np.int64], slips: Array) -> Array:
 
 
 def wandered(setting: Setting, lasts: float, seed: float) -> Array:
-    """Ornstein-Uhlenbeck process (N,) of size 1 with a correlation time of some rows."""
+    """Ornstein-Uhlenbeck process (N,) of unit variance; correlation time: ``lasts`` × the mean time per given row."""
     chance = np.random.default_rng(int(seed)).normal(size=setting.samples)
     row = setting.time[-1] / max(int(setting.given.sum()), 1)
     kept = np.exp(-np.diff(setting.time) / (lasts * row))
@@ -331,7 +331,7 @@ def wandered(setting: Setting, lasts: float, seed: float) -> Array:
 
 
 def _coolant(setting: Setting, values: Array) -> Array:
-    """Joint with intermittent cooling: what it follows is not recorded."""
+    """Error (N, n) of joints with intermittent cooling: an Ornstein-Uhlenbeck process that no column records."""
     moved = np.zeros_like(setting.q)
     for j in np.flatnonzero(values[:, 0]):
         moved[:, j] = values[j, 0] * wandered(setting, values[j, 1], values[j, 2])

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def from_vector(twists: Array) -> Array:
-    """Rigid motions (N, 4, 4) from translations (m) and rotation vectors (rad), (N, 6)."""
+    """Homogeneous transforms (N, 4, 4) from translations (m) and rotation vectors (rad), (N, 6)."""
     motion = np.tile(np.eye(4), (len(twists), 1, 1))
     motion[:, :3, :3] = Rotation.from_rotvec(twists[:, 3:]).as_matrix()
     motion[:, :3, 3] = twists[:, :3]
@@ -24,7 +24,7 @@ def from_vector(twists: Array) -> Array:
 
 
 def rpy_matrix(rpy: Array) -> Array:
-    """Rotation matrix of roll, pitch, yaw about the fixed axes x, y, z."""
+    """Rotation matrix (3, 3) of roll, pitch, yaw (rad) about the fixed axes x, y, z, in this order."""
     return np.asarray(Rotation.from_euler("xyz", rpy).as_matrix())
 
 
@@ -34,7 +34,7 @@ def quaternion(rotation: Array) -> Array:
 
 
 def anywhere(rng: np.random.Generator, reach: float) -> Array:
-    """Random pose (4, 4) with a place up to ``reach`` along each axis."""
+    """Draw a homogeneous transform (4, 4): uniform rotation, translation uniform within ±``reach`` (m) on each axis."""
     motion = np.eye(4)
     motion[:3, :3] = Rotation.random(rng=rng).as_matrix()
     motion[:3, 3] = rng.uniform(-reach, reach, 3)
@@ -42,7 +42,10 @@ def anywhere(rng: np.random.Generator, reach: float) -> Array:
 
 
 def free_columns(reference: Array, rotation: Array, base: bool, tool: bool) -> Array:
-    """Displacement (3N, 0..9) per unit of each unknown frame coordinate."""
+    """Jacobian (3N, K) of positions ``reference`` (N, 3) by the unknown frames; K is 0, 3, 6 or 9.
+
+    ``base``: three translations, and three rotations about the centroid; ``tool``: three coordinates of the target.
+    """
     n, centred = len(reference), reference - reference.mean(axis=0)
     parts = []
     if base:
@@ -57,9 +60,9 @@ def free_columns(reference: Array, rotation: Array, base: bool, tool: bool) -> A
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint of the tree: ``origin`` (xyz, rpy) in its parent link, unit ``axis`` in its own frame, limits, type.
+    """Joint of a URDF: origin (``xyz``, ``rpy``) in its parent link, unit ``axis`` in its own frame, limits, type.
 
-    ``mimic`` is the joint that it follows, with multiplier and offset; ``None`` for one that is commanded itself.
+    ``mimic`` is the joint that it follows, with multiplier and offset; ``None`` for one that follows no other.
     """
 
     name: str
@@ -75,7 +78,7 @@ class Joint:
 
     @property
     def movable(self) -> bool:
-        """Whether the joint is not fixed."""
+        """Whether the joint is revolute, continuous or prismatic."""
         return self.kind in ("revolute", "continuous", "prismatic")
 
     @property
@@ -85,18 +88,21 @@ class Joint:
 
     @property
     def held(self) -> float:
-        """Position of a joint that is not commanded: 0, or its limit nearest to 0."""
+        """Position of a joint that is not commanded: 0, clipped to its limits."""
         return float(np.clip(0.0, self.lower, self.upper))
 
     def displaced(self, error: Array) -> tuple[Array, Array]:
-        """Shift (3,) and rotation (3, 3) in the parent link, of a placement error (6,) m and rotation vector."""
+        """Shift (3,), m, and whole rotation (3, 3) of the joint's frame in its parent link, if its placement errs.
+
+        ``error`` (6,) is a translation (m) and a rotation vector (rad) in the joint's own frame.
+        """
         rotation, motion = rpy_matrix(self.rpy), from_vector(error[None])[0]
         return rotation @ motion[:3, 3], rotation @ motion[:3, :3]
 
 
 @dataclass(frozen=True)
 class Tree:
-    """Kinematic tree: joints from the root on, masses (kg) and centres of mass (3,) by link, root link."""
+    """Kinematic tree of a URDF: its root link, joints from there on, masses (kg), centres of mass (3,), m, by link."""
 
     root: str
     joints: tuple[Joint, ...]
@@ -108,7 +114,7 @@ class Tree:
         return self.mass[link] + sum(self.carried(j.child) for j in self.joints if j.parent == link)
 
     def chain(self, tool_frame: str) -> tuple[Joint, ...]:
-        """Joints from the root to a link."""
+        """Joints on the path from the root to a link, fixed ones too."""
         by_child = {j.child: j for j in self.joints}
         found: list[Joint] = []
         link = tool_frame
@@ -119,7 +125,7 @@ class Tree:
 
 
 def read(text: str) -> Tree:
-    """Parse the kinematics and masses of a URDF."""
+    """Parse the kinematic tree, masses and centres of mass of a URDF's text."""
     robot = ElementTree.fromstring(re.sub(r"<\?xml[^>]*\?>", "", text).strip())
     mass, centre = {}, {}
     for link in robot.findall("link"):
@@ -169,7 +175,7 @@ _ROTOR = 1.0  # kg m², kg: MuJoCo wants inertia in every freedom; where nothing
 
 @dataclass
 class Body:
-    """Deviations of a robot from its URDF over N measurements; neutral in a sound one.
+    """Deviations of a robot from its URDF over N measurements; zeros and identities in a sound robot.
 
     Attributes
     ----------
@@ -200,17 +206,17 @@ class Body:
     scale: float = 0.0
 
     def take(self, rows: NDArray[np.int64]) -> Body:
-        """Subset of the rows."""
+        """Copy of the body for a subset of the measurements, by their indices."""
         each = {name: getattr(self, name)[rows] for name in ("joints", "bow", "growth", "base", "tool")}
         return replace(self, **each, placements=self.placements[rows] if self.placements.ndim == 3 else self.placements)
 
     def move(self, where: str, twists: Array) -> None:
-        """Displace the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
+        """Compose the motion of ``base`` or ``tool`` on the right with translations (m) and rotation vectors (N, 6)."""
         setattr(self, where, getattr(self, where) @ from_vector(twists))
 
 
 class World:
-    """Robot model in MuJoCo.
+    """Statics of a robot in MuJoCo, from its URDF: rigid, or with springs, beams and growth; gravity and payload act.
 
     Parameters
     ----------
@@ -267,7 +273,7 @@ class World:
         return coupling, rest
 
     def sound(self, samples: int) -> Body:
-        """Body without fault."""
+        """Body of the sound robot, without any deviation, for a number of measurements."""
         s = len(self.segments)
         return Body(
             joints=np.zeros((samples, self.n)),
@@ -281,9 +287,9 @@ class World:
         )
 
     def poses(self, q: Array, payload: Array, body: Body) -> tuple[Array, Array]:
-        """Tool poses (N, 4, 4) in the root frame, and static joint torques (N, n), N·m.
+        """Solve forward kinematics in static equilibrium: tool poses (N, 4, 4) in the root frame, joint torques (N, n).
 
-        Each row is a statics problem of its own: springs and beams yield until they balance gravity.
+        In each row springs and beams of the body yield until they balance gravity and payload (kg). Torques in N·m.
         """
         bending = bool(np.any(body.beams) or np.any(body.bow))
         # a copy: rows stretch it
@@ -329,11 +335,11 @@ class World:
         return moments
 
     def address(self, model: mujoco.MjModel) -> list[int]:
-        """Coordinate addresses of the m movable joints of the chain."""
+        """Return the indices of the chain's m movable joints in MuJoCo's generalised coordinates (``qpos``)."""
         return [int(model.joint(joint.name).qposadr[0]) for joint in self.moving]
 
     def compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
-        """Compile the model: ``bending`` makes links beams, ``placements`` as in :class:`Body` or ``None``."""
+        """Compile the MuJoCo model: ``bending`` makes beams of the segments, ``placements`` (S', 6) displace joints."""
         plain = placements is None or not placements.any()
         if plain and bending in self._sound:
             return self._sound[bending]
@@ -389,7 +395,7 @@ class World:
             body.quat = quaternion(rotation @ turn)
 
     def _beam(self, parent: mujoco.MjsBody, joint: Joint, offset: Array) -> mujoco.MjsBody:
-        """Insert hinges of a beam, two at each node, between a link and its joint's placement."""
+        """Insert a beam along a joint's offset, as bodies with two hinges at each node; returns the last body."""
         first, second = cross_axes(offset)
         for node in range(NODES):
             step = offset / NODES * (0.5 if node == 0 else 1.0)
@@ -401,12 +407,12 @@ class World:
         return parent
 
     def nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
-        """Addresses (S, 2, NODES) of the beams' hinges."""
+        """Return the indices (S, 2, NODES) of the beams' hinges in MuJoCo's generalised coordinates (``qpos``)."""
         names = [[[f"{j.name}/{node}/{axis}" for node in range(NODES)] for axis in (0, 1)] for j in self.grown]
         return np.array([[[int(model.joint(n).qposadr[0]) for n in line] for line in pair] for pair in names])
 
     def _place(self, model: mujoco.MjModel, placements: Array) -> None:
-        """Set the displaced placements of one row."""
+        """Displace the joints' placements in a compiled model by the errors (S', 6) of one row."""
         for joint, error in zip(self.chain, placements, strict=True):
             body, (shift, rotation) = model.body(f"link:{joint.child}").id, joint.displaced(error)
             model.body_pos[body] += shift
@@ -414,7 +420,7 @@ class World:
 
 
 def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
-    """Set the payload mass, kg."""
+    """Set the payload's mass, kg, in a compiled model, and update its constants."""
     carried = model.body("payload").id
     if model.body_mass[carried] != payload:
         model.body_mass[carried] = payload
@@ -422,7 +428,7 @@ def _carry(model: mujoco.MjModel, data: mujoco.MjData, payload: float) -> None:
 
 
 def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Return the static generalised forces against gravity."""
+    """Return the generalised forces (nv,) that hold the model against gravity at rest, by inverse dynamics."""
     held = np.zeros(model.nv)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -431,7 +437,10 @@ def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 
 def _static_torques(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
-    """Solve the static equilibrium of joint springs against gravity; return the joint torques, N·m."""
+    """Solve the static equilibrium of springs against gravity by fixed-point iteration; returns forces (nv,), N·m or N.
+
+    ``free`` (nv,) are the coordinates without load, ``compliance`` (nv, nv) the springs'; ``data`` keeps the solution.
+    """
     yields = bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
@@ -446,7 +455,7 @@ def _static_torques(model: mujoco.MjModel, data: mujoco.MjData, free: Array, com
 
 
 def cross_axes(direction: Array) -> tuple[Array, Array]:
-    """Two unit vectors perpendicular to a direction."""
+    """Two unit vectors perpendicular to a direction and to each other."""
     along = direction / np.linalg.norm(direction)
     least = np.eye(3)[np.argmin(np.abs(along))]
     first = np.cross(along, least)
@@ -456,7 +465,7 @@ def cross_axes(direction: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of the target's position in the root frame, M rows, about the sound robot.
+    """Jacobians of the target's position in the root frame by the deviations of a :class:`Body`, about the sound robot.
 
     Attributes
     ----------
@@ -495,7 +504,7 @@ class Slopes:
 
 
 def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
-    """Return the derivatives at (M, n) commands with (M,) payloads, kg; the target is in the tool frame, m."""
+    """Compute the target's Jacobians at commands (M, n) with payloads (M,), kg; ``target`` (3,), tool frame, m."""
     model = copy(world.compile(True, None))  # its payload changes
     data = mujoco.MjData(model)
     address, nodes = world.address(model), world.nodes(model)
@@ -530,7 +539,7 @@ def _pose(data: mujoco.MjData, body: int) -> Array:
 
 
 def _placed(world: World, model: mujoco.MjModel, data: mujoco.MjData, point: Array) -> tuple[Array, Array]:
-    """Return the derivatives by placements (3, S', 6) and by growth (3, S)."""
+    """Jacobians of a point (root frame, m) by the joints' placements (3, S', 6) and by the segments' growth (3, S)."""
     placements, growth = np.empty((3, len(world.chain), 6)), np.empty((3, len(world.segments)))
     for k, joint in enumerate(world.chain):
         carrier = _pose(data, model.body(f"link:{joint.parent}").id)
