@@ -63,7 +63,7 @@ LISTED = "campaigns.csv"
 
 @dataclass(frozen=True)
 class RobotChoice:
-    """A robot of the trial: its name, its URDF (a path, ``builtin:<name>`` ... or text), the link with the target."""
+    """Robot of the trial: its name, URDF (text, path or ``builtin:<name>`` ...) and link that carries the target."""
 
     name: str
     urdf: str
@@ -72,17 +72,17 @@ class RobotChoice:
 
 @dataclass(frozen=True)
 class Several:
-    """Parameters of a case of several campaigns.
+    """What a case of several campaigns adds: their number, what changes between them or is shared, and by how much.
 
     Attributes
     ----------
     campaigns
         How many: drawn between the two.
     how, moves
-        What is true of them, and the effect of which one parameter changes or that is shared; both may be empty.
+        Kind of change or of sharing, and the effect of which one parameter changes or is shared; both may be empty.
     change
-        How large a change is: deviations of the difference between two campaigns for ``changes``, of one campaign
-        else; drawn between the two, evenly in its logarithm.
+        Size of a change over the parameter's standard deviation: of the difference between two campaigns for
+        ``changes``, of one campaign else; drawn between the two, evenly in its logarithm.
     apart
         Effects of a fleet that one robot has, each another one.
     """
@@ -96,16 +96,16 @@ class Several:
 
 @dataclass(frozen=True)
 class Case:
-    """Test case: one robot with its hidden fault.
+    """Specification of one test case: robot, hidden faults and their size, what is withheld, and the seed of the rest.
 
     Attributes
     ----------
     id, seed
-        Name of its folder, which tells nothing; everything else that is drawn follows from the seed.
+        Name of its folder, which gives nothing away; everything else that is drawn follows from the seed.
     kind, robot
-        What is asked, and whose fault it is.
+        Kind of case, and the robot that has the fault.
     effects, unlisted
-        Those really at work and large, and the name of a cause that no library knows, or ``None``.
+        Effects at work that are to be found, and the name of a cause that no library knows, or ``None``.
     without, hidden
         Effects taken out of the library, and columns out of the table (``temperature`` stands for each link's, too).
     ratio

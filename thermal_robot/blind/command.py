@@ -164,7 +164,7 @@ def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) 
 def _with_faults(
     cases: tuple[Case, ...], faults: Sequence[str], seed: int, robots: tuple[RobotChoice, ...]
 ) -> tuple[Case, ...]:
-    """Add cases with faults of the user's own, under the library's name where there is one."""
+    """Append cases with the user's faults: ``single`` if the library has an effect of that name, else ``unlisted``."""
     if not faults:
         return cases
     from thermal_robot.blind.reality.unlisted import load
@@ -184,7 +184,7 @@ def _with_faults(
 
 
 def _counts(options: argparse.Namespace) -> dict[str, int]:
-    """Return the number of cases by kind; ``real`` only where it was given."""
+    """Return the number of cases by kind, from ``--count``, else of ``--size``; ``real`` only if ``--count`` has it."""
     from thermal_robot.blind.plan import FULL, SHORT
 
     if not options.count:

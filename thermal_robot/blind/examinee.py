@@ -55,12 +55,12 @@ _ROUNDS = 3  # after which noise and fit agree to a per cent
 def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[str, Array]:
     """Predict samples with every subset of a model's effects, frames and effects refitted for each.
 
-    Of a part of the effects linear about the nominal robot, by least squares on the rows that were not set aside, with
-    the settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the
-    size that they have in it, the more so the more a subset leaves: what it leaves counts as noise, of positions and of
-    orientations apart. So the held-out shares of a diagnosis are defined, too. All effects together are the model.
+    Each fit is a ridge regression, linear about the nominal robot, on the rows that were not set aside, with the
+    settings of the whole diagnosis (time constants, places, quantities). The prior of an effect's parameters has the
+    size that they have in the diagnosis; the residual of a subset counts as noise, of positions and of orientations
+    apart. A diagnosis defines its held-out shares in the same way. For all effects the model itself predicts.
 
-    Returns (M, 3) positions in the measurement frame, m, by names joined with ``+``; nothing where there are more than
+    Returns (M, 3) positions in the measurement frame, m, by names joined with ``+``; empty where there are more than
     :data:`MOST` effects, or none.
     """
     model = found.model
@@ -86,7 +86,7 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
 
 
 def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
-    """Return the samples with dummy measurements, so that their columns are those of the campaign."""
+    """Return the samples with dummy measurements, so that their design matrix has the columns of the campaign's."""
     count = samples.samples
     turned = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)) if model.measures == "pose" else None
     read = {name: values for name, values in samples.covariates.items() if name in model.needs}
@@ -96,10 +96,10 @@ def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
 def _design(
     model: CorrectedModel, given: Observations, asked: Observations
 ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """Columns (N, m, K) and (M, 3, K) of frames and effects, priors of the effects' columns, and where each block ends.
+    """Design matrices (N, m, K) and (M, 3, K), prior precisions of the effects' columns, and the blocks' end indices.
 
-    A prior is one over the variance: a parameter is held to the rms of its effect's parameters, in units of their
-    expected sizes.
+    The blocks are the frames and each effect. The prior standard deviation of a parameter is its expected size times
+    the rms of its effect's fitted parameters over their expected sizes.
     """
     here, there, prior = [frame_columns(given)[0]], [frame_columns(asked)[0]], [np.zeros(0)]
     for effect, values in model.effects:
@@ -113,15 +113,15 @@ def _design(
 
 
 def _level(left: Array) -> Array:
-    """Rms (m/3,) per axis of positions and of orientations (N, m)."""
+    """Root mean square (m/3,) per axis of residuals (N, m): of positions, m, then of orientations, rad."""
     return np.asarray(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))))
 
 
 def _fitted(columns: Array, gap: Array, noise: Array, prior: Array) -> Array:
-    """Ridge regression (K,) with the noise and the residual of each kind estimated together.
+    """Coefficients (K,) by iteratively reweighted ridge regression.
 
-    (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad; ``prior`` is one over the
-    variance of the last columns, those of effects.
+    The weights of positions and of orientations follow from the rms of their residuals, at least the ``noise`` (m/3,),
+    m and rad. (N, m, K) columns and (N, m) gap; ``prior`` is the precision of the last columns, those of effects.
     """
     level = np.maximum(_level(gap), noise)
     for _ in range(_ROUNDS):
@@ -148,7 +148,7 @@ class Fence:
         self._folder = Path(os.path.realpath(folder))
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
-        """Deny access, if the event asks for a forbidden file."""
+        """Raise PermissionError if an event opens or lists a path in the directory but outside the allowed folder."""
         if event not in ("open", "os.listdir", "os.scandir") or not isinstance(arguments[0], (str, bytes, os.PathLike)):
             return
         # links are followed: one inside the folder could lead out of it
@@ -158,7 +158,7 @@ class Fence:
 
 
 def answer(request: dict[str, Any]) -> Plain:
-    """Diagnose a campaign and predict its fresh samples; any exception becomes the reply's error."""
+    """Diagnose the requested campaign(s) and predict a single one's fresh samples; an exception becomes the error."""
     folder, asks = Path(request["folder"]), request.get("asks", "diagnosis")
     reply: Plain = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
     at, start = asks, time.perf_counter()
@@ -190,7 +190,7 @@ def answer(request: dict[str, Any]) -> Plain:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Answer requests until there are no more."""
+    """Answer JSON requests on standard input, one a line, until it ends; always returns 0."""
     (directory,) = sys.argv[1:] if arguments is None else arguments
     # whatever a library prints goes to stderr, C code included: the replies have a channel of their own
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as replies:
@@ -209,19 +209,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def comparison(listed: Listed, only: Sequence[str] | None) -> Plain:
-    """Compare listed campaigns: ``thermal-robot/comparison/1``."""
+    """Compare listed campaigns; returns the comparison as plain values, format ``thermal-robot/comparison/1``."""
     names = [name for name, _ in listed.campaigns]
     return compare(*map(listed.folder, names), names=names, only=only).to_dict()
 
 
 def followed(listed: Listed, only: Sequence[str] | None) -> Plain:
-    """Diagnose the change over time of a robot from dated campaigns: ``thermal-robot/wear/1``."""
+    """Diagnose a robot's change over time from dated campaigns; returns plain values, ``thermal-robot/wear/1``."""
     date = listed.names.index("date")
     return wear([(labels[date], listed.folder(name)) for name, labels in listed.campaigns], effects=only).to_dict()
 
 
 def fleet(listed: Listed, only: Sequence[str] | None) -> Plain:
-    """Diagnose the robots of a fleet and summarise: ``thermal-robot/fleet/1``.
+    """Diagnose the robots of a fleet; returns the summary as plain values, format ``thermal-robot/fleet/1``.
 
     It is what :func:`~thermal_robot.diagnose_many` does, but within this process: those of Dask would stand outside
     the fence, and outlive an examinee that is ended.

@@ -77,49 +77,49 @@ _SILENT: dict[str, Any] = {
 
 
 def marks(record: Record) -> Marks:
-    """Score one record: answers by question, one or one for each effect found; unasked questions are missing."""
+    """Score one record: one or several true or false answers by question; all wrong if the diagnosis failed."""
     answers = _ASKED[record["kind"]](record)
     return {name: (name in BAD,) * len(given) for name, given in answers.items()} if failed(record) else answers
 
 
 def is_miss(record: Record) -> bool:
-    """Whether the main question of this kind of case is answered wrongly."""
+    """Whether the main question of this kind of case (:data:`HEADLINE`) is answered wrongly."""
     return not all(marks(record)[HEADLINE[record["kind"]]])
 
 
 def failed(record: Record) -> bool:
-    """Whether the diagnosis failed."""
+    """Whether the diagnosis of a record ended in an error or gave no answer."""
     return record.get("error") is not None or record.get("said") is None
 
 
 def said(record: Record) -> Plain:
-    """Diagnosis, or an empty one where it failed."""
+    """Diagnosis of a record as plain values, or one without any finding where it failed."""
     return _SILENT if failed(record) else record["said"]
 
 
 def at_work(record: Record) -> tuple[str, ...]:
-    """Effects at work, which are to be found."""
+    """Return the true effects of a case that the diagnosis is to find, without those of the background."""
     return tuple(record["truth"]["effects"])
 
 
 def found(record: Record) -> frozenset[str]:
-    """Effects that the diagnosis reports as found."""
+    """Effects to which the diagnosis gives the status ``found``."""
     return frozenset(e["name"] for e in said(record)["effects"] if e["status"] == "found")
 
 
 def ratio(record: Record, effect: str) -> float | None:
-    """Return the true size of an effect over the noise; ``None`` where it is absent or its size unknown."""
+    """Return an effect's residual rms over the noise, per axis; ``None`` where it is absent or its size unknown."""
     size = record["truth"].get("parts", {}).get(effect, {}).get("ratio")
     return None if size is None else float(size)
 
 
 def is_absent(record: Record, effect: str) -> bool:
-    """Whether an effect is not at work, nor in the background."""
+    """Whether an effect is not to be found, and leaves less than 0.1 of the noise in the background, too."""
     return effect not in at_work(record) and (ratio(record, effect) or 0.0) < ABSENT
 
 
 def first_named(record: Record) -> str | None:
-    """First effect of the verdict."""
+    """First effect of the verdict; ``None`` where it is empty."""
     return next(iter(said(record)["verdict"]["effects"]), None)
 
 
@@ -129,16 +129,16 @@ def unexplained(record: Record) -> bool:
 
 
 def corrects(record: Record) -> bool:
-    """Whether the corrected model holds an effect beside the frames: one named, with a shrinkage.
+    """Whether the corrected model holds an effect: one of the verdict that has a shrinkage.
 
-    Random effects are named, too, but no correction removes them.
+    Random effects are in the verdict, too, but no correction removes them, and they have none.
     """
     named = set(said(record)["verdict"]["effects"])
     return any(e["name"] in named and e.get("shrinkage") for e in said(record)["effects"])
 
 
 def is_right_law(record: Record, law: Plain) -> bool:
-    """Whether a law has the place, or a neighbour, and the quantity of a cause outside the library."""
+    """Whether a law's first place is that of the unlisted cause or beside it, and its quantity a right one as well."""
     truth = record["truth"]
     near = _sites(truth.get("near") or truth.get("places", ()))
     return any(site in near for site in _sites(law["locations"][:1])) and (
@@ -147,7 +147,7 @@ def is_right_law(record: Record, law: Plain) -> bool:
 
 
 def answer(record: Record) -> tuple[tuple[str, str] | None, str | None]:
-    """Place and quantity of the unknown cause: of a discovered law, else of the unexplained residual.
+    """Place and quantity that the diagnosis gives an unknown cause: its first law's, else the unexplained residual's.
 
     The quantity is ``none`` where an unexplained residual follows nothing.
     """
@@ -188,14 +188,14 @@ def _known(record: Record) -> Marks:
 
 
 def _mixed(record: Record) -> Marks:
-    """Score a case whose effects may be too small to be seen: only false alarms count."""
+    """Score a mixture, whose effects may be too small to find: nothing false found, or wrongly called unexplained."""
     right = {e["name"] for e in said(record)["effects"] if e["name"].startswith(LAW) and is_right_law(record, e)}
     extra, strange = _extra(record) - right, unexplained(record) and not record["truth"].get("unlisted")
     return _yes(sound=not extra and not strange, false_alarm=bool(extra))
 
 
 def _unknown(record: Record) -> Marks:
-    """Score a case with a cause outside the library, or removed from it."""
+    """Score a case whose cause is not in the library: flagged, nothing else blamed, right place and quantity."""
     flagged, blameless = unexplained(record), not _blamed(record)
     truth, (place, quantity) = record["truth"], answer(record)
     answers = _yes(flagged=flagged, not_blamed=blameless, right=flagged and blameless)
@@ -237,7 +237,7 @@ _HALL = "hall"
 
 
 def _compared(record: Record) -> Marks:
-    """Score a comparison of two campaigns, of the format ``thermal-robot/comparison/1``."""
+    """Score a comparison of two campaigns: true and false changes, and effects at work that are in the verdict."""
     truth, told = record["truth"], said(record)
     right, others = _true_and_false(truth, told["changes"])
     kept = set(truth["effects"]) <= set(told["verdict"]["effects"])
@@ -247,7 +247,7 @@ def _compared(record: Record) -> Marks:
 
 
 def _followed(record: Record) -> Marks:
-    """Score the result of a robot over time, of the format ``thermal-robot/wear/1``."""
+    """Score the answer on one robot over time: what changed, where, jump or trend, when and by how much."""
     truth, rings = record["truth"], [p for p in said(record)["parameters"] if p["alarm"]]
     right, others = _true_and_false(truth, rings)
     if not truth["changes"]:
@@ -268,14 +268,14 @@ def _followed(record: Record) -> Marks:
 
 
 def _true_and_false(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[Plain]]:
-    """Split reported changes into true and false ones."""
+    """Split reported changes into those whose effect and place are those of a true change, and all others."""
     true = {(c["effect"], c["place"]["name"]) for c in truth["changes"]}
     right = [one for one in told if (one["effect"], one["place"]) in true]
     return right, [one for one in told if one not in right]
 
 
 def _shared(record: Record) -> Marks:
-    """Score the summary of a fleet, of the format ``thermal-robot/fleet/1``."""
+    """Score the summary of a fleet: faults called shared, truly or falsely, and faults of single robots."""
     truth, told = record["truth"], said(record)
     called = [s for s in told["shared"] if not any(_same(s, true) for true in truth["shared"])]
     true_ones = {true["effect"] for true in truth["shared"]}
@@ -323,7 +323,7 @@ _ASKED: dict[str, Callable[[Record], Marks]] = {
 
 
 def true_words(truth: Plain) -> tuple[str, ...]:
-    """Truth of several campaigns in short words."""
+    """Return the true changes, shared faults and single robots' faults of several campaigns, in short words."""
     words = []
     for c in truth.get("changes", ()):
         day = "" if c["after"] is None else f", after campaign {c['after'] + 1}"
@@ -333,7 +333,7 @@ def true_words(truth: Plain) -> tuple[str, ...]:
 
 
 def said_words(kind: str, said: Plain) -> tuple[str, ...]:
-    """Answer on several campaigns in short words."""
+    """Return the changes, alarms or shared faults that the diagnosis of several campaigns reports, in short words."""
     if kind in ("same", "changed"):
         return tuple(f"{c['effect']}, {c['place'] or 'everywhere'}" for c in said["changes"])
     if kind in ("steady", "series"):

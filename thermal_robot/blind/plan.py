@@ -68,7 +68,7 @@ _FLEETS: tuple[How, ...] = ("all", "hall", "")
 
 
 def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Endless sequence of cases of one kind, cycling through these effects and unlisted causes.
+    """Yield the fields of cases of one kind without end; each cycle is a permutation of its effects or unlisted causes.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.rand
 
 
 def _menu(kind: str, effects: Sequence[str], causes: Sequence[str]) -> list[Asked]:
-    """Items of one cycle: every effect or cause as often as any other."""
+    """Fields of the cases in one cycle of a kind: one for each effect, pair of effects, unlisted cause or change."""
     # contained effects are no loss where the library keeps the container
     contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
     apart, local = _apart(effects), [name for name in LOCAL if name in effects]
@@ -152,9 +152,9 @@ def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tup
 
 
 def _mixture(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Asked:
-    """Draw each effect with its own probability, to calibrate probabilities.
+    """Draw the effects of a mixture independently, each with a probability of its own up to 0.3, and an unlisted cause.
 
-    Sets in which one contains another are drawn again.
+    Sets in which one effect contains another are drawn again.
     """
     while True:
         repeated = bool(rng.random() < REPEATED)
@@ -167,14 +167,14 @@ def _mixture(effects: Sequence[str], causes: Sequence[str], rng: np.random.Gener
 
 
 def _with_another(first: tuple[str, ...], always: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Add a constant effect in every second case, at random, unless the two are confounded."""
+    """Add, with probability one half, a random effect that all days share, unless it is present or confounded."""
     second = str(always[int(rng.integers(len(always)))])
     wanted = bool(rng.random() < 0.5)
     return first if not wanted or second in first or alike((*first, second)) else (*first, second)
 
 
 def _own(shared: tuple[str, ...], effects: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
-    """Draw faults of single robots of a fleet, no more of one kind than every arm has joints for."""
+    """Draw the names of two to four faults of single robots in a fleet; with the shared ones, at most two of a kind."""
     places = [name for name in LOCAL if name in effects for _ in range(PLACES - shared.count(name))]
     count = min(int(rng.integers(APART[0], APART[1] + 1)), len(places))
     return tuple(places[k] for k in rng.permutation(len(places))[:count])
@@ -185,7 +185,7 @@ def _holds(contents: Mapping[str, set[str]], chosen: Sequence[str]) -> bool:
 
 
 def alike(chosen: Sequence[str]) -> bool:
-    """Whether one effect contains another, or can nearly imitate it."""
+    """Whether any of the effects contains another of them, or nearly imitates it (:data:`IMITATES`)."""
     return _holds(CONTAINS, chosen) or _holds(IMITATES, chosen)
 
 
@@ -230,9 +230,9 @@ SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0,
 
 
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
-    """Robots with their URDF text.
+    """Load robots, and return each with the text of its URDF.
 
-    Of each a name, a URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and the tool frame.
+    ``chosen``: name, URDF (a path, ``builtin:`` or ``example-robot-data:`` and a name) and tool frame of each.
 
     Raises
     ------

@@ -51,7 +51,7 @@ _STILL = 1e-4  # rad: a joint that is told to move less does not arrive from any
 
 
 def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Campaign:
-    """Campaign with commands that hide a joint error: actual = command in the table + error.
+    """Campaign with a joint error put in by changing the commands: actual position = command in the table + error.
 
     A scalar or (N,), rad: a constant is a zero offset, a step a slip, −½ b·approach lost motion.
     """
@@ -73,9 +73,9 @@ def with_approaches(campaign: Campaign) -> Campaign:
 
 
 def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
-    """Campaign with elongated links, (N, S) of the nominal segments, whose temperature the table lacks.
+    """Campaign with positions shifted as by thermal elongation of the links, and without temperature columns.
 
-    Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
+    ``strains`` (S,), 1/K, of the nominal segments; ``warmer`` (N,), K above the temperature of the URDF's lengths.
     """
     robot, frames = campaign.robot, seen_in_position(campaign).frames
     along = np.array([np.append(s.direction * s.length, np.zeros(3)) for s in robot.segments])
@@ -88,7 +88,7 @@ def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
 
 
 def warm_up(rng: np.random.Generator, samples: int) -> Array:
-    """Return the simulated temperature (N,), kelvin above the start: warm-up, break, and warm-up again."""
+    """Draw a temperature rise (N,), K: first-order warm-up, a break, and warm-up again, to a maximum of 10 to 20 K."""
     passed = np.linspace(0.0, 1.0, samples)
     start, end = rng.uniform(0.35, 0.45), rng.uniform(0.55, 0.65)
     slow = rng.uniform(0.1, 0.25)
@@ -107,13 +107,13 @@ def seen_in_position(campaign: Campaign) -> Observations:
 
 
 def leaves(seen: Observations, shift: Array) -> float:
-    """Residual rms, m, of (N, 3) shifts in the root frame after registration."""
+    """Rms distance, m, of (N, 3) shifts in the root frame, after least-squares alignment of the unknown frames."""
     frames = orthonormal(equations_of(frame_columns(seen)[0]))
     return rms(without(shift.ravel(), frames).reshape(shift.shape))
 
 
 def measured(campaign: Campaign) -> Array:
-    """Measured positions; an error if there are none."""
+    """Measured positions (N, 3), m, of a campaign that has them."""
     return np.asarray(campaign.position)
 
 
@@ -125,9 +125,9 @@ CLAIM = (0.5, 1.25)  # rms reached over rms claimed
 
 
 def judged(fault: str, record: Record, control: Record | None, remainder: float) -> tuple[bool, str]:
-    """Whether the answer is right, and the answer in short words; see :meth:`RealCase.judge`.
+    """Whether the diagnosis is right by the rule of its fault (module's table), and the answer in short words.
 
-    The remainder is what a full geometry leaves of the campaign, rms distance, m.
+    The remainder is what a full geometry leaves of the campaign, rms distance, m. No diagnosis is wrong.
     """
     said = record.get("said")
     if said is None:
@@ -183,7 +183,10 @@ def _backlash(said: Record, truth: Record) -> tuple[bool, str]:
 
 
 def _unexplained(said: Record, truth: Record, kind: str) -> tuple[bool, str]:
-    """Whether a flagged residual names one of the true quantities and, where a kind is given, places."""
+    """Whether a residual is flagged, and it or one law has a true first quantity and, if a kind is given, place.
+
+    Also returns place and quantity in words.
+    """
     left = said["unexplained"]
     places = {(p["kind"], p["name"]) for p in truth["places"]}
     first = left["locations"][:1], [d["covariate"] for d in left["depends_on"][:1]]
@@ -273,13 +276,13 @@ class RealCase:
         return answers
 
     def judge(self, record: dict[str, Any], control: dict[str, Any] | None) -> dict[str, Any]:
-        """Record of this case with ``right`` and ``answer`` in short words; ``control`` is the unmodified one's."""
+        """Copy of a record with ``right`` and ``answer`` (:func:`judged`); ``control`` is the untouched campaign's."""
         right, answer = judged(self.fault, record, control, REMAINDERS[self.campaign])
         return {**record, "right": right, "answer": answer}
 
 
 def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCase, ...]:
-    """Cases of one trial, each after its control; missing campaigns are left out.
+    """Draw the real cases of a trial in random order, each after its control; missing campaigns are left out.
 
     At most ``count``, controls included; about sixteen where absent.
     """
@@ -307,7 +310,7 @@ def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCas
 
 
 def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
-    """Row limit of a quick diagnosis: every k-th row, or consecutive ones."""
+    """Take 600 to 1200 rows in order of measurement, every k-th from a random one on; all of a smaller campaign."""
     rows = in_order(campaign)
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 1])
     size = int(rng.integers(*_ROWS))
@@ -319,7 +322,7 @@ def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
 
 
 def _kept(samples: int, seed: int, name: str) -> NDArray[np.bool_]:
-    """Mask (N,) of training rows in whole runs, so that near-repeats are not split."""
+    """Draw the mask (N,) of rows held out from the diagnosis: four of twenty equal runs of consecutive rows."""
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 3])
     spell = np.arange(samples) * _SPELLS // samples
     return np.isin(spell, rng.choice(_SPELLS, _SPELLS // 5, replace=False))
@@ -329,7 +332,7 @@ Made = tuple[Campaign, Answers, str]
 
 
 def _truth(effect: str | None = None, ratio: float = 0.0, size: float = 0.0, joint: str = "") -> Answers:
-    """Truth of a case: the arm's geometric errors, and the added fault."""
+    """Right answers to a case: the arm's geometric errors, and the added effect with ratio, size (SI) and joint."""
     places = [{"kind": "joint", "name": joint}] if joint else []
     parts = {effect: {"ratio": ratio, "main": True, "places": places, "size": size}} if effect else {}
     effects = ["geometric", *parts]
@@ -344,7 +347,10 @@ def _nothing(campaign: Campaign, rng: np.random.Generator, remainder: float, ask
 def _joint_fault(
     campaign: Campaign, rng: np.random.Generator, remainder: float, fault: Fault, leaving: tuple[float, float]
 ) -> Made:
-    """Add an offset, backlash or a slip to one joint, which leaves a random multiple of the remainder."""
+    """Add an offset, backlash or a slip to an inner joint; its rms over the remainder is drawn between ``leaving``.
+
+    Returns the campaign, the right answers, and the fault in words.
+    """
     joint = int(rng.integers(1, campaign.robot.n - 2))
     name = campaign.robot.joint_names[joint]
     shape = np.ones(campaign.samples)

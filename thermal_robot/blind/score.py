@@ -120,13 +120,13 @@ def rate(successes: int, trials: int) -> Plain:
 
 
 def counted(outcomes: Iterable[bool]) -> Plain:
-    """Rate of true outcomes."""
+    """Proportion of outcomes that are true, with its Wilson interval (:func:`rate`)."""
     told = [bool(outcome) for outcome in outcomes]
     return rate(sum(told), len(told))
 
 
 def _tally(answers: Iterable[tuple[str, str, bool | None]]) -> dict[str, dict[str, Plain]]:
-    """Rates of answers by group, in alphabetical order, and question; ``None`` asks without an answer."""
+    """Rates of right answers by group (alphabetical) and question; ``None`` lists a question without a trial."""
     table = pd.DataFrame(answers, columns=["group", "question", "right"]).astype({"right": float})
     counts = table.groupby(["group", "question"], sort=False)["right"].agg(["sum", "count"])
     return {
@@ -184,7 +184,7 @@ def _miss(record: Record) -> Plain:
 
 
 def _told(record: Record) -> Plain:
-    """Effects at work and named, place and quantity of the unexplained residual, and the verdict's probability."""
+    """Return the true effects and the verdict: effects, place and quantity of an unexplained residual, probability."""
     if record["kind"] in SEVERAL:
         words = {"truth": list(true_words(record["truth"])), "said": list(said_words(record["kind"], said(record)))}
         return {**words, "unexplained": None, "probability": None}
@@ -202,12 +202,11 @@ def _told(record: Record) -> Plain:
 def coverage(records: Sequence[Record]) -> Plain:
     """Coverage of 95 % intervals: how often the truth lies inside, over all records but real ones.
 
-    ``parameters``: where exactly what is at work was found, and nothing is unexplained, as of a wrong model no
-    parameter is right; those that are identified and whose true value is known, value ± 1.96 standard deviations.
-    Those of one effect do not err independently: the rate's own interval is too narrow.
-    ``shrinkage``: where something is named that a correction takes away, the held-out shrinkage against that on fresh
-    rows, both with the noise in them. ``shares``: each named effect's, against its Shapley value on fresh rows
-    (:mod:`thermal_robot.blind.examinee`).
+    ``parameters``: value ± 1.96 standard deviations of identified parameters with a known true value, where exactly the
+    effects at work were found and nothing is unexplained, as a wrong model has no right parameters. Those of one effect
+    do not err independently: the rate's own interval is too narrow. ``shrinkage``: held-out shrinkage against that on
+    fresh rows, both with the noise in them, where a correctable effect is named. ``shares``: that of each effect found,
+    against its Shapley value on fresh rows (:func:`shares`).
     """
     told = [r for r in records if not failed(r) and r["kind"] != "real"]
     parts = {"parameters": _parameters, "shrinkage": _shrinkage, "shares": _shares}
@@ -262,14 +261,17 @@ _VISIBLE = 0.5  # × noise per axis: where the gap before is less, a share of it
 
 
 def shrinkage(records: Sequence[Record]) -> Plain:
-    """Shrinkage claimed from held-out rows and reached on fresh samples, with the median difference."""
+    """Pairs of shrinkage claimed from held-out rows and reached on fresh samples, and median absolute difference."""
     pairs = [pair for record in records for pair in _pair(record)]
     apart = [abs(pair["claimed"] - pair["real"]) for pair in pairs]
     return {"pairs": pairs, "median_absolute_difference": float(np.median(apart)) if apart else None}
 
 
 def _pair(record: Record) -> Iterator[Plain]:
-    """Ratios of mean squares, the noise subtracted; on real campaigns with the noise, as fresh rows contain it."""
+    """Yield claimed and real shrinkage, 1 − mean square after / before, without noise; of real campaigns with it.
+
+    Nothing without fresh samples, or where the rms gap is below half the noise.
+    """
     fresh = record.get("fresh")
     if failed(record) or not fresh or not fresh["rms_before"] or record.get("noise") is None:
         return
@@ -344,7 +346,7 @@ NOTHING, UNLISTED, UNEXPLAINED, FAILED = "nothing", "unlisted", "unexplained", "
 
 
 def confusion(records: Sequence[Record], kinds: Sequence[str]) -> Plain:
-    """Confusion matrix of truths and first-named effects, over cases of some kinds.
+    """Confusion matrix (counts) of truths and first-named effects, over cases of some kinds.
 
     Rows are effects, ``nothing``, ``unlisted``; columns the rows' effects, then others, ``nothing``, ``unexplained``,
     ``failed``. Of several effects at work the first of the truth's list is the row. A discovered law counts as
@@ -384,9 +386,9 @@ _POINTS = 41
 
 
 def detection(records: Sequence[Record]) -> Plain:
-    """Return the detection rates by size, by rows, by both, and the fitted curve, over cases with one effect.
+    """Return detection rates by bins of size over noise, of rows and of both, and the fitted :func:`logistic` curve.
 
-    A case whose size is unknown does not count. ``table`` has one row for each step of the ratio.
+    Over cases with one effect of known size. ``table`` has one row for each bin of the size.
     """
     one = [(ratio(r, e), r["samples"], e in found(r)) for r in records if r["kind"] in _DETECTED for e in at_work(r)]
     size, rows, hit = np.array([case for case in one if case[0]], dtype=float).reshape(-1, 3).T
@@ -460,11 +462,11 @@ def _needed(a: float, b: float, c: float, size: float) -> float | None:
 def shares(
     predicted: Mapping[str, Sequence[Sequence[float]]], true: Sequence[Sequence[float]], noise: float
 ) -> dict[str, float]:
-    """Shapley value of what each effect takes away of the gap's mean square, as a share of it.
+    """Shapley value of each effect's reduction of the gap's mean square, as a share of that mean square.
 
-    Predicted are, for every subset by its names joined with ``+``, (M, 3) positions, m, with the frames and this subset
-    fitted to the given rows; true is where the target really is; the noise, one sigma per axis, m, is in the gap that
-    is shared, as in the claim. The sum is what all effects together take away; empty without subsets.
+    ``predicted``: (M, 3) positions, m, by every subset's names joined with ``+``, frames and this subset being fitted;
+    ``true``: positions without noise; ``noise``: one sigma per axis, m, which counts in the mean square, as in the
+    claim. The sum is what all effects together take away; empty without subsets.
     """
     left = {
         frozenset(filter(None, name.split("+"))): float(((np.asarray(rows) - true) ** 2).sum(axis=1).mean())

@@ -23,11 +23,11 @@ _KEPT = ("PATH", "HOME", "LD_LIBRARY_PATH")  # a Pinocchio that came with ROS or
 
 
 class Lost(Exception):
-    """An examinee gave no answer; says why."""
+    """Error: an examinee process ended, timed out or replied no JSON; the message says which."""
 
 
 class Examinee:
-    """One examinee process for the trial in a directory."""
+    """Subprocess that diagnoses campaigns of the trial in a directory, one request at a time."""
 
     def __init__(self, directory: Path) -> None:
         self._complaints = tempfile.TemporaryFile()
@@ -51,7 +51,7 @@ class Examinee:
             raise RuntimeError(f"the examinee does not start: {why}") from None
 
     def ask(self, request: Mapping[str, Any], timeout: float) -> dict[str, Any]:
-        """Send a request and return the reply; :class:`Lost` if it ends or exceeds the timeout (s)."""
+        """Send a request and return the reply; :class:`Lost` if the process ends, times out (s) or replies no JSON."""
         assert self._process.stdin
         try:
             self._process.stdin.write(json.dumps(request) + "\n")
@@ -106,12 +106,12 @@ class Examinee:
 
 
 def command(directory: Path) -> list[str]:
-    """Command line of an examinee."""
+    """Command line that starts an examinee for the trial in a directory."""
     return [sys.executable, "-m", "thermal_robot.blind.examinee", str(directory.resolve())]
 
 
 def environment() -> dict[str, str]:
-    """Environment variables of an examinee: program, libraries, one core."""
+    """Environment variables of an examinee: search paths of programs, libraries and this package, one OpenMP thread."""
     root = Path(__file__).resolve().parents[2]
     # a checkout is found by PYTHONPATH; an installed package must not be, since it would stand before Python's own
     own = [] if root.name in ("site-packages", "dist-packages") else [str(root)]
@@ -123,10 +123,10 @@ def environment() -> dict[str, str]:
 def examine(
     requests: Mapping[str, Mapping[str, Any]], directory: Path, *, workers: int, timeout: float
 ) -> Generator[tuple[str, dict[str, Any]], None, None]:
-    """Answer requests, by name of the case, with several examinees in parallel, each within the timeout, s.
+    """Send requests, by name of the case, to examinee processes in parallel, and yield each name with its reply.
 
-    Yields name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving
-    the loop early ends all of them.
+    Replies come as they are ready. A process that ends or exceeds the timeout (s) is replaced, and an error stands in
+    for its reply. Leaving the loop early ends all processes.
     """
     idle: SimpleQueue[Examinee] = SimpleQueue()
     started: list[Examinee] = []

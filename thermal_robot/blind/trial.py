@@ -33,7 +33,7 @@ KEY_BYTES = 32
 def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
     """Encrypt answers with a stream cipher, and return their commitment: SHA-256 of key and text, in hexadecimal.
 
-    The text, :func:`canonical` JSON, is added to a keystream that SHAKE-256 draws from the 32 random bytes of the key.
+    The text, :func:`canonical` JSON, is XORed with a keystream that SHAKE-256 makes of the 32 random bytes of the key.
     The key stays in the memory of the process that made the answers: without it the file tells only its length. A key
     must serve once, since two texts under one keystream would betray their difference. The commitment says that the
     answers were fixed when it was told: nobody finds another text, or another key, with the same hash.
@@ -70,7 +70,7 @@ def canonical(value: Any) -> bytes:
 
 
 def _cipher(text: bytes, key: bytes) -> bytes:
-    """Stream cipher; applied twice it gives the text back."""
+    """XOR of a text with the SHAKE-256 keystream of a key; applied twice it gives the text back."""
     stream = hashlib.shake_256(key).digest(len(text))
     both = int.from_bytes(text, "big") ^ int.from_bytes(stream, "big")
     return both.to_bytes(len(text), "big")
@@ -99,7 +99,7 @@ def run_trial(
     sealed: Callable[[str], None] = lambda _: None,
     timeout: float = 600.0,
 ) -> list[Plain]:
-    """Run a trial, or resume one.
+    """Run a trial: make campaigns, seal the answers, diagnose, open and judge; or resume one that was stopped.
 
     Campaigns are made in processes that are started anew, so a script must call this under
     ``if __name__ == "__main__"``. A trial that is taken up again makes them all once more, which gives the same files,
@@ -163,7 +163,7 @@ def run_trial(
 
 
 def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, Any] | None) -> Plain:
-    """Record of a case, its truth and its reply."""
+    """Merge a case, its true answers and its reply into one record; without a reply, the reason of its withdrawal."""
     asked: Plain = {"id": case.id, "kind": case.kind}
     if isinstance(case, Case):
         asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
@@ -191,7 +191,7 @@ def _request(case: Case | RealCase, folder: Path) -> Plain:
 
 
 def _identity(cases: Sequence[Case | RealCase]) -> Plain:
-    """Identity of this trial, which reveals nothing that is drawn."""
+    """Identity of a trial: program version and digest, hash of the cases, number of cases by kind, robots' names."""
     from thermal_robot import __version__
 
     if len({case.id for case in cases}) < len(cases) or not cases:
@@ -209,7 +209,7 @@ def _identity(cases: Sequence[Case | RealCase]) -> Plain:
 
 
 def _take(folder: Path, identity: Plain) -> None:
-    """Claim a directory that is empty or holds this trial."""
+    """Claim a directory that is empty or holds the trial of this identity; raises ThermalRobotError for any other."""
     file = folder / PLAN
     if file.is_file():
         try:
@@ -237,7 +237,7 @@ def _make_all(
     workers: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[dict[str, Plain], dict[str, str]]:
-    """Generate all campaigns; return their answers, and a digest of each one's files."""
+    """Generate all campaigns in worker processes; return answers and SHA-256 of the files by case, "" if withdrawn."""
     answers, made = {}, {}
     pool = ProcessPoolExecutor(min(workers, len(cases)), get_context("spawn"), _quiet)
     try:
@@ -278,9 +278,9 @@ def _make_one(case: Case | RealCase, folder: Path, make: Make | None) -> tuple[P
 
 
 def _read_replies(path: Path, made: Mapping[str, str]) -> dict[str, Plain]:
-    """Read the replies that belong to the present campaigns.
+    """Read the replies of an earlier run whose campaign has the same digest as the present one.
 
-    Where a file was made on another machine, a campaign may differ in its last digits from what was diagnosed.
+    Digests differ in campaigns that were made on another machine, by the last digits of their numbers.
     """
     if not path.is_file():
         return {}

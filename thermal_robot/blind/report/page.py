@@ -60,7 +60,7 @@ _GROUPS = {
 def confusion_figure(score: Plain, which: str = "single") -> Figure:
     """Draw the confusion matrix of true and first-named effects.
 
-    Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
+    Numbers are cases; the stronger the colour, the larger their share of the row; the right answer is framed.
     """
     table = score["confusion"].get(which)
     if table is None:
@@ -95,7 +95,7 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
 
 
 def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
-    """Square in a colour through which the page shows, so that it is right on a dark one, too."""
+    """Square of a confusion matrix: opacity is the share of the row, a dark frame marks the right answer."""
     edge, width, order = (INK, 1.0, 2.0) if right else (FAINT, 0.5, 1.0)
     corner = column - 0.5, line - 0.5
     return Rectangle(corner, 1.0, 1.0, facecolor=(AFTER, share), edgecolor=edge, linewidth=width, zorder=order)
@@ -163,7 +163,7 @@ def _error(calibration: Plain) -> str:
 
 
 def shrinkage_figure(score: Plain) -> Figure:
-    """Draw the ratio of mean squares on fresh samples against the ratio that the diagnosis claims."""
+    """Scatter the remaining share of the gap's mean square on fresh samples against the claimed one, log-log."""
     pairs = score["shrinkage"]["pairs"]
     if not pairs:
         return _empty("How far the gap shrinks", "No case has fresh samples.")
@@ -212,8 +212,8 @@ _LAST = 1.5  # times the lower bound: where a step without an upper one ends in 
 def power_figure(score: Plain) -> Figure:
     """Draw the power of the diagnosis against effect size and number of rows.
 
-    Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower and
-    the upper quartile of the other quantity.
+    Points: detection rate of the cases in one bin, with 95 % bars and their number; lines: the logistic curve fitted to
+    all cases, at the lower and the upper quartile of the other quantity.
     """
     detection = score["detection"]
     figure = Drawing(BROAD, 4.0)
@@ -271,7 +271,7 @@ def html(score: Plain, generated: str) -> str:
 
 
 def _groups(heading: str, groups: Plain, columns: Sequence[str]) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading, column names and rows of a table of rates, false alarms among them."""
+    """Heading, column names and rows of a table of rates by group, with the columns that any group has."""
     asked = [q for q in dict.fromkeys((*columns, "false_alarm")) if any(q in rates for rates in groups.values())]
     rows = [(group, *(_share(rates.get(q)) for q in asked)) for group, rates in groups.items()]
     return heading, ("", *map(text.question, asked)), rows

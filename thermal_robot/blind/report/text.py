@@ -98,12 +98,12 @@ def effect(name: str) -> str:
 
 
 def count(rate: Plain) -> str:
-    """Format ``20 of 22``."""
+    """Format a rate as ``20 of 22``, successes of trials."""
     return f"{rate['successes']} of {rate['trials']}"
 
 
 def interval(rate: Plain) -> str:
-    """95 % interval of a rate in per cent; empty without trials."""
+    """Format the 95 % interval of a rate in per cent; empty text without trials."""
     return f"{units.interval(rate['interval'])} %" if rate["interval"] else ""
 
 
@@ -113,12 +113,12 @@ def lost(score: Plain) -> str:
 
 
 def left(of: Plain) -> str:
-    """Residual on fresh samples, rms per axis over the noise, of the cases of one kind, in words."""
+    """Median and 90 % quantile, in words, of the rms per axis over the noise on fresh samples, of cases of one kind."""
     return f"{of['fresh']['median']:.2f} in the median, 90 % below {of['fresh']['q90']:.2f}"
 
 
 def step(bounds: Plain) -> str:
-    """Bounds of a step in words: ``0.5 to 0.7``, ``200 and more``."""
+    """Bounds of a bin in words: ``0.5 to 0.7``, ``200 and more``."""
     low, high = bounds["low"], bounds["high"]
     return f"{low:g} and more" if high is None else f"{low:g} to {high:g}"
 
@@ -136,7 +136,7 @@ def needed(curve: Plain, wanted: Plain) -> str:
 
 
 def coefficients(curve: Plain) -> str:
-    """Return the detection curve: coefficients with their standard deviations."""
+    """Format the logistic detection curve in ln size and ln rows: coefficients with their standard deviations."""
     names = ("ln size", "ln rows")
     terms = (
         f"({curve[k]:.2g} ± {std:.1g}) {n}"
@@ -146,7 +146,7 @@ def coefficients(curve: Plain) -> str:
 
 
 def facts(score: Plain) -> tuple[tuple[str, str], ...]:
-    """Single figures by name."""
+    """Names and texts of the score's single figures that have trials: calibration, shrinkage, laws, coverage, time."""
     all_, sure = score["calibration"]["all"], score["calibration"]["doubtful"]
     gap, time, held = score["shrinkage"], score["seconds"], score["coverage"]
     said = []
@@ -320,7 +320,7 @@ def _detection(detection: Plain) -> Iterator[str]:
 
 
 def _both(detection: Plain) -> Iterator[str]:
-    """Return the detection by both size and rows, where there are several of both."""
+    """Yield the lines of a table of detections by size and rows; none unless cases fill two bins or more of each."""
     table = detection["table"]
     lines = [k for k, row in enumerate(table) if any(rate["trials"] for rate in row)]
     columns = [m for m in range(len(detection["samples"])) if any(row[m]["trials"] for row in table)]
