@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def check(options: argparse.Namespace) -> None:
-    """Read a campaign, or a log of motion, and describe it."""
+    """Run ``check``: read a campaign or a log of motion, and print its description; no effect is fitted."""
     from thermal_robot.motion.read import declares_motion
 
     if not declares_motion(Path(options.campaign)):
@@ -38,7 +38,7 @@ def check(options: argparse.Namespace) -> None:
 
 
 def _foretold(campaign: Campaign) -> str:
-    """Describe a campaign, with what a diagnosis would say of it before anything is fitted."""
+    """Describe a campaign, and what a diagnosis says before it fits: rows that count, misfit, effects not testable."""
     from thermal_robot.diagnosis.data_checks import counted
     from thermal_robot.diagnosis.data_faults.misfit import mismatch
     from thermal_robot.inference.fit import require_enough
@@ -93,7 +93,7 @@ def effects(options: argparse.Namespace) -> None:
 
 
 def diagnosed(options: argparse.Namespace) -> Diagnosis | Any:
-    """Diagnose the campaign or the log of motion that was named, telling the stages."""
+    """Read and diagnose the named campaign or log of motion, with progress by stages on the console."""
     from thermal_robot import diagnosing
 
     with stages(options.loudness) as progress:
@@ -103,7 +103,10 @@ def diagnosed(options: argparse.Namespace) -> Diagnosis | Any:
 
 
 def diagnose(options: argparse.Namespace) -> None:
-    """Diagnose a campaign or a log of motion, print the result and write what is asked for."""
+    """Run ``diagnose``: diagnose a campaign or a log of motion, print the result and write the requested files.
+
+    :class:`CampaignError` after that if no corrected model can be had of the campaign.
+    """
     from thermal_robot.motion.read import declares_motion
     from thermal_robot.report import html
 
@@ -145,7 +148,7 @@ def _diagnose_motion(options: argparse.Namespace) -> None:
 
 
 def demo(options: argparse.Namespace) -> None:
-    """Run ``demo``: diagnose the demo's campaign, print and draw it."""
+    """Run ``demo``: diagnose the simulated campaign of the package, print the result and write its page."""
     from thermal_robot.report import html
 
     options.campaign = demo_directory()
@@ -157,7 +160,7 @@ def demo(options: argparse.Namespace) -> None:
 
 
 def crash(options: argparse.Namespace) -> None:
-    """Run ``crash``: find what moved, print it and write the requested file."""
+    """Run ``crash``: find which joint zero or link a crash moved, print it and write the requested JSON file."""
     from thermal_robot.diagnosis.crash import after_crash
     from thermal_robot.report import crash_headline
 
@@ -168,7 +171,7 @@ def crash(options: argparse.Namespace) -> None:
 
 
 def iso9283(options: argparse.Namespace) -> None:
-    """Run ``iso9283``: compute the criteria, print them and write the requested files."""
+    """Run ``iso9283``: compute the standard's performance criteria from repeats, print and write them."""
     from thermal_robot.iso9283 import performance
 
     require_free((options.json, options.csv), read_from(options.campaign, Path() if options.piped else None))
@@ -178,7 +181,7 @@ def iso9283(options: argparse.Namespace) -> None:
 
 
 def view(options: argparse.Namespace) -> None:
-    """Run ``view``: serve the scene until interrupted."""
+    """Run ``view``: serve a 3-D scene of robot and gap to the browser until interrupted; needs viser."""
     try:
         import viser  # noqa: F401
     except ImportError as error:

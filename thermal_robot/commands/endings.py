@@ -14,7 +14,7 @@ from thermal_robot.errors import CampaignError
 
 @dataclass(frozen=True)
 class Form:
-    """Format of a file.
+    """Format of an output file: its name in messages, and the endings that it may have.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ _TAKEN = {ending for form in FORMS.values() for ending in form.endings}
 
 
 def require_endings(options: argparse.Namespace) -> None:
-    """Refuse a file whose ending is not of the format that its option writes; a name without ending is taken.
+    """Refuse a file whose ending is not of the format that its option writes; a name without ending is accepted.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def require_endings(options: argparse.Namespace) -> None:
 
 
 def _require(module: str, file: str, ending: str) -> None:
-    """Import what writing a file needs; refuse it where that is not installed, or lacks a library of the system."""
+    """Import a module that writing a file needs; CampaignError if it, or a system library of its, is not installed."""
     try:
         import_module(module)
     except ImportError as error:

@@ -12,7 +12,7 @@ from thermal_robot.robot import ENDS, load_robot
 
 
 def plan(options: argparse.Namespace) -> None:
-    """Run ``plan``: plan a campaign, write it, and print the expected precision."""
+    """Run ``plan``: plan a campaign by optimal design, write it if asked, and print the expected precision."""
     from thermal_robot.effects import KINEMATIC
     from thermal_robot.planning import plan, text, write_plan
     from thermal_robot.planning.plan import CRASH_ROWS, ROWS
@@ -40,7 +40,7 @@ def plan(options: argparse.Namespace) -> None:
 
 
 def import_files(options: argparse.Namespace) -> None:
-    """Run ``import``: import files and report what was read and left out."""
+    """Run ``import``: convert files of another program into a campaign or motion log, and print what was read."""
     from thermal_robot.campaign.importers.plan import Plan, planned, read_mapping
     from thermal_robot.campaign.importers.run import import_files
     from thermal_robot.motion.importers import MOTION_FORMATS
@@ -75,7 +75,7 @@ def _import_motion(options: argparse.Namespace) -> None:
 
 
 def paper(options: argparse.Namespace) -> None:
-    """Run ``paper``: print or write the ledger."""
+    """Run ``paper``: print or write the table of the paper's figures beside the computed ones."""
     from thermal_robot.paper import PaperInputs, ledger
 
     found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))

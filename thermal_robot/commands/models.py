@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def predict(options: argparse.Namespace) -> None:
-    """Run ``predict``: predict a table of samples and write it."""
+    """Run ``predict``: write a table of samples with the positions that a corrected model predicts."""
     require_free((options.output,), (options.model, options.samples))
     model = CorrectedModel.load(options.model)
 
@@ -59,7 +59,7 @@ def _table(
     file: str,
     filled: Callable[[pd.DataFrame, Campaign], pd.DataFrame],
 ) -> Output:
-    """Return the samples in a file, completed by the model's defaults."""
+    """Return the output that writes a file's table completed by ``filled`` with predictions or commands."""
     read = read_table(Path(file))
     samples = model.samples(read)
     _tell_unseen(options, model, samples, Path(file).name)
@@ -68,7 +68,7 @@ def _table(
 
 
 def _tell_unseen(options: argparse.Namespace, model: CorrectedModel, samples: Campaign, file: str) -> None:
-    """Note where the order of rows counts anew, or a session is unknown to the model."""
+    """Print a note if samples restart the order of rows, follow it, or lack or have new levels of a label."""
     if model.counts_anew(samples):
         note(f"order in {file} counts its own rows; predicted as after the campaign", options.loudness)
     if model.follows_rows(samples):

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 def motion_files(options: argparse.Namespace, found: MotionDiagnosis) -> list[Output]:
-    """Return each robot file that was asked for (``--mjcf``, ``--urdf``), and say what it holds and what it cannot.
+    """Return the outputs of ``--mjcf`` and ``--urdf`` with the causes found; print what each holds and cannot hold.
 
-    The MJCF is that of ``--from-mjcf``, else the one that the log names, else a translation of its URDF. ``--unseen``
-    names a log of other motions, and how far MuJoCo's own rollout shrinks their gap is said.
+    The MJCF is that of ``--from-mjcf``, else the one that the log names, else a translation of its URDF. Of a log of
+    other motions, ``--unseen``, the shrinkage of the gap in MuJoCo's own rollout is printed.
     """
     from thermal_robot.motion.write import motion_mjcf, motion_urdf
 
@@ -48,7 +48,7 @@ def motion_files(options: argparse.Namespace, found: MotionDiagnosis) -> list[Ou
 
 
 def _own_mjcf(options: argparse.Namespace, found: MotionDiagnosis) -> Path | str:
-    """Return the user's own MJCF, or a translation of the URDF."""
+    """Return the path of the MJCF of ``--from-mjcf`` or of the log's declaration, else MJCF text made of the URDF."""
     from thermal_robot.correction import mjcf_of_urdf
 
     if options.from_mjcf:

@@ -38,7 +38,7 @@ _MOST = 12
 
 
 def require_of_use(options: argparse.Namespace) -> None:
-    """Refuse an option that affects no requested file."""
+    """Raise CampaignError for an option that affects no requested file, naming those that it is of use with."""
     for name, outputs in _OF_USE_WITH.items():
         given = getattr(options, name)
         if given is not None and given is not False and not any(getattr(options, output) for output in outputs):
@@ -48,7 +48,10 @@ def require_of_use(options: argparse.Namespace) -> None:
 
 
 def robot_files(options: argparse.Namespace, model: CorrectedModel) -> tuple[list[Output], str]:
-    """Contents of the requested files of the calibrated robot, and what is said of them."""
+    """Compute the requested files of the calibrated robot; returns their outputs, and the text that describes them.
+
+    :class:`CampaignError` for options that exclude each other, or without the file that ``--lerobot`` needs.
+    """
     if options.alone and (options.min_sigma is not None or options.temperature is not None):
         problem = "takes what was fitted alone, all of it and at the reference temperature"
         raise CampaignError("--alone", problem, expected="neither --min-sigma nor --temperature beside it")
@@ -78,7 +81,10 @@ def robot_files(options: argparse.Namespace, model: CorrectedModel) -> tuple[lis
 
 
 def _min_sigma(options: argparse.Namespace, model: CorrectedModel) -> float | None:
-    """Return the standard deviations from zero that a file asks for: 0 of the user's asks for all."""
+    """Return how many standard deviations from zero a parameter must be to be written; ``None`` writes all.
+
+    As ``--min-sigma`` says, 0 for all; else 2 if the model has covariances; with ``--alone`` always all.
+    """
     if options.alone:
         return None
     if options.min_sigma is None:
@@ -95,7 +101,7 @@ def _of_files(options: argparse.Namespace, robot: to.Calibrated, names: Iterable
 
 
 def _of_parameters(robot: to.Calibrated) -> Iterator[str]:
-    """Yield which parameters are worth applying, which are left out, and which no file can hold."""
+    """Yield the lines that list parameters worth applying, those left out as too weak, and those no file can hold."""
     if robot.alone:
         return
     worth = f", {robot.min_sigma:g} standard deviations from zero" if robot.min_sigma else ""

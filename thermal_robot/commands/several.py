@@ -15,7 +15,7 @@ PAGE, SUMMARY = "fleet.html", "fleet.json"
 
 
 def compare(options: argparse.Namespace) -> None:
-    """Compare campaigns, print the result and write what is asked for."""
+    """Run ``compare``: compare campaigns, models or logs of motion, print the result and write the requested files."""
     from thermal_robot.diagnosing import compare
     from thermal_robot.fleet.compare_sums import is_model
     from thermal_robot.motion.read import declares_motion, files_of
@@ -33,7 +33,7 @@ def compare(options: argparse.Namespace) -> None:
 
 
 def wear(options: argparse.Namespace) -> None:
-    """Run ``wear``: analyse changes over time, print them and write the requested files."""
+    """Run ``wear``: find changes of one robot's parameters over campaigns in order of time, print and write them."""
     from thermal_robot.fleet.wear import wear
 
     files = [file for one in options.campaigns for file in read_from(one)]

@@ -21,7 +21,7 @@ Output = tuple[str | None, Callable[[Path], object]]
 
 
 def tell(options: argparse.Namespace, text: str, brief: str = "") -> None:
-    """Print a text, or its short form under ``-q``; nothing where a file is printed instead."""
+    """Print a text, or its short form under ``-q``; nothing where a requested file goes to standard output instead."""
     said = brief if options.loudness == QUIET else text
     if said and not options.printed:
         print(said)
@@ -42,7 +42,7 @@ def deliver(options: argparse.Namespace, outputs: Sequence[Output], text: str = 
 
 
 def as_json(target: str | None, plain: Any) -> Output:
-    """Output of plain values as JSON."""
+    """Output (file name, writer) of plain values as indented JSON; ValueError for NaN or infinity."""
     text = json.dumps(plain, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return target, lambda path: write_text(path, text)
 
@@ -54,7 +54,7 @@ def as_page(
     files: Iterable[Path] = (),
     name: Callable[..., str] = str,
 ) -> Output:
-    """Output of a page, PDF by its ending, with the time and the SHA-256 of its input files in the footer."""
+    """Output (file name, writer) of an HTML or PDF page, with time and SHA-256 of its input files in the footer."""
 
     def write(path: Path) -> None:
         # a pipe was read once, and is no file
@@ -70,7 +70,7 @@ def read(options: argparse.Namespace) -> Campaign:
 
 
 def read_from(campaign: str | Path, folder: Path | None = None) -> list[Path]:
-    """Input files of a campaign."""
+    """Input files of a campaign: its declaration, its table and, where it names a file, its URDF."""
     declaration = read_declaration(Path(campaign), folder)
     robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
     return [declaration.file, declaration.table, *robot]

@@ -26,7 +26,7 @@ _LAST_PORT = 65535
 
 
 class Option(NamedTuple):
-    """Arguments of ``add_argument``, whether it is an input or output file that may be ``-``, and which it writes."""
+    """Arguments of ``add_argument`` for one option; ``stream`` ``in`` or ``out`` for a file that may be ``-``."""
 
     names: tuple[str, ...]
     how: dict[str, Any]
@@ -37,7 +37,7 @@ class Option(NamedTuple):
 
 @dataclass(frozen=True)
 class Command:
-    """One command of the program.
+    """One command of the program: its help text, its options and the function that it runs.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Command:
     prepare
         Called with the options before streams are opened.
     fixed
-        Options that nobody asks for.
+        Values of options that the command line does not have, but the action reads.
     define
-        Defines options and what is run instead of the above.
+        Adds the arguments and sets the action, instead of ``run``, ``options``, ``prepare`` and ``fixed``.
     """
 
     does: str
@@ -65,7 +65,7 @@ class Command:
     define: Callable[[argparse.ArgumentParser], None] | None = None
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Define the options and the action."""
+        """Add the command's options to its parser; set its action, and which options name files to read or write."""
         if self.define:
             self.define(parser)
             return
@@ -81,7 +81,7 @@ class Command:
 
 
 def _taken_back(options: argparse.Namespace) -> Iterator[str]:
-    """Yield campaigns that `--only a b campaign.toml` took for effect names, the last first."""
+    """Remove from ``--only`` and ``--without`` and yield trailing names that are files or ``-``, the last first."""
     for names in (options.only, options.without):
         while names and (names[-1] == "-" or Path(names[-1]).exists()):
             yield names.pop()
@@ -102,7 +102,7 @@ def _need_two(options: argparse.Namespace) -> None:
 
 
 def _port(text: str) -> int:
-    """Parse a port number; 0 asks for any free one."""
+    """Parse a port number, 0 (any free port) to 65535; ArgumentTypeError for anything else."""
     if not text.isascii() or not text.isdigit() or int(text) > _LAST_PORT:
         raise argparse.ArgumentTypeError(f"{text!r} is no port; expected a number from 0, for any, to {_LAST_PORT}")
     return int(text)

@@ -32,7 +32,7 @@ _SHOWN = (
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run ``map``: map the workspace, draw it, and print the best places."""
+    """Run ``map``: compute or continue the map of a workspace, draw it, and print the best places by one column."""
     robot = load_robot(options.robot, options.tool, root_frame=options.root)
     within = dict(_rule(rule) for rule in options.where)
     with counted(options.loudness) as show:
@@ -76,7 +76,7 @@ def _question(options: argparse.Namespace) -> Question:
 
 
 def _numbers(name: str, given: list[str]) -> float | dict[str, float]:
-    """Parse one number, or numbers by name."""
+    """Parse one number, or ``NAME=NUMBER`` pairs into numbers by name; :class:`CampaignError` for anything else."""
     pairs = [word.rpartition("=") for word in given]
     try:
         if len(pairs) == 1 and not pairs[0][1]:
@@ -100,7 +100,7 @@ def _rule(text: str) -> tuple[str, tuple[float | None, float | None]]:
 
 
 def _text(found: Map, robot: Robot, best: pd.DataFrame, by: str) -> str:
-    """Best places of the map, in mm and degrees."""
+    """Format a summary of the map and a table of its best places, in mm, µm and degrees (m of sliding joints)."""
     # the postures of a place stand in one chunk
     counts = np.array([(len(c["place"]), len(np.unique(c["place"]))) for c in found.chunks(["place"])])
     rows, reached = counts.sum(axis=0)
