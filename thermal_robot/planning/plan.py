@@ -49,7 +49,7 @@ FRAMES = "unknown frames"
 
 @dataclass(frozen=True)
 class ExpectedParameter:
-    """Expected precision of one parameter.
+    """Expected precision of one parameter of an effect: its posterior standard deviation by the planned rows.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ExpectedParameter:
 
     @property
     def told(self) -> bool:
-        """Whether its expected standard deviation, as the only parameter, is below half its size."""
+        """Whether :attr:`sigma`, its expected standard deviation with this effect alone, is below half its size."""
         return self.sigma < settings.DETERMINED * self.size
 
     def to_dict(self) -> dict[str, Any]:
@@ -89,7 +89,7 @@ class ExpectedParameter:
 
 @dataclass(frozen=True)
 class Expected:
-    """Expected precision of one effect.
+    """Expected precision of one effect: of its parameters, and what they are confounded with.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Whitened design matrix of effects, in units of the noise and of the expected sizes.
+    """Whitened design matrix of frames and effects: rows over the noise, columns times the expected sizes.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Columns:
 
     @classmethod
     def of(cls, seen: Observations, effects: Sequence[Effect]) -> Columns:
-        """Whitened design matrix of effects; the campaign states the noise, m and rad."""
+        """Whitened design matrix of these effects at a campaign's rows, whose noise (m and rad) it states."""
         items = tuple(block(seen, effect) for effect in effects)
         frames = frame_columns(seen)[0] * design.LOOSE
         rows, measures, flat = frames.shape
@@ -161,20 +161,20 @@ class Columns:
 
     @property
     def precision(self) -> Array:
-        """Posterior precision (f + P, f + P), in units of the expected sizes."""
+        """Posterior precision matrix (f + P, f + P): Gram matrix plus the prior's identity, expected sizes as units."""
         rows = equations_of(self.root)
         return np.asarray(rows.T @ rows + np.eye(rows.shape[1]))
 
     @property
     def information(self) -> float:
-        """Information of all rows on the effects' parameters, nats."""
+        """Mutual information of all rows and the effects' parameters, nats; the frames are marginalised."""
         precision = self.precision
         whole, frames = (np.linalg.slogdet(part)[1] for part in (precision, precision[: self.flat, : self.flat]))
         return float(0.5 * (whole - frames))
 
 
 def expectations(columns: Columns) -> tuple[Expected, ...]:
-    """Return the expected precision of each effect."""
+    """Compute the expected posterior standard deviations of each effect's parameters, and what confounds the effect."""
     flat, precision = columns.flat, columns.precision
     ends = np.cumsum([flat, *(len(item.sizes) for item in columns.blocks)])
     own = [np.arange(a, b) for a, b in pairwise(ends)]
@@ -196,7 +196,7 @@ def expectations(columns: Columns) -> tuple[Expected, ...]:
 
 
 def foreseen(campaign: Campaign, effects: str | Iterable[str] | None = None) -> tuple[Expected, ...]:
-    """Return how well effects would be known from the rows of a campaign, whatever these measure (Fisher).
+    """Return the expected posterior standard deviations of effects from the rows of a campaign, whatever these measure.
 
     Parameters
     ----------
@@ -226,12 +226,12 @@ def foreseen(campaign: Campaign, effects: str | Iterable[str] | None = None) -> 
 
 
 def _testable(seen: Observations, kinds: Sequence[Effect]) -> Columns:
-    """Whitened design matrix of those effects that the rows can tell."""
+    """Whitened design matrix of those effects for which the rows lack no column, each in its first variant."""
     return Columns.of(seen, [gate.variants(kind, seen)[0] for kind in kinds if not gate.missing(kind, seen)])
 
 
 def _left(precision: Array, which: NDArray[np.int64]) -> Array:
-    """Return the standard deviations (k,) over the expected sizes, without other parameters."""
+    """Posterior standard deviations (k,), over expected sizes, of the parameters ``which``, with all others zero."""
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision[np.ix_(which, which)]))))
 
 
@@ -413,7 +413,7 @@ def plan(
 
 
 def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dict[str, Any] | None = None) -> Campaign:
-    """Rows with these commands and conditions."""
+    """Copy of an empty campaign with commands (N, n), conditions, labels, and orientations if it states their noise."""
     turned = None if empty.noise_orientation is None else np.tile([1.0, 0.0, 0.0, 0.0], (len(q), 1))
     rows = np.arange(2, len(q) + 2)
     return replace(empty, q=q, orientation=turned, covariates=covariates, rows=rows, labels=labels or {})
@@ -422,7 +422,10 @@ def _filled(empty: Campaign, q: Array, covariates: dict[str, Array], labels: dic
 def _planned(
     empty: Campaign, given: dict[str, Array], visits: schedule.Rows, kinds: Sequence[Effect], rng: np.random.Generator
 ) -> Plan:
-    """Choose poses and their order, for (N,) conditions and (P, K) rows of each pose."""
+    """Plan by greedy D-optimal choice of poses among random ones, in the most informative of :data:`ORDERS` orders.
+
+    ``given`` are the conditions (N,) of the rows, ``visits`` (P, K) the rows of each pose.
+    """
     poses, places = visits.shape
     each = max(FEWEST_CHOICES, min(CHOICES, MOST_CANDIDATES // (poses * places)))
     place = np.repeat(np.arange(poses), each)
@@ -444,7 +447,7 @@ def _planned(
 
 
 def _best(found: Iterable[tuple[Campaign, Columns]], kinds: Sequence[Effect], repeats: int) -> Plan:
-    """Plan of the most informative of several campaigns."""
+    """Plan of the campaign with the most :attr:`Columns.information`, and what it lacks for the other effects."""
     commands, told, columns = max(((c, own.information, own) for c, own in found), key=lambda each: each[1])
     known, seen = {expected.name: expected for expected in expectations(columns)}, observe(commands)
     without = {kind.name: Expected(kind.name, kind.title, (), lacks=gate.missing(kind, seen)) for kind in kinds}
@@ -452,9 +455,10 @@ def _best(found: Iterable[tuple[Campaign, Columns]], kinds: Sequence[Effect], re
 
 
 def _elsewhere(planned: Plan, measures: str, kinds: Sequence[Effect], seed: int) -> Plan:
-    """Plan of rows of another kind, from the poses of a plan: stands are drawn as often as orders are.
+    """Convert a plan to rows of another kind: of :data:`ORDERS` draws of stands, the most informative.
 
-    Planes, anchors and cameras follow from the poses, and stand about their middle: a second draw is the same.
+    Planes, anchors and cameras follow from the poses alone, and are placed once. Raises the last draw's CampaignError
+    if the robot reaches none.
     """
     lost, found = CampaignError("plan", "cannot be planned"), []
     for k in range(ORDERS if measures == "socket" else 1):
@@ -470,7 +474,7 @@ def _elsewhere(planned: Plan, measures: str, kinds: Sequence[Effect], seed: int)
 
 
 def _measured_by(commands: Campaign, measures: str, seed: int) -> Campaign:
-    """Rows of another kind by a sound robot, as far as they are known before."""
+    """Simulate rows of another kind by a sound robot; without approaches where a hand leads it."""
     noise = commands.noise_position or NOISE
     rows = simulate(commands.robot, commands=commands, measures=measures, noise=noise, seed=seed)
     # from which side a hand brings each joint is not known
@@ -482,7 +486,7 @@ def _measured_by(commands: Campaign, measures: str, seed: int) -> Campaign:
 def _in_order(
     empty: Campaign, given: dict[str, Array], visits: schedule.Rows, poses: Array, k: int, rng: np.random.Generator
 ) -> Campaign:
-    """Plan of poses (P, n) in the k-th balanced order, with the approaches that follow from it."""
+    """Campaign of poses (P, n) in a balanced order, random but for k = 0, with columns of resulting approaches."""
     mixed = poses if k == 0 else poses[rng.permutation(len(poses))]
     q, labels = schedule.in_turn(mixed[schedule.balanced(mixed, visits, rng)], visits)
     sides = arrivals(q, empty.robot.joint_names, given, None)
@@ -496,7 +500,7 @@ def _number(value: object) -> bool:
 def _check(
     robot: Robot, rows: int, repeats: int, noise: float, turn: float, rise: float, loads: Sequence[float]
 ) -> None:
-    """Refuse invalid numbers of rows, repeats, noise and so on."""
+    """Raise CampaignError for invalid rows, repeats, noise, rise or loads, or a sliding joint without limits."""
 
     def refuse(column: str, found: object, expected: str) -> None:
         raise CampaignError("plan", "cannot be planned", column=column, found=repr(found), expected=expected)
@@ -570,7 +574,7 @@ def _lines(expected: Expected) -> Iterator[tuple[str, ...]]:
 
 
 def _why(expected: Expected) -> str:
-    """Reason why nothing can be expected of an effect."""
+    """Reason in words why an effect of a plan has no expected parameters."""
     lacks = expected.lacks
     if not lacks:
         return "has no columns before there are data: it is looked for in what is measured"
@@ -589,7 +593,7 @@ _TO_DO = {
 
 
 def _comments(plan: Plan) -> tuple[str, ...]:
-    """Return what is to be done with the files, for campaign.toml."""
+    """Return comments for campaign.toml: how to measure the plan and fill in its files, and where artefacts stand."""
     usual = "go direct from row to row in this order, and fill in measurements.csv: the target's place"
     return (
         f"Planned, not yet measured: {_TO_DO.get(plan.commands.measures, usual)}, and, where measurements.csv has such "

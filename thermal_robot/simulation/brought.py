@@ -44,9 +44,9 @@ def closed(
     frames
         The true frames and artefacts.
     effects
-        What is at work, with the (P,) values of each.
+        Effects at work, with the (P,) values of each.
     away
-        (N, m) by how much each row is to miss what it says, root frame axes, m and rad: play and noise.
+        (N, m) gap that each row is to keep, root frame axes, m and rad: play and noise; none by default.
     near
         (N, n) postures that are nearer to it, from which rows begin that are not reached otherwise.
 
@@ -96,9 +96,9 @@ def touched(
     noise: float,
     rng: np.random.Generator,
 ) -> Campaign:
-    """Return the campaign of a robot that is led into sockets, or onto planes, from the postures of a plan.
+    """Simulate a robot that is led into sockets, or onto planes, from the postures of a plan, by inverse kinematics.
 
-    ``noise`` is one sigma per axis of the play, m.
+    ``noise`` is the standard deviation of the play, per axis in sockets, across planes, m.
     """
     labels, artefacts, q, near = _stands(plan, rng) if kind == "socket" else _planes(plan, frames)
     labels = {**plan.labels, KIND: np.full(plan.samples, kind), **labels}
@@ -112,7 +112,7 @@ def touched(
 
 
 def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], dict[str, Any], Array, Array]:
-    """Return the labels of sockets, the stands, postures near them, and nearer ones."""
+    """Draw stands with sockets; returns labels, stands by name, start postures (N, n), and nearer ones (N, n)."""
     robot, each = plan.robot, -(-plan.samples // (STANDS * SOCKETS))
     low, high = np.maximum(robot.lower, -LED), np.minimum(robot.upper, LED)
     middles = rng.uniform(low + 0.25 * (high - low), high - 0.25 * (high - low), (STANDS, robot.n))
@@ -132,7 +132,7 @@ def _stands(plan: Campaign, rng: np.random.Generator) -> tuple[dict[str, Any], d
 
 
 def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, Any], Array, Array]:
-    """Return the labels of planes, the planes through the middle of all places, postures, and nearer ones."""
+    """Put three orthogonal planes through the median place; returns labels, planes, and postures as :func:`_stands`."""
     places = observe(plan, frames).position
     middle = np.median(places, axis=0)
     number = np.arange(plan.samples) % PLANES
@@ -141,7 +141,10 @@ def _planes(plan: Campaign, frames: Frames) -> tuple[dict[str, Any], dict[str, A
 
 
 def as_kind(kind: str, campaign: Campaign) -> Campaign:
-    """Return the rows that an instrument measured as those of another kind."""
+    """Convert measured positions to distances from anchors or pixels of cameras, or poses to those of a controller.
+
+    Rows of any other kind are returned as they are.
+    """
     if kind == "controller":
         labels = {**campaign.labels, KIND: np.full(campaign.samples, kind)}
         return replace(campaign, labels=labels, base_known=True, tool_known=True)
@@ -159,7 +162,7 @@ def as_kind(kind: str, campaign: Campaign) -> Campaign:
 
 
 def _filmed(campaign: Campaign, points: Array, number: NDArray[np.int64]) -> Campaign:
-    """Return the rows that cameras in the room, by number, see of points (N, 3), by perspective projection."""
+    """Convert points (N, 3), m, to pixels u, v by perspective projection in the cameras of these numbers (N,)."""
     away = ABOUT * np.ptp(points, axis=0).max()
     # each looks along a horizontal axis of the measurement frame, the image's y down
     axes = np.array(

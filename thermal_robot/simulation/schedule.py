@@ -31,10 +31,10 @@ Rows = NDArray[np.int64]
 
 
 def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str, Array]:
-    """Time (N,), s, temperature, °C, and, with loads, payload, kg, of each row.
+    """Columns (N,) of time (s), temperature (°C) and, with loads, payload (kg).
 
-    The arm warms by nearly ``rise``, K, then cools; without, rows follow each other faster. Payloads, none first, come
-    round in blocks.
+    The arm warms exponentially by nearly ``rise``, K, then cools; without a rise, rows follow each other faster.
+    Payloads come round in blocks of rows, no payload first.
     """
     share = np.arange(rows) / max(rows - 1, 1)
     warm = -np.expm1(-np.minimum(share, WARMING) / CONSTANT)
@@ -51,7 +51,7 @@ def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str,
 
 
 def visits(rows: int, repeats: int) -> Rows:
-    """Row numbers (P, K) of each of P poses: once a round, every second round in reverse.
+    """Row indices (P, K) of K visits to each of P poses: once a round, every second round in reverse order.
 
     The last pose stays the last, so that no pose follows itself: a repeat requires leaving the pose.
     """
@@ -62,10 +62,10 @@ def visits(rows: int, repeats: int) -> Rows:
 
 
 def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
-    """Order (P,) of poses (P, n) in which each joint comes from either side about equally often.
+    """Order (P,) of poses (P, n), by random exchanges, in which each joint moves up and down about equally often.
 
-    Two poses are exchanged wherever that brings the least balanced joint nearer to half; it stops once all are within
-    :data:`~thermal_robot.simulation.schedule.BALANCED`.
+    An exchange of two is kept unless the least balanced joint moves away from one half; it stops once all are within
+    :data:`~thermal_robot.simulation.schedule.BALANCED`, or after :data:`~thermal_robot.simulation.schedule.SWAPS`.
     """
     order = np.arange(len(poses))
     worst = _unbalanced(poses, places, order)
@@ -83,20 +83,20 @@ def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
 
 
 def _unbalanced(poses: Array, places: Rows, order: Rows) -> float:
-    """Deviation of the share of rising moves of any joint from one half."""
+    """Largest deviation from one half, over joints, of the share of moves that raise the joint's position."""
     moved = np.diff(poses[order][_pose_of(places)], axis=0)
     return float(np.abs((moved > 0.0).sum(axis=0) / np.maximum((moved != 0.0).sum(axis=0), 1) - 0.5).max())
 
 
 def _pose_of(places: Rows) -> Rows:
-    """Pose number (N,) of each row."""
+    """Pose number (N,) of each row, from the row indices (P, K) of each pose."""
     found = np.empty(places.size, dtype=np.int64)
     found[places] = np.arange(len(places))[:, None]
     return found
 
 
 def in_turn(poses: Array, places: Rows) -> tuple[Array, dict[str, NDArray[np.str_]]]:
-    """Poses (N, n) in the order of rows, and with repeats (N,) labels ``pose`` from 1."""
+    """Joint positions (N, n) of all rows in their order, and, if poses repeat, their numbers as labels ``pose``."""
     which = _pose_of(places)
     labels = {"pose": np.array([str(k + 1) for k in which])} if places.shape[1] > 1 else {}
     return np.asarray(poses[which]), labels

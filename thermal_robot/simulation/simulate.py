@@ -41,7 +41,7 @@ CALL = "simulate()"
 def _commanded(
     robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
 ) -> Campaign:
-    """Rows to simulate, with conditions and without measurements."""
+    """Campaign to simulate: drawn or given commands, conditions and approaches, without measurements."""
     if isinstance(commands, Campaign):
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
@@ -53,7 +53,7 @@ def _commanded(
 
 
 def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> Campaign:
-    """Rows of a campaign without its measurements."""
+    """Copy of a campaign without its measurements; CampaignError if its joints differ, or rows or repeats are given."""
     if rows is not None or repeats != 1:
         expected = "neither rows nor repeats beside a campaign, which has its own"
         raise CampaignError(CALL, "too much is said of the rows", expected=expected)
@@ -68,7 +68,7 @@ def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> C
 
 
 def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
-    """Distinct poses (P, n), and the number of repeats of each."""
+    """Distinct poses (P, n), given or drawn uniformly within the joints' ranges, and the number of repeats of each."""
     times = fitted(whole(1), repeats, CALL, "repeats")
     if commands is not None:
         if rows is not None:
@@ -87,7 +87,7 @@ def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.
 
 
 def _given(robot: Robot, commands: Any) -> Array:
-    """Positions (P, n) that a user gave; (n,) counts as one row."""
+    """Check joint positions that a user gave, and return them as (P, n); (n,) counts as one row."""
     rows = f"rows of {robot.n} joint positions, or a campaign, which read_samples makes of a table"
     if not isinstance(commands, (list, tuple, np.ndarray)):
         raise CampaignError(CALL, "no positions", column="commands", found=type(commands).__name__, expected=rows)
@@ -101,7 +101,7 @@ def _given(robot: Robot, commands: Any) -> Array:
 
 
 def _under(plan: Campaign, conditions: Any) -> Campaign:
-    """Rows under given conditions, in addition to their own."""
+    """Campaign with given conditions added to its own or in their place; ``None`` removes a column."""
     given: Mapping[str, Any] = checked_mapping(CALL, "conditions", {} if conditions is None else conditions)
     covariates, labels, extra = dict(plan.covariates), dict(plan.labels), list(plan.extra)
     for name, values in given.items():
@@ -122,7 +122,7 @@ def _under(plan: Campaign, conditions: Any) -> Campaign:
 
 
 def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
-    """Values (N,) of a condition; one value is broadcast."""
+    """Values (N,) of a condition, one value broadcast to all rows; CampaignError for any other number of them."""
     try:
         found = np.asarray(values, dtype=np.str_ if name in columns.LABELS else np.float64)
         return np.broadcast_to(found, rows).copy()
@@ -132,7 +132,10 @@ def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
 
 
 def _known(name: str, robot: Robot) -> bool:
-    """Whether the format defines a column; other columns than conditions are refused."""
+    """Whether the format defines a condition's column; false for a name of the user's own.
+
+    CampaignError for commands, measurements, unknown joints or links, and names that look like a typing error.
+    """
     if name in robot.joint_names or name in (*columns.MEASURED, *columns.SIMULATED):
         what = "is commanded, no condition" if name in robot.joint_names else "is no condition"
         raise CampaignError(CALL, what, column=name, expected="positions in commands; poses are what is simulated")
@@ -198,7 +201,7 @@ def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
 
 
 def _require_conditions(effect: Effect, seen: Observations) -> None:
-    """Refuse an effect without a quantity to follow, naming the missing columns."""
+    """Raise EffectError, naming the columns, if the campaign lacks one that the effect needs."""
     # a condition may stand still, as on a robot that has warmed through
     lacks = [column for column in gate.missing(effect, seen) if column not in seen.covariates]
     if not lacks:
@@ -209,7 +212,7 @@ def _require_conditions(effect: Effect, seen: Observations) -> None:
 
 
 def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
-    """Parameter values (P,) of an effect."""
+    """Parameter values (P,) of an effect, SI, from one number for all, a sequence, or a mapping by name; else 0."""
     pairs: Iterable[tuple[int, Any]]
     names = [place.name for place in places]
     if isinstance(given, Mapping):
@@ -232,7 +235,7 @@ def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
 
 
 def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
-    """Index of the one parameter of a name, a place, or a label."""
+    """Index of the one parameter with this name, else this place, else this label; EffectError for none or several."""
     for candidates in ([p.name for p in places], [p.place for p in places], [p.label for p in places]):
         found = [k for k, candidate in enumerate(candidates) if candidate == name]
         if len(found) == 1:
@@ -246,7 +249,7 @@ def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
 
 
 def _number(effect: Effect, place: Parameter, value: Any) -> float:
-    """Return the validated parameter value."""
+    """Return a parameter's value as float; EffectError if it is no number, or negative where it must not be."""
     least = 0.0 if place.positive else -LARGEST
     what = f"a number{', not negative,' if place.positive else ''} in {place.unit}"
     kind = number(least=least, expected=what)
@@ -263,7 +266,7 @@ _ALIGNED = (1.0, 0.0, 0.0, 0.0)
 
 
 def _instrument(measures: Any, noise: Any, noise_orientation: Any) -> tuple[str, float, float]:
-    """Return what is measured, and one sigma per axis, m and rad."""
+    """Check and return the kind of measurement, and the noise of positions and orientations, one sigma per axis, SI."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
@@ -278,7 +281,7 @@ _RIGID = 1e-6
 
 
 def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
-    """Rows with declared frames, and the true frames; see :func:`thermal_robot.simulate`."""
+    """Campaign that declares its frames known or not, and the true frames; CampaignError if known ones differ."""
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
     ground = Frames.declared(plan).base if base is None else _pose("base", base)
@@ -305,7 +308,7 @@ def _placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: A
 
 
 def _array(given: Any) -> Array:
-    """Array of numbers; empty for anything else."""
+    """Convert to an array of floats; an empty one if that is not possible."""
     try:
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
@@ -313,7 +316,7 @@ def _array(given: Any) -> Array:
 
 
 def _pose(key: str, given: Any) -> Array:
-    """Rigid pose (4, 4), validated."""
+    """Check and return a homogeneous transform (4, 4), m; CampaignError for anything else."""
     also, pose = ", or three numbers" if key == "tool" else "", _array(given)
     if pose.shape == (4, 4) and np.isfinite(pose).all():
         turn = pose[:3, :3]
@@ -332,7 +335,7 @@ def _measured(
     joints: np.random.Generator,
     readings: np.random.Generator,
 ) -> Campaign:
-    """Return the simulated measurement of a robot with effects at work, at its true frames.
+    """Simulate the measurement of a robot with effects at work: exact kinematics, scatter of joints, normal noise.
 
     Each effect has the (P,) values of its parameters; ``noise`` is one sigma per axis, m and rad; ``joints`` and
     ``readings`` are the random generators of the scatter and of the instrument.
@@ -354,7 +357,7 @@ def _measured(
 
 
 def _scatter(plan: Campaign, effects: Sequence[tuple[Effect, Array]], rng: np.random.Generator) -> Array:
-    """Random deviation (N, n) of the joints from their commands, rad or m."""
+    """Random deviation (N, n) of the joints from their commands, rad or m, by the random effects alone."""
     away, pose, names = np.zeros_like(plan.q), repeated_poses(plan), plan.robot.joint_names
     for effect, sizes in effects:
         if isinstance(effect, RandomEffect):
