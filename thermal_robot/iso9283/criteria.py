@@ -22,22 +22,22 @@ Three = tuple[float, float, float]
 SPREADS = 3.0
 """Standard deviations that the standard adds to the mean distance."""
 FEWEST_FOR_INTERVAL = 3
-"""Cycles from which an interval is told. Two lie equally far from their barycentre: nothing is known of the spread."""
+"""Fewest cycles for a confidence interval. Two lie equally far from their barycentre: the spread stays unknown."""
 DRAWS = 1000
-"""Times that the test is repeated in simulation: the ends of the interval are then good to 1 % at 30 cycles."""
+"""Simulated repetitions of the test for the interval, whose ends are then good to 1 % at 30 cycles."""
 _LEVEL = (0.025, 0.975)
 
 
 @dataclass(frozen=True, eq=False)
 class Attained:
-    """Attained poses of one target in n cycles, in one frame: that of the base to meet the standard.
+    """Attained poses of one target in n cycles, all in one frame, which the standard wants to be the base frame.
 
     Attributes
     ----------
     position
         (n, 3) m.
     rotation
-        (n, 3, 3), which turn vectors of the target's frame into that frame; ``None`` where only positions are known.
+        (n, 3, 3) rotation matrices from the target's frame to that frame; ``None`` where only positions are known.
     """
 
     position: Array
@@ -59,12 +59,12 @@ class Attained:
         return None if self.rotation is None else mean_rotation(self.rotation)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Attained:
-        """Subset of the cycles."""
+        """Return the attained poses of some cycles, chosen by number or mask."""
         return Attained(self.position[rows], None if self.rotation is None else self.rotation[rows])
 
 
 def mean_rotation(rotations: Array) -> Array:
-    """Chordal mean (3, 3) of (n, 3, 3) rotations: the mean matrix projected onto the rotations.
+    """Chordal mean (3, 3) of (n, 3, 3) rotations: the arithmetic mean matrix, projected onto SO(3) by its SVD.
 
     Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002).
     """
@@ -73,7 +73,7 @@ def mean_rotation(rotations: Array) -> Array:
 
 
 def angles(rotations: Array, reference: Array) -> Array:
-    """(..., 3) angles a, b, c from a reference to rotations: the rotation vector of R R_refᵀ, rad.
+    """Angles a, b, c (..., 3) from a reference rotation to rotations R: the rotation vector of R R_refᵀ, rad.
 
     The standard turns about one axis after the other, which differs by products of the angles: 1 µrad at 1 mrad.
     """
@@ -81,14 +81,14 @@ def angles(rotations: Array, reference: Array) -> Array:
 
 
 def three(values: ArrayLike) -> Three:
-    """Three numbers as plain values."""
+    """Convert an array of three numbers to a tuple of floats."""
     a, b, c = (float(v) for v in np.asarray(values))
     return a, b, c
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Pose accuracy AP: from the commanded pose to the barycentre of the attained ones.
+    """Pose accuracy AP: difference of the barycentre of the attained poses from the commanded pose.
 
     Attributes
     ----------
@@ -106,14 +106,14 @@ class Accuracy:
 
 
 def accuracy(attained: Attained, commanded: Attained) -> Accuracy:
-    """Pose accuracy AP of one pose.
+    """Pose accuracy AP of one pose: mean attained position and rotation against the mean commanded ones.
 
     Parameters
     ----------
     attained
         Attained poses of n cycles.
     commanded
-        Commanded pose, one row; or n rows, where a model predicts every cycle separately, as one with temperature does.
+        Commanded pose, one row; or n rows, where a model (with temperature, say) predicts every cycle separately.
     """
     away = attained.barycentre - commanded.barycentre
     is_, should = attained.mean_rotation, commanded.mean_rotation
@@ -130,8 +130,8 @@ class Repeatability:
     position
         RP_l: mean distance and three of its standard deviations, m.
     ci95
-        95 % interval of RP_l of endlessly many cycles, m; ``None`` with two cycles, or without scatter. RP_l of few
-        cycles is too small in the mean, by a sixth with five: the interval counts that, and lies higher.
+        95 % confidence interval of the RP_l of infinitely many cycles, m; ``None`` with two cycles, or without scatter.
+        RP_l of few cycles is biased low, by a sixth with five; the interval corrects that, and so lies higher.
     angles
         RP_a, RP_b, RP_c: three standard deviations, to be read as ±, rad; ``None`` where only positions are known.
     """
@@ -142,7 +142,7 @@ class Repeatability:
 
 
 def repeatability(attained: Attained) -> Repeatability:
-    """Pose repeatability RP of one pose from n ≥ 2 cycles."""
+    """Pose repeatability RP of one pose from n ≥ 2 cycles: RP_l with its confidence interval, RP_a, RP_b and RP_c."""
     deviations, turned = attained.position - attained.barycentre, None
     value = float(_of(np.linalg.norm(deviations, axis=1)))
     if attained.rotation is not None:
@@ -152,15 +152,15 @@ def repeatability(attained: Attained) -> Repeatability:
 
 
 def _of(distances: Array) -> Array:
-    """Positional repeatability RP_l from distances to the barycentre, the last axis being cycles."""
+    """RP_l: mean plus 3 sample standard deviations, over the last axis (cycles), of distances to the barycentre, m."""
     return np.asarray(distances.mean(axis=-1) + SPREADS * distances.std(axis=-1, ddof=1))
 
 
 def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
-    """Bootstrap interval (95 %, parametric) of RP_l, from normal scatter with the sample's principal axes.
+    """Parametric bootstrap 95 % interval of the RP_l of infinitely many cycles; ``None`` below 3 cycles or with RP_l 0.
 
-    The ratio of RP_l from n cycles to its limit depends on the shape of the scatter, not on its size. The draws are the
-    same in each call.
+    Cycles are drawn from a normal law with the principal standard deviations of ``deviations`` (n, 3); quantiles of
+    RP_l of n cycles over that of all divide ``value``, the RP_l measured. The random draws are the same in each call.
     """
     cycles = len(deviations)
     if cycles < FEWEST_FOR_INTERVAL or value == 0.0:
@@ -174,16 +174,16 @@ def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
 
 
 def of_noise(sigma: float) -> float:
-    """Repeatability RP_l of an instrument's noise alone, ``sigma`` per axis, m.
+    """Repeatability RP_l, m, that isotropic normal noise of an instrument alone shows, ``sigma`` m per axis.
 
-    The distances have Maxwell's law: mean 2 √(2/π) σ, standard deviation √(3 − 8/π) σ.
+    The distances have a Maxwell distribution: mean 2 √(2/π) σ, standard deviation √(3 − 8/π) σ.
     """
     return float(sigma * (2.0 * np.sqrt(2.0 / np.pi) + SPREADS * np.sqrt(3.0 - 8.0 / np.pi)))
 
 
 @dataclass(frozen=True)
 class Variation:
-    """Multi-directional pose accuracy variation vAP: largest differences between barycentres.
+    """Multi-directional pose accuracy variation vAP: largest differences between the mean poses of two directions.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Variation:
 
 
 def variation(attained: Sequence[Attained]) -> Variation:
-    """Multi-directional pose accuracy variation vAP, from the attained poses of two directions or more."""
+    """Multi-directional variation vAP: largest difference of the mean poses over all pairs of approach directions."""
     pairs = list(combinations(attained, 2))
     away = max(float(np.linalg.norm(one.barycentre - other.barycentre)) for one, other in pairs)
     means = [(one.mean_rotation, other.mean_rotation) for one, other in pairs]
@@ -208,17 +208,17 @@ def variation(attained: Sequence[Attained]) -> Variation:
 
 @dataclass(frozen=True)
 class Drift:
-    """Drift of pose characteristics: largest changes against the first measuring time.
+    """Drift of pose characteristics: largest absolute changes of AP and RP against the first measuring time.
 
     Attributes
     ----------
     accuracy, accuracy_angles
-        dAP_p, m, and dAP_a, dAP_b, dAP_c, rad: change of AP; ``None`` where AP cannot be told.
+        dAP_p, m, and dAP_a, dAP_b, dAP_c, rad: change of AP; ``None`` where AP is not known.
     repeatability, repeatability_angles
         dRP_l, m, and dRP_a, dRP_b, dRP_c, rad: change of RP.
     shift
-        How far the barycentre went, m. It is no criterion of the standard, whose dAP_p does not see a pose that goes
-        from one side of the commanded pose to the other.
+        Largest distance of the barycentre from the first one, m. It is no criterion of the standard, whose dAP_p does
+        not see a pose that goes from one side of the commanded pose to the other.
     """
 
     accuracy: float | None
@@ -229,15 +229,15 @@ class Drift:
 
 
 def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None = None) -> Drift:
-    """Drift of pose accuracy and repeatability of one pose.
+    """Drift of one pose: largest absolute changes of AP, RP and barycentre against the first measuring time.
 
     Parameters
     ----------
     attained
         Attained poses of each measuring time, first to last: two times or more, each of two cycles or more.
     commanded
-        Of each measuring time, as for :func:`~thermal_robot.iso9283.accuracy`; ``None`` where AP cannot be
-        told.
+        Commanded pose of each measuring time, as for :func:`~thermal_robot.iso9283.accuracy`; ``None`` where AP is
+        not known.
     """
     spread = [repeatability(each) for each in attained]
     gone = [float(np.linalg.norm(each.barycentre - attained[0].barycentre)) for each in attained]
@@ -250,7 +250,7 @@ def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None 
 
 
 def _change(values: Sequence[Any]) -> Any:
-    """Largest change against the first of numbers or triples; ``None`` where one of them is unknown."""
+    """Largest absolute difference from the first value, of numbers or per component of triples; ``None`` if any is."""
     if any(value is None for value in values):
         return None
     largest = np.abs(np.subtract(values, values[0])).max(axis=0)
@@ -259,7 +259,7 @@ def _change(values: Sequence[Any]) -> Any:
 
 @dataclass(frozen=True)
 class AlongPath:
-    """Path criteria AT or RT: worst of a path's points.
+    """Path accuracy AT or path repeatability RT: the largest AP or RP among the points of a path.
 
     Attributes
     ----------
@@ -275,7 +275,10 @@ class AlongPath:
 
 
 def along_path(points: Sequence[Accuracy] | Sequence[Repeatability]) -> AlongPath:
-    """Path accuracy AT from the accuracies of its points; path repeatability RT from their repeatabilities."""
+    """Path accuracy AT (or repeatability RT): largest position figure, and largest absolute angles, of a path's points.
+
+    ``points`` are the accuracies AP of the points for AT, their repeatabilities RP for RT.
+    """
     turns = [np.abs(point.angles) for point in points if point.angles is not None]
     return AlongPath(max(point.position for point in points), three(np.max(turns, axis=0)) if turns else None)
 
@@ -291,11 +294,11 @@ class PoseCriteria:
     cycles
         How often it was repeated.
     directions
-        From how many directions it was approached; ``None`` where that is unknown.
+        Number of directions of approach; ``None`` where unknown.
     repeatability
         RP, of all cycles.
     accuracy
-        AP; ``None`` where the frames take up all that was measured.
+        AP; ``None`` where the fit of unknown frames has as many unknowns as there are measured numbers.
     corrected
         AP against the prediction of a corrected model; ``None`` without one.
     variation, variation_cycles

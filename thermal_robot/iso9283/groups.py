@@ -30,9 +30,9 @@ MOST_TIMES = 8
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Rows (n,), in the sequence of measurement, that repeat one commanded pose; its path, or none for a pose at rest.
+    """Rows (n,), in order of measurement, that repeat one commanded pose; ``path`` is empty for a pose at rest.
 
-    Without labels it is called as the row in the file that came first.
+    ``label`` is the campaign's pose label, or "row k" with the lowest file row k where the campaign has no such labels.
     """
 
     label: str
@@ -41,10 +41,10 @@ class Repeats:
 
 
 def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
-    """Poses that were measured repeatedly, in order of occurrence, and the number of single rows.
+    """Group rows into poses that were measured at least twice, in order of occurrence; also count the ungrouped rows.
 
-    Rows with the same ``pose`` label belong together; without that column, rows with the same commands. Points of
-    different paths, and poses at rest, never do.
+    Rows with the same ``pose`` label form a group; without that column, rows with the same joint commands. Rows of
+    different paths, or of a path and a pose at rest, are never grouped.
     """
     pose, paths = campaign.labels.get("pose"), campaign.labels.get("path")
     number = repeated_poses(campaign)
@@ -63,10 +63,10 @@ def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
 
 
 def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
-    """Repeats of one pose grouped by the direction of approach, the same sign in every joint.
+    """Group the repeats of one pose by direction of approach: rows of a group agree in the sign of each joint's motion.
 
-    Rows in which a joint's direction is unknown belong to none. ``None`` where half of them do: nobody recorded
-    it, and the pose was repeated in a row.
+    Rows in which a joint's direction is unknown are left out. ``None`` where these are half of the rows or more
+    (directions were not recorded, and repeats of the pose followed each other), or no joint has a direction.
     """
     columns = [name for name in campaign.covariates if split_name(name)[0] == "approach"]
     signs = [campaign.covariates[name][rows] for name in columns]
@@ -84,7 +84,7 @@ def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
 
 
 def _follow(campaign: Campaign, columns: list[str]) -> bool:
-    """Whether directions are derived from the order of the rows."""
+    """Whether the approach columns named are derived from the order of the rows, or equal to such derived ones."""
     names, sessions = campaign.robot.joint_names, campaign.labels.get("session")
     ordered = arrivals(campaign.q, names, campaign.covariates, sessions)
     same = (name in ordered and np.array_equal(campaign.covariates[name], ordered[name]) for name in columns)
@@ -92,18 +92,18 @@ def _follow(campaign: Campaign, columns: list[str]) -> bool:
 
 
 def _came(campaign: Campaign) -> NDArray[np.bool_]:
-    """Mask (N,) of rows that follow another command, so that the order gives the direction."""
+    """Mask (N,) of rows whose joint command differs from that of the row measured before; true for the first row."""
     order, came = in_order(campaign), np.ones(campaign.samples, dtype=bool)
     came[order[1:]] = np.abs(np.diff(campaign.q[order], axis=0)).max(axis=1) > SAME_COMMAND
     return came
 
 
 def times(campaign: Campaign, rows: Rows) -> list[Rows]:
-    """Repeats of one pose grouped by measuring time, first to last.
+    """Group the repeats of one pose by measuring time, first to last, for the drift criteria.
 
-    The times are sessions, where the pose was repeated in several. Otherwise the span of ``time`` or ``order`` over
-    these rows is divided into equal parts, of :data:`PER_TIME` cycles in the mean, :data:`MOST_TIMES` at most. Nothing
-    where there are fewer than two times.
+    The times are sessions, where two or more of them have repeats of the pose. Otherwise the span of ``time`` or
+    ``order`` over these rows is divided into equal parts, of :data:`PER_TIME` cycles on average, :data:`MOST_TIMES` at
+    most. Groups of one row are dropped; the list is empty where fewer than two groups are left.
     """
     session = campaign.labels.get("session")
     if session is not None:

@@ -1,6 +1,6 @@
 """ISO 9283 criteria of a campaign with repeats, and remarks on their validity.
 
-The standard looks at attained and commanded poses in the axes of the base.
+The standard compares attained with commanded poses in the axes of the base.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Campaign transformed to the axes of the base.
+    """Measured, commanded and predicted poses of a campaign in the axes of the base.
 
-    ``attained`` was measured, ``commanded`` are the nominal robot's poses (``None`` where the frames take up all
-    figures, so that AP would be zero by itself), ``corrected`` what a model predicts. ``fitted`` are the frames that
-    were fitted to the same rows, ``unknowns`` the numbers that took, ``figures`` those of different poses.
+    ``attained`` was measured, ``commanded`` are the nominal robot's poses (``None`` where the unknown frames have as
+    many unknowns as there are figures, or more), ``corrected`` those that a model predicts. ``fitted`` names the frames
+    fitted to the same rows, ``unknowns`` counts their parameters, ``figures`` the measured numbers of different poses.
     """
 
     campaign: Campaign
@@ -55,11 +55,11 @@ class Seen:
     figures: int
 
     def near(self, rows: Rows) -> Accuracy | None:
-        """Pose accuracy AP of some rows."""
+        """Pose accuracy AP of some rows against the commanded poses; ``None`` where these are unknown."""
         return None if self.commanded is None else accuracy(self.attained.take(rows), self.commanded.take(rows))
 
     def after(self, rows: Rows) -> Accuracy | None:
-        """Pose accuracy AP of some rows against the corrected model, where it predicts them."""
+        """Pose accuracy AP of the rows that the corrected model predicts, against it; ``None`` if it predicts none."""
         if self.corrected is None:
             return None
         rows = rows[np.isfinite(self.corrected.position[rows]).all(axis=1)]
@@ -67,7 +67,7 @@ class Seen:
 
 
 def _seen(campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Array | None] | None) -> Seen:
-    """Transform a campaign to the base; arguments as of :func:`performance`."""
+    """Transform measured, commanded and predicted poses to the base; unknown frames are fitted by least squares."""
     each = 3 if campaign.orientation is None else 6
     held = campaign.tool_known or campaign.simulated_position is not None
     unknown = {"base": 0 if campaign.base_known else 6, "tool": 0 if held else each}
@@ -84,14 +84,14 @@ def _seen(campaign: Campaign, frames: Frames | None, predicted: tuple[Array, Arr
 
 
 def _in_base(base: Array, position: Array, orientation: Array | None) -> Attained:
-    """Rotate from the measurement frame into the axes of the base."""
+    """Transform positions (N, 3) and quaternions (N, 4) from the measurement frame to the base, whose pose is given."""
     turn, origin = base[:3, :3], base[:3, 3]
     rotation = None if orientation is None else turn.T @ quaternion_to_rotation(orientation)
     return Attained((position - origin) @ turn, rotation)
 
 
 def _checked(campaign: Campaign, predicted: tuple[Array, Array | None]) -> tuple[Array, Array | None]:
-    """Return the validated predictions of the same rows."""
+    """Validate a model's predictions: one position and orientation (or ``None``) for each row, else a CampaignError."""
     kind = "positions (N, 3) and orientations (N, 4) or None, as prediction() returns them"
     require("performance(), predicted", predicted, (tuple, list), kind)
     position, orientation = (None if part is None else np.asarray(part, dtype=float) for part in predicted[:2])
@@ -109,7 +109,7 @@ _NAMED = 5
 def _notes(
     seen: Seen, groups: Sequence[Repeats], poses: Sequence[PoseCriteria], paths: Sequence[PathCriteria], alone: int
 ) -> Iterator[str]:
-    """Yield remarks on the criteria; ``alone`` rows repeat nothing."""
+    """Yield remarks on the validity of the criteria; ``alone`` is the number of rows that repeat no other."""
     campaign, many = seen.campaign, len(seen.fitted) > 1
     frames = f"{' and '.join(seen.fitted)} frame{'s' if many else ''}"
     if seen.commanded is None:
@@ -146,23 +146,23 @@ def _notes(
 def performance(
     campaign: Campaign, *, frames: Frames | None = None, predicted: tuple[Array, Array | None] | None = None
 ) -> Performance:
-    """ISO 9283 criteria from the repeats of a campaign.
+    """ISO 9283 performance criteria (AP, RP, vAP, drift, AT, RT) from the repeats of a campaign.
 
     Parameters
     ----------
     campaign
-        With measurements. Rows with the same ``pose`` label are cycles of one pose, without that column those with the
-        same commands; a ``path`` label makes them points of a path.
+        Campaign with measurements. Rows with the same ``pose`` label are cycles of one pose; without that column, rows
+        with the same joint commands. A ``path`` label makes them points of a path.
     frames
-        Base and tool; where absent, unknown ones are fitted to the nominal robot by least squares of all rows.
+        Base and tool frame; where absent, unknown ones are fitted to the nominal robot by least squares of all rows.
     predicted
-        What a corrected model predicts of the same rows, as :meth:`CorrectedModel.prediction` returns it: (N, 3)
+        Predictions of a corrected model for the same rows, as :meth:`CorrectedModel.prediction` returns them: (N, 3)
         positions, m, and (N, 4) orientations or ``None``, in the measurement frame. Rows that are NaN do not count.
 
     Returns
     -------
     Performance
-        Prints as a table.
+        The criteria of each pose and path; prints as tables.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""ISO 9283 criteria of all repeated poses and paths: dict, data frame, table.
+"""ISO 9283 criteria of all repeated poses and paths, and their output as dict, data frame and text tables.
 
-Tables are in mm and mrad, the poses below each other; their cells are texts, for a terminal or a page.
+Tables are in mm and mrad, with one row for each pose or path; their cells are strings, for a terminal or a page.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ MILLI = 1e3
 MOST = 40
 """Rows of a table at most: a screen; data frame and JSON have all."""
 LONGEST_NAME = 20
-"""Letters of a label that a table shows, so that a line fits."""
+"""Characters of a label that a table shows, so that a line fits."""
 NOTHING = 1e-6
-"""mm and mrad: what is smaller is rounding, and asks for no decimals."""
+"""mm and mrad: smaller values are rounding errors, and do not count for the number of decimals."""
 _LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
 Criteria = PoseCriteria | PathCriteria
 
@@ -48,7 +48,7 @@ _FIGURES = {
     "dRP_abc": "drift.repeatability_angles",
     "shift": "drift.shift",
 }
-"""Criteria of a pose, and where they stand; three letters stand for three figures. Of a path: AT for AP, RT for RP."""
+"""Attribute of ``PoseCriteria`` for each criterion; _abc and _xyz are three figures. For a path AT is AP, RT is RP."""
 _OF_PATH = {"AP_p", "AP_abc", "AP_p corrected", "AP_abc corrected", "RP_l", "RP_abc"}
 _COLUMNS = {
     "RP_l": "pose n dir AP_p corrected AP_x AP_y AP_z RP_l low high",
@@ -72,7 +72,7 @@ _WHERE_KNOWN = ("corrected", "vAP_a", "vAP_b", "vAP_c")
 
 
 def _figures(one: Criteria) -> dict[str, float]:
-    """Figures of a pose or path by criterion, m and rad."""
+    """Criteria of a pose or path as a flat dict by name (``AP_p``, ``AP_a`` …), m and rad, without unknown ones."""
     found: dict[str, float] = {}
     for name, place in _FIGURES.items():
         if isinstance(one, PathCriteria):
@@ -90,7 +90,7 @@ def _figures(one: Criteria) -> dict[str, float]:
 
 
 def _cycles(one: Criteria, name: str) -> int:
-    """Smallest number of cycles in any direction, time or point of a criterion."""
+    """Return the number of cycles of the criterion ``name``: the smallest of its directions, times or path points."""
     if isinstance(one, PoseCriteria) and name[0] in "vds":
         return min(one.variation_cycles if name[0] == "v" else one.drift_cycles)
     return one.cycles
@@ -98,9 +98,9 @@ def _cycles(one: Criteria, name: str) -> int:
 
 @dataclass(frozen=True)
 class Table:
-    """Table of criteria of poses or paths.
+    """Text table of criteria, one row for each pose or path.
 
-    ``head`` names the columns, the label's first; ``more`` poses or paths are not shown.
+    ``head`` names the columns, the label's first; ``more`` is the number of poses or paths that are not shown.
     """
 
     heading: str
@@ -115,7 +115,7 @@ class Table:
 
     @classmethod
     def of(cls, found: Sequence[Criteria], needs: str) -> Table | None:
-        """Write SI figures in thousandths with as many decimals as the smallest needs; ``None`` without rows."""
+        """Table of the poses or paths that have the criterion ``needs``, in mm and mrad; ``None`` where none has it."""
         cells = [_cells(one, figures, needs) for one in found if needs in (figures := _figures(one))]
         if not cells:
             return None
@@ -134,7 +134,7 @@ class Table:
 
 
 def _cells(one: Criteria, figures: dict[str, float], needs: str) -> dict[str, str | int | float | None]:
-    """Cells of a table row by column."""
+    """Values of one pose or path by column name, in SI; ``needs`` is the criterion that names the table."""
     corrected = figures.get("AP_p corrected", figures.get("AT_p corrected"))
     angles = {f"±{name}": value for name, value in figures.items()}
     cells = {**figures, **angles, "corrected": corrected, "n": _cycles(one, needs)}
@@ -158,7 +158,7 @@ def _text(cell: str | int | float | None, decimals: int) -> str:
 
 
 def _decimals(values: Sequence[float]) -> int:
-    """Return the number of decimals: two digits of the median, at least a micrometre."""
+    """Return how many decimals (3 to 6) give the median absolute value, in mm or mrad, two digits; values in SI."""
     sizes = sorted(MILLI * abs(value) for value in values if isfinite(value))
     sizes = [size for size in sizes if size > NOTHING]
     if not sizes:
@@ -167,7 +167,7 @@ def _decimals(values: Sequence[float]) -> int:
 
 
 def _counted(name: str, counts: Sequence[int], standard: int) -> str:
-    """Return the number of poses or paths and of their repeats, beside the standard's number."""
+    """Text with the number of poses or paths, their cycles, and the standard's number of cycles; empty without any."""
     if not counts:
         return ""
     often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
@@ -175,7 +175,7 @@ def _counted(name: str, counts: Sequence[int], standard: int) -> str:
 
 
 def _wrapped(sentence: str, indent: str) -> str:
-    """Wrap a sentence."""
+    """Wrap a sentence at 96 characters, with a hanging indent."""
     return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent), break_on_hyphens=False)
 
 
@@ -197,10 +197,10 @@ class Performance:
         Paths, likewise.
     registered
         The frames that were fitted to the same measurements: ``base``, ``tool``. AP and AT are then after
-        registration, and smaller than against frames that are measured by themselves. RP, vAP and RT do not depend on
+        registration, and smaller than against frames that are measured separately. RP, vAP and RT do not depend on
         it.
     instrument
-        RP_l that the instrument alone would show, m; ``None`` where its noise is not given.
+        RP_l that the noise of the instrument alone would show, m; ``None`` where that noise is not given.
     notes
         Remarks, a sentence each.
 
@@ -259,7 +259,7 @@ class Performance:
 
     @property
     def summary(self) -> str:
-        """The worst figures in one line."""
+        """Text of one line with the worst AP_p, RP_l, AT_p and RT_p over all poses and paths, mm."""
         named = [("AP_p", self.accuracy), ("corrected", self.corrected), ("RP_l", self.repeatability)]
         named += [("AT_p", self.path_accuracy), ("corrected", self.path_corrected), ("RT_p", self.path_repeatability)]
         said = [f"{name} {_text(value, _decimals([value]))} mm" for name, value in named if value is not None]
@@ -267,7 +267,7 @@ class Performance:
 
     @property
     def extent(self) -> str:
-        """Number of poses and paths, and of repeats of each."""
+        """Text with the numbers of poses and paths and of their cycles, and the standard's number of cycles."""
         at_rest = _counted("pose", [p.cycles for p in self.poses], CYCLES)
         along = _counted("path", [p.cycles for p in self.paths], PATH_CYCLES)
         return ", and ".join(part for part in (at_rest, along) if part)
@@ -285,7 +285,7 @@ class Performance:
         return {"schema": SCHEMA, **asdict(self)}
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the data frame, one row a figure.
+        """Return a long-format data frame with one row for each criterion of each pose or path, SI.
 
         Returns
         -------
@@ -321,7 +321,7 @@ class Performance:
 
     @property
     def tables(self) -> tuple[Table, ...]:
-        """Tables of texts, in mm and mrad: of poses, then of paths; empty ones are left out."""
+        """Text tables of the criteria, in mm and mrad: those of poses, then those of paths; empty ones are left out."""
         made = (Table.of(self._all, needs) for needs in _COLUMNS)
         return tuple(table for table in made if table)
 

@@ -1,6 +1,6 @@
-"""Workspace maps: scatter, thermal shift and joining probability of a robot, place by place, in every posture.
+"""Workspace maps: scatter, thermal shift and joining probability of a robot at each place, in every posture.
 
-The room knows robots and the assembly's probabilities, no campaign.
+This package depends on robots and on assembly probabilities, not on campaigns.
 """
 
 from thermal_robot.maps.figures import plot_map

@@ -1,4 +1,4 @@
-"""Figures of a workspace map: contours of a plane, a cloud of places in space."""
+"""Figures of a workspace map: filled contours over a plane, or a 3D scatter plot of places."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ _LEVELS = 12
 
 
 def larger_is_better(by: str) -> bool:
-    """Whether large values of a column are good."""
+    """Whether the best value of a map column is its largest (probability, capability, margin), not its smallest."""
     return by in _BETTER_LARGE
 
 
 def plot_map(found: Map, by: str = "required_warm") -> Figure:
-    """Draw a column of a map, at each place that of the best posture.
+    """Plot one column of a map over the workspace, at each place the value of the best posture.
 
-    Contours where the places lie in a plane that is parallel to two axes of the root frame, else points in space.
-    The best place is marked.
+    Filled contours with the best place marked, where the places are a grid in a plane parallel to two axes of the root
+    frame; else a 3D scatter plot.
 
     Parameters
     ----------
     found
         The map.
     by
-        The column.
+        Name of the column.
 
     Returns
     -------
@@ -77,14 +77,14 @@ def plot_map(found: Map, by: str = "required_warm") -> Figure:
 
 
 def _colours(largest: bool) -> str:
-    """Colour map whose yellow end is the better one, in a plane and in space."""
+    """Name of the matplotlib colour map whose yellow end means better: reversed where small values are better."""
     return "viridis" if largest else "viridis_r"
 
 
 def _plane(
     figure: Figure, found: Map, places: Array, values: Array, axes: list[int], label: str, *, largest: bool
 ) -> None:
-    """Draw filled contours over a grid; places that are not reached stay empty."""
+    """Draw filled contours of values over the grid of a plane and mark the best place; unreached places stay empty."""
     first, second = (np.linspace(*found.notes["xyz"[k]]) for k in axes)
     grid = np.full((len(second), len(first)), np.nan)
     column, row = (
@@ -106,7 +106,7 @@ def _plane(
 
 
 def _space(figure: Figure, places: Array, values: Array, label: str, *, largest: bool) -> None:
-    """Draw the places as points, a limited number of them."""
+    """Draw a 3D scatter plot of the places, coloured by value; of 40 000 places and more, only every k-th."""
     step = max(len(places) // 20_000, 1)
     own = figure.add_subplot(projection="3d")
     drawn = own.scatter(*places[::step].T, c=values[::step], s=3.0, cmap=_colours(largest), depthshade=False)

@@ -1,10 +1,10 @@
-"""Columns of a workspace map: all postures of an arm at many places, and their quality.
+"""Columns of a workspace map: inverse kinematics for all postures of an arm at many places, and their quality.
 
-Postures are searched from many starts at a few places, and from there continued to the neighbours. Where the task
-leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest to home is taken
-among those that hang together:
+Postures (branches of the inverse kinematics) are searched by multi-start at a few places, and continued from there to
+neighbouring places. Where the task leaves a direction free (a turn about the tool, a seventh joint), the configuration
+nearest to home is taken within the branch, by damped least squares with a null-space step, J being the task Jacobian:
 
-    Δq = J⁺ e + (1 − J⁺J) λ (q_home − q),    J⁺ = Jᵀ (J Jᵀ + μ)⁻¹,  μ as the square of what is missing (e).
+    Δq = J⁺ e + (1 − J⁺J) λ (q_home − q),    J⁺ = Jᵀ (J Jᵀ + μ)⁻¹,  μ half the square of the task error e.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ MOST_LINKS = 12
 
 
 class Task:
-    """Inverse kinematics task: tip (3,) m at a place, tool ``axis`` along ``approach`` in the root frame.
+    """Inverse kinematics task: bring the tip (3,), m, to a place, the tool ``axis`` along ``approach`` (root frame).
 
-    Free directions are drawn to ``home``, (n,) rad or m.
+    Directions that the task leaves free move towards the configuration ``home``, (n,) rad or m.
     """
 
     def __init__(self, robot: Robot, approach: Array, axis: Array, tip: Array, home: Array) -> None:
@@ -68,18 +68,21 @@ class Task:
             self.whole = self.turns & (robot.upper - robot.lower > 2.0 * np.pi - 1e-9)
 
     def nearest_turn(self, q: Array) -> Array:
-        """Equivalent configurations (N, n), each joint of a full turn within half a turn of home, if limits allow."""
+        """Shift fully turning joints of q (N, n) by whole turns to within half a turn of home, where limits allow."""
         turns = np.where(self.whole, np.round((q - self.home) / (2.0 * np.pi)), 0.0)
         turned = q - 2.0 * np.pi * turns
         return np.where((turned >= self.robot.lower) & (turned <= self.robot.upper), turned, q)
 
     def way(self, start: Array, q: Array) -> Array:
-        """Joint displacement (N, n), modulo whole turns."""
+        """Joint displacements (N, n) from ``start`` to ``q``, reduced to half a turn for joints that can turn fully."""
         gone = q - start
         return np.where(self.whole, gone - 2.0 * np.pi * np.round(gone / (2.0 * np.pi)), gone)
 
     def solve(self, targets: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Damped least squares: configurations (N, n) with the tip at (N, 3) places, and whether they converged."""
+        """Solve the inverse kinematics for targets (N, 3), m, by damped least squares from (N, n) configurations.
+
+        Returns configurations (N, n) and a mask (N,) of those that converged and are within the joint limits.
+        """
         q, found, robot = start.copy(), np.zeros(len(start), dtype=bool), self.robot
         eye = np.eye(6)
         for step_number in range(STEPS):
@@ -112,14 +115,14 @@ class Task:
 
 
 class _Known:
-    """Postures found so far at M places, up to a maximum."""
+    """Store of the distinct postures found so far at each of M places, 32 at most for each."""
 
     def __init__(self, task: Task, places: int) -> None:
         self.task, self.q = task, np.full((places, MOST, task.robot.n), np.nan)
         self.count = np.zeros(places, dtype=np.intp)
 
     def fresh(self, places: Rows, q: Array) -> NDArray[np.bool_]:
-        """Add configurations (K, n) of places (K,); mask of those that are new."""
+        """Add configurations (K, n) of places (K,) that differ from those stored by 1e-4 rad or m; return a mask."""
         new = np.zeros(len(places), dtype=bool)
         left = np.arange(len(places))
         while len(left):
@@ -137,9 +140,10 @@ class _Known:
 
 
 def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
-    """Multi-start search of all postures at M places (M, 3) m: place number (K,), ascending; (K, n), near home first.
+    """Find all inverse kinematics solutions (postures) at M places (M, 3), m, by multi-start and continuation.
 
-    Neighbours should lie no farther apart than about 0.2 m.
+    Returns place numbers (K,), ascending, and configurations (K, n), nearest to home first. Neighbouring places should
+    be at most about 0.2 m apart.
     """
     from scipy.spatial import cKDTree
 
@@ -148,7 +152,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
     starts, random, idle = _everywhere(task), np.random.default_rng(0), 0
 
     def searched(places: Rows, start: Array) -> tuple[Rows, Array]:
-        """Return the new postures."""
+        """Solve at numbered places from start configurations; return places and configurations of new postures only."""
         q, found = task.solve(targets[places], start)
         new = found.copy()
         new[found] = known.fresh(places[found], q[found])
@@ -175,7 +179,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
 
 
 def _everywhere(task: Task) -> Array:
-    """Sobol configurations (S, n) within the limits, a turn about home at most; home first."""
+    """Start configurations (S, n): home, then a Sobol sequence within limits, at most half a turn from home."""
     from scipy.stats import qmc
 
     robot = task.robot
@@ -186,17 +190,17 @@ def _everywhere(task: Task) -> Array:
 
 
 def _wanting(count: NDArray[np.intp], random: np.random.Generator) -> Rows:
-    """Places without a posture, and some with fewer than others: half of the seeds each."""
+    """Draw the places to search next: up to 6 without any posture, and 6 with fewer postures than the most so far."""
     some = (count > 0) & (count < count.max())
     halves = (np.flatnonzero(chosen) for chosen in (count == 0, some if some.any() else count > 0))
     return np.concatenate([random.permutation(half)[: SEEDS // 2] for half in halves])
 
 
 def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
-    """Start configurations of the search for other postures.
+    """Start configurations, from known ones q (K, n), for the search of other postures at the same places.
 
-    One joint mirrored about home, or turned by half a turn; or an elbow flipped, with its neighbours compensating as
-    for two equal links.
+    One joint is mirrored about home or turned by half a turn; or one inner joint changes its sign (elbow flip) and both
+    neighbours compensate as for two equal links. All are clipped to the joint limits.
     """
     n, elbows = task.robot.n, np.arange(1, task.robot.n - 1)
     starts = np.repeat(q[:, None], 2 * n + 2 * len(elbows), axis=1)
@@ -225,7 +229,7 @@ UNITS = {
 
 
 def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
-    """Columns of a chunk of the map: all postures of the numbered places, or the numbered configurations."""
+    """Compute all columns of a chunk of a map: for all postures at numbered places, or for numbered configurations."""
     robot, asked = spec.robot, spec.question
     if isinstance(spec.over, Joints):
         q = spec.over.drawn(rows, robot)
@@ -274,11 +278,11 @@ def _assembly_columns(spec: Spec, q: Array) -> Columns:
 
 
 def polygon(edges: Array) -> tuple[Array, Array]:
-    """Area (N,), m², and width, m, of the polygons of the tip for each segment between cold and warm.
+    """Area (N,), m², and diameter (N,), m, of the zonogons that the tip can reach, each segment being cold to warm.
 
-    A polygon of edges ``g`` (N, 2, S), what the whole rise of each segment does across the tool (Eqs 14-15), has the
-    area ``sum |g_i x g_j|`` over all pairs; its width, the largest distance of two corners, is the longest ``sum ±
-    g_i``. Refused for more segments than have their corners compared.
+    The edges ``g`` (N, 2, S), m, are the tip's displacements across the tool by the whole rise of each of S segments
+    (Eqs 14-15). The area is ``sum |g_i x g_j|`` over all pairs; the width, the largest distance of two corners, is the
+    longest ``sum ± g_i``. More than 12 segments raise a :class:`RobotError`.
     """
     links = edges.shape[2]
     if links > MOST_LINKS:

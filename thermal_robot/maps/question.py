@@ -1,4 +1,4 @@
-"""Specification of a workspace map: the quantities, and the places or joint positions."""
+"""Specification of a workspace map: the robot's errors and its joining task, and the places or joint positions."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ Span = tuple[float, float, int]
 
 @dataclass(frozen=True)
 class Question:
-    """Errors, temperature and joining task for which each configuration is evaluated.
+    """Joint errors, rise of temperature and joining task for which a map evaluates each configuration.
 
     Parameters
     ----------
     sigma_q
         Standard deviation of each joint, rad or m: one number for all, or by the names of all joints.
     coefficients, rise
-        1/K and K: of all segments, or by their names.
+        Coefficient of thermal expansion, 1/K, and rise of temperature, K: of all segments, or by their names.
     clearance, capability
-        Diameter, m, for the probability; C_p for the clearance that is required.
+        Diametral clearance, m, for which the probability of joining is computed; capability C_p for which the required
+        clearance is computed.
     law
-        ``"shift"``: the rise has happened; ``"uniform"``: it is anywhere within ± ``rise``.
+        ``"shift"``: the rise is fixed, a displacement; ``"uniform"``: it is uniform within ± ``rise``.
     approach
         Direction in which the tool enters, in the root frame.
     axis, point
@@ -54,14 +55,14 @@ class Question:
 
 @dataclass(frozen=True)
 class Positions:
-    """A grid of places of the tip in the root frame, m; one value an axis makes a plane or a line.
+    """Rectangular grid of places of the tip in the root frame, m; an axis with one value makes it a plane or a line.
 
     Parameters
     ----------
     x, y, z
-        First, last, and how many.
+        First value, last value, number of values.
     home
-        (n,) rad or m: postures are counted from the one nearest to it; the middle of the limits where left out.
+        (n,) rad or m: postures are numbered from the one nearest to it; the middle of the limits where left out.
     """
 
     x: Span
@@ -75,7 +76,7 @@ class Positions:
         return self.x[2] * self.y[2] * self.z[2]
 
     def place(self, rows: NDArray[np.int64]) -> Array:
-        """Positions (K, 3) m, of places by number; x runs fastest."""
+        """Positions (K, 3), m, of the grid points with these numbers (K,); x runs fastest, then y."""
         x, y, z = (np.linspace(low, high, many) for low, high, many in (self.x, self.y, self.z))
         along, rest = rows % len(x), rows // len(x)
         return np.stack([x[along], y[rest % len(y)], z[rest // len(y)]], axis=1)
@@ -83,14 +84,14 @@ class Positions:
 
 @dataclass(frozen=True)
 class Joints:
-    """Halton points within the joint limits.
+    """Halton sequence of joint configurations within limits, in place of a grid of places.
 
     Parameters
     ----------
     count
-        How many.
+        Number of configurations.
     lower, upper
-        (n,) rad or m: the robot's limits where left out, at most a turn about zero.
+        (n,) rad or m; where left out the robot's limits, for rotating joints cut at half a turn either side of zero.
     """
 
     count: int
@@ -98,7 +99,7 @@ class Joints:
     upper: tuple[float, ...] | None = None
 
     def drawn(self, rows: NDArray[np.int64], robot: Robot) -> Array:
-        """Return the configurations (K, n) rad or m, by number; chunks continue the sequence."""
+        """Return the configurations (K, n), rad or m, of K consecutive numbers in the Halton sequence."""
         from scipy.stats import qmc
 
         low, high = within(robot, self.lower, self.upper)
@@ -113,9 +114,9 @@ Over = Positions | Joints
 def within(
     robot: Robot, lower: tuple[float, ...] | None = None, upper: tuple[float, ...] | None = None
 ) -> tuple[Array, Array]:
-    """Finite joint limits (n,): those given, else the robot's, at most half a turn either side of zero.
+    """Finite lower and upper joint limits (n,), rad or m: those given, else the robot's, rotating joints cut at ± π.
 
-    Refused: a prismatic joint without limits, limits of another number of joints.
+    A prismatic joint without limits, or limits of another number of joints, raise a :class:`RobotError`.
     """
     turns = np.array([kind != "prismatic" for kind in robot.joint_types])
     low, high = (
@@ -136,7 +137,7 @@ class Spec:
     question: Question = field(default_factory=Question)
 
     def chunks(self) -> Iterator[NDArray[np.int64]]:
-        """Yield the numbers of places or configurations in chunks."""
+        """Yield the numbers of places or configurations, 4096 at a time."""
         for start in range(0, self.over.count, CHUNK):
             yield np.arange(start, min(start + CHUNK, self.over.count))
 
@@ -146,7 +147,7 @@ class Spec:
         return -(-self.over.count // CHUNK)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values of everything that decides the map."""
+        """Return everything that determines the map as a dict for JSON: robot, places, question, chunk size."""
         return {
             "schema": "thermal-robot/map/1",
             "robot": self.robot.name,
@@ -160,7 +161,7 @@ class Spec:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of :meth:`to_dict`."""
+        """SHA-256 hash of :meth:`to_dict`, by which a run recognises the map that it may resume."""
         return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True).encode()).hexdigest()
 
 

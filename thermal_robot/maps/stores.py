@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 NOTES = "map.json"
-"""Beside the parts of a Parquet folder: what decides the map."""
+"""File beside the parts of a Parquet folder that holds the specification of the map."""
 LISTED = 10
-"""Best places that are told."""
+"""Number of best places that are listed by default."""
 
 
 class _Parquet:
-    """Folder of Parquet files, one for each chunk, with notes."""
+    """Store of a map as a folder of Parquet files, one for each chunk, and a JSON file with its specification."""
 
     library, extra = "pyarrow", "parquet"
 
@@ -56,14 +56,14 @@ class _Parquet:
         return next(k for k in count() if not self._part(k).is_file())
 
     def begin(self, notes: dict[str, Any]) -> None:
-        """Create an empty map."""
+        """Create an empty map with this specification; parts of an earlier one are deleted."""
         self.folder.mkdir(parents=True, exist_ok=True)
         for part in self.folder.glob("part-*.parquet"):
             part.unlink()
         (self.folder / NOTES).write_text(json.dumps(notes, indent=2, ensure_ascii=False), encoding="utf-8")
 
     def add(self, columns: Columns) -> None:
-        """Add the next chunk by an atomic rename."""
+        """Write the next chunk to its file; an atomic rename keeps an interrupted write from counting."""
         import pyarrow
         import pyarrow.parquet
 
@@ -73,7 +73,7 @@ class _Parquet:
         os.replace(unfinished, part)
 
     def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
-        """Yield the columns, or some of them, chunk by chunk."""
+        """Yield a dict of the columns by name, all or those named, for each finished chunk."""
         import pyarrow.parquet
 
         for k in range(self.done):
@@ -82,7 +82,7 @@ class _Parquet:
 
 
 class _Zarr(_Parquet):
-    """Zarr group with one array for each column; rows beyond the counted ones are unfinished."""
+    """Store of a map as a Zarr group, one array for each column; rows beyond those counted are an unfinished chunk."""
 
     library, extra = "zarr", "maps"
 
@@ -103,7 +103,7 @@ class _Zarr(_Parquet):
         self._group("w").attrs.update({"notes": notes, "rows": []})
 
     def add(self, columns: Columns) -> None:
-        """Add the next chunk; it counts once its number of rows is written."""
+        """Append the next chunk to the arrays; it counts as finished once its number of rows is written."""
         group = self._group()
         rows = [int(count) for count in group.attrs["rows"]]
         before, more = sum(rows), len(next(iter(columns.values())))
@@ -124,7 +124,7 @@ class _Zarr(_Parquet):
 
 
 def store(path: str | Path) -> _Parquet:
-    """Store of a path by its ending; an unknown ending or a missing library is an error."""
+    """Store of a map, by its path's ending .zarr or .parquet; another, or a missing library, is a CampaignError."""
     folder = Path(path)
     kinds = {".zarr": _Zarr, ".parquet": _Parquet}
     if folder.suffix not in kinds:
@@ -134,11 +134,11 @@ def store(path: str | Path) -> _Parquet:
 
 
 Limits = Mapping[str, tuple[float | None, float | None]]
-"""By column: the least and the largest value that will do; ``None`` for no limit."""
+"""Smallest and largest value that is accepted, by column; ``None`` for no limit."""
 
 
 class Map:
-    """Stored workspace map of a robot, by place and posture or by configuration.
+    """Stored workspace map of a robot, with a row for each posture at each place, or for each configuration.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Map:
     Raises
     ------
     CampaignError
-        No map there.
+        There is no map at the path.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -177,7 +177,7 @@ class Map:
         return ("place", "branch", *self.notes["joints"], *list(UNITS)[2:])
 
     def chunks(self, names: Sequence[str] | None = None) -> Iterator[Columns]:
-        """Yield the columns by name, by default all, chunk by chunk.
+        """Yield a dict of arrays by column, all or those named, for each finished chunk.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class Map:
         return self._store.chunks(None if names is None else list(dict.fromkeys(names)))
 
     def frame(self, names: Sequence[str] | None = None) -> pd.DataFrame:
-        """Return the data frame of the columns, SI, in memory."""
+        """Read the columns, all or those named, of all finished chunks into one data frame, SI."""
         import pandas as pd
 
         wanted = list(names) if names is not None else list(self.columns)
@@ -203,18 +203,18 @@ class Map:
         within: Limits | None = None,
         count: int = LISTED,
     ) -> pd.DataFrame:
-        """Best rows, with the best posture of each place, best first.
+        """Return the best places by one column, best first, each with its best posture; NaN rows are left out.
 
         Parameters
         ----------
         by
-            Column by which rows are compared; the smallest is best.
+            Column by which rows are compared; the smallest value is best.
         largest
-            The largest is.
+            Whether the largest value is best instead.
         within
-            Required range by column, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
+            Accepted range by column, ``{"capability_warm": (1.33, None), "z": (None, 0.5)}``.
         count
-            Number of places.
+            Number of places at most.
 
         Raises
         ------
@@ -245,7 +245,7 @@ class Map:
                 raise CampaignError(str(self.path), "the map has no such column", column=name, expected=expected)
 
     def values(self, by: str, *, largest: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Reached places (K, 3), m, and the best value (K,) of a column among their postures."""
+        """Positions (K, 3), m, of reached places, and the smallest (or largest) value (K,) of a column there."""
         found = self.frame(["place", "x", "y", "z", by])
         best = found.sort_values(by, ascending=not largest, kind="stable").drop_duplicates("place").sort_values("place")
         return best[["x", "y", "z"]].to_numpy(dtype=float), best[by].to_numpy(dtype=float)
@@ -260,10 +260,10 @@ def workspace_map(
     replace: bool = False,
     progress: Callable[[str, int, int], None] = lambda _stage, _done, _all: None,
 ) -> Map:
-    """Workspace map of a robot: scatter, thermal displacement, probability, C_p, clearance.
+    """Compute the workspace map of a robot: scatter, thermal displacement, probability of joining, C_p, clearance.
 
-    Results are written chunk by chunk. A run that is stopped leaves a map that can be read; the same call goes on with
-    it, and gives the same file.
+    Results are written chunk by chunk. A run that is stopped leaves a map that can be read; the same call resumes it,
+    and gives the same file.
 
     Parameters
     ----------
@@ -276,21 +276,21 @@ def workspace_map(
     question
         Quantities to be computed at each configuration.
     replace
-        Begin anew where another map stands there.
+        Whether a map that is already at the path is overwritten.
     progress
         Called with a stage, how many chunks are done, and how many there are.
 
     Returns
     -------
     Map
-        Read from there chunk by chunk.
+        The map at the path.
 
     Raises
     ------
     RobotError
         Nothing to map, or a name that is not known.
     CampaignError
-        Another map at that path, another ending.
+        A map with other settings is at that path, or the path has another ending.
 
     Examples
     --------
