@@ -36,7 +36,7 @@ TextArray: TypeAlias = NDArray[np.str_]
 
 
 def _instance(kind: Any, expected: str) -> Kind:
-    """Require an object of a type."""
+    """Return a validator that accepts instances of a type only; others raise a MisfitError with ``expected``."""
 
     def take(value: Any, path: str) -> Any:
         if not isinstance(value, kind):
@@ -105,7 +105,8 @@ class Campaign:
     noise_position, noise_orientation
         One sigma per axis of the instrument, m and rad; ``None`` when not given.
     noise_of_rows
-        (N,) that of a point in each row, m, their root mean square in all if none is given; ``None`` for one in all.
+        (N,) one sigma of a point in each row, m, whose root mean square is ``noise_position`` if that is not given;
+        ``None`` where one sigma holds for all rows.
     targets
         Several targets of each pose, whose common frame ``position`` and ``orientation`` are; ``None`` for one.
     payload_com
@@ -127,12 +128,12 @@ class Campaign:
     urdf
         The robot's reference as written in the campaign file.
     travelled
-        Of rows taken from a larger campaign: what :attr:`since_turn` was there. Leave it out.
+        :attr:`since_turn` of rows in the larger campaign that they were taken from; set by :meth:`take`, not by users.
     readings
         (N,) per column of measurements of other kinds, where :attr:`kinds` are not position or pose alone, SI; 0 in
         rows of another kind. Their labels stand in ``labels``, the kind of each row in ``labels["kind"]``.
     facts
-        What is known of the things that such rows share, by kind, SI.
+        What is known of the cameras and the like that such rows share, by kind, SI.
     about
         Whose measurements they are, for reports: serial numbers, operator, date, whatever the user wants there.
 
@@ -218,7 +219,7 @@ class Campaign:
         self._set(key, checked_array(f"<{self.name}>", key, getattr(self, key), shape, kind))
 
     def _weigh_rows(self, file: str, samples: int) -> None:
-        """Set targets and the noise of each row; without one for all, that is their root mean square."""
+        """Validate ``targets`` and ``noise_of_rows``, whose root mean square is the noise of all rows if not given."""
         if self.targets is not None and len(self.targets.points) != samples:
             raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
         if self.noise_of_rows is None:
@@ -232,7 +233,7 @@ class Campaign:
             self._set("noise_orientation", turn or self.noise_orientation)
 
     def __repr__(self) -> str:
-        """One line; the arrays stay out of a notebook."""
+        """Summary in one line: name, samples, kind of measurement, numbers of joints and covariates."""
         what = f"of {self.measures}" if self.measured else "to predict"
         return (
             f"<Campaign {self.name!r}: {self.samples} samples {what}, {self.robot.n} joints, "
@@ -243,7 +244,7 @@ class Campaign:
         return description.html(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """Table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
+        """Convert the table to a pandas data frame in the units of the file; :func:`campaign_from_table` reads it.
 
         Returns
         -------
@@ -287,7 +288,7 @@ class Campaign:
 
     @property
     def measures(self) -> str:
-        """What the rows say: one of :attr:`kinds`, ``"position"`` and ``"pose"`` among them, or ``"mixed"``."""
+        """Kind of measurement of all rows (``"position"``, ``"pose"`` …); ``"mixed"`` where there are several."""
         return self.kinds[0] if len(self.kinds) == 1 else "mixed"
 
     @cached_property
@@ -299,7 +300,10 @@ class Campaign:
 
     @cached_property
     def numbered(self) -> Mapping[str, tuple[tuple[str, ...], NDArray[np.int64]]]:
-        """Of each label of a kind of measurement its values, sorted, and (N,) the number of that of each row."""
+        """Labels of other kinds of measurement (``"stand"``, ``"plane"`` …) as categories, by label.
+
+        Each is its distinct values, sorted, and the number (N,) of each row's value among them.
+        """
         found = {}
         for name in (name for name in names.OF_KINDS if name in self.labels):
             values, number = np.unique(self.labels[name], return_inverse=True)
@@ -308,18 +312,18 @@ class Campaign:
 
     @property
     def measured(self) -> bool:
-        """Whether anything was measured: rows to predict say nothing."""
+        """Whether the rows hold measurements, of positions or of another kind; false for rows to be predicted."""
         return self.position is not None or "kind" in self.labels
 
     @cached_property
     def reach(self) -> float:
-        """Diagonal of the volume that was measured, or through which the tool was led, m."""
+        """Diagonal of the bounding box of measured positions, or without any of nominal tool positions, m."""
         led = self.position if self.position is not None else tool_poses(self.robot, self.q)[:, :3, 3]
         return float(np.linalg.norm(np.ptp(led, axis=0)))
 
     @cached_property
     def relative_noise(self) -> Array | None:
-        """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
+        """Standard deviations (N, m) of the m figures of each row over those of all rows; ``None`` where all are 1."""
         turned = "pose" in self.kinds or "controller" in self.kinds
         return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, turned)
 
@@ -330,7 +334,7 @@ class Campaign:
 
     @cached_property
     def pose_labels(self) -> TextArray | None:
-        """Label (N,) of the commanded pose that a row repeats, ``""`` without one; ``None`` where no row has one.
+        """Label (N,) of the commanded pose that each row repeats, ``""`` for none; ``None`` without a column of them.
 
         Labels of poses count within their path: point 3 of one path is not that of another.
         """
@@ -342,10 +346,10 @@ class Campaign:
 
     @cached_property
     def since_turn(self) -> Mapping[str, Array]:
-        """Signed distance (N,) from each joint's last turning point, rad or m; empty where rows have no order.
+        """Signed distance (N,) of each joint since its last reversal, rad or m, by name; empty if rows have no order.
 
-        It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
-        :func:`~thermal_robot.campaign.turning.since_turns`.
+        It follows from the order of all rows of the whole campaign; a subset keeps these values. Strains of stop
+        operators are included, see :func:`~thermal_robot.campaign.turning.since_turns`.
         """
         if self.travelled and self.clock is not None:
             return self.travelled
@@ -353,14 +357,14 @@ class Campaign:
 
     @property
     def settings(self) -> Settings:
-        """Settings that are not in the table; root frame and gravity are the robot's."""
+        """Settings of the campaign: all that its table does not hold; root frame and gravity are the robot's."""
         own: dict[str, Any] = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         own |= {key: as_vector(own[key]) for key in ("target", "payload_com")}
         own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
         return Settings(**{**own, "kind": "", "gravity": as_vector(self.robot.gravity)})
 
     def take(self, rows: ArrayLike) -> Campaign:
-        """Subset of the rows, without a new validation.
+        """Return the campaign of some rows only; plausibility checks are not repeated.
 
         Parameters
         ----------
@@ -394,7 +398,7 @@ class Campaign:
         return replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:
-        """Copy without a covariate or label column.
+        """Return a copy of the campaign without one covariate or label column.
 
         Raises
         ------
@@ -418,7 +422,7 @@ class Campaign:
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Freeze an array that nobody else holds, so that the constructor need not copy it."""
+    """Make an array read-only in place, so that the constructor of a campaign need not copy it."""
     array.flags.writeable = False
     return array
 
@@ -448,10 +452,10 @@ GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:
-    """Copy of a campaign with the sign of one quantity reversed.
+    """Return a copy of a campaign with the sign of one quantity reversed, which ``turned`` records.
 
-    ``torque`` or ``approach`` stands for their columns of all joints; of ``temperature`` the differences from
-    ``reference_temperature`` change their sign, and ``gravity`` is the robot's.
+    ``torque`` or ``approach`` stands for its columns of all joints; temperatures are mirrored about
+    ``reference_temperature``; ``gravity`` is the robot's vector.
     """
     if quantity == GRAVITY:
         robot = campaign.robot
@@ -464,7 +468,7 @@ def turned_round(campaign: Campaign, quantity: str) -> Campaign:
 
 
 def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campaign:
-    """Copy of a campaign with the same sign reversals as another one."""
+    """Reverse signs so that exactly the quantities ``turned`` are reversed; take ``robot`` if its gravity differs."""
     for quantity in {*campaign.turned} ^ {*turned}:
         campaign = turned_round(campaign, quantity)
     return campaign if (campaign.robot.gravity == robot.gravity).all() else replace(campaign, robot=robot)
@@ -473,8 +477,8 @@ def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campa
 def appended(campaigns: Sequence[Campaign]) -> Campaign:
     """Concatenate campaigns of one robot and the same joints, with the declarations of the first.
 
-    Covariates and labels that not all have are left out. Each row keeps its number, its side of approach, and how far
-    its joints had gone since they last turned: of the move from one campaign to the next nothing is known.
+    Covariates and labels that not all have are left out. Each row keeps its number, its direction of approach, and the
+    distances of its joints since their last reversals: the motion between two campaigns is unknown.
 
     Raises
     ------

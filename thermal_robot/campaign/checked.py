@@ -36,23 +36,23 @@ def first_true(refused: NDArray[np.bool_]) -> int | None:
 
 
 def beyond(values: Array, most: float = LARGEST) -> NDArray[np.bool_]:
-    """Mask of the numbers that are not finite or too large, of the shape of the values."""
+    """Mask, of the shape of the values, of numbers that are not finite or whose absolute value exceeds ``most``."""
     return ~(np.abs(values) <= most)
 
 
 def without_rounding(values: Array) -> Array:
-    """Set negligibly small numbers to 0; the array itself where there are none."""
+    """Set numbers below 1e-30 in absolute value to 0; returns the array itself where there are none."""
     vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
 
 
 def no_orientation(quaternions: Array) -> NDArray[np.bool_]:
-    """Mask (N,) of the (N, 4) quaternions that are not normalised."""
+    """Mask (N,) of the (N, 4) quaternions whose norm differs from 1 by more than 0.1."""
     return np.asarray(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE)
 
 
 def no_rotation(matrices: Array) -> NDArray[np.bool_]:
-    """Mask (N,) of the (N, 3, 3) matrices that are no rotations, to two decimals."""
+    """Mask (N,) of the (N, 3, 3) matrices that are no rotations: R Rᵀ is off by more than 0.01, or det R < 0."""
     away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
     return np.asarray((away > ROTATION_TOLERANCE) | (np.linalg.det(matrices) < 0.0))
 
@@ -66,7 +66,10 @@ def refuse(
     found: Callable[[int], str],
     rows: Rows | None = None,
 ) -> None:
-    """Refuse the first of (N,) or (N, k) that is wrong, naming it by its number of (N,) ``rows``, or by its index."""
+    """Raise a CampaignError for the first row that is true in a mask (N,) or (N, k); do nothing without one.
+
+    The message has the row's number in ``rows`` (N,), or its index, and what ``found`` says of that index.
+    """
     index = first_true(wrong)
     if index is not None:
         row, place = (None, f" at index {index}") if rows is None else (int(rows[index]), "")
@@ -75,10 +78,10 @@ def refuse(
 
 
 def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-    """Read-only array of a required shape and type; a copy unless the input is read-only.
+    """Convert a value to a read-only array of a required shape and type; a copy unless the input is read-only.
 
-    Refused, by ``file`` and ``key``, are something else than numbers, another shape, and a figure that is not finite or
-    larger than any. ``kind`` is ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
+    A CampaignError with ``file`` and ``key`` refuses other values than numbers, another shape, and numbers that are not
+    finite or too large. ``kind`` is ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
     """
     try:
         array = _as_array(value, kind)
@@ -111,7 +114,7 @@ def _as_array(value: Any, kind: Any) -> NDArray[Any]:
 
 
 def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None = None) -> None:
-    """Refuse (N, 4) quaternions that are not normalised."""
+    """Raise a CampaignError for the first of (N, 4) quaternions whose norm differs from 1 by more than 0.1."""
 
     def found(index: int) -> str:
         one = quaternions[index]
@@ -122,7 +125,10 @@ def check_quaternions(file: str, key: str, quaternions: Array, rows: Rows | None
 
 
 def check_covariate(file: str, name: str, values: Array, rows: Rows | None = None) -> None:
-    """Refuse (N,) values outside the physical range of a quantity."""
+    """Raise a CampaignError for the first of (N,) values that its quantity cannot have.
+
+    These are approach other than −1, 0, 1, negative payload, and temperature below absolute zero.
+    """
     quantity, place = split_name(name)
     known = "approach.<joint>" if quantity == "approach" and place else quantity if quantity == "temperature" else name
     if known in IMPOSSIBLE:
@@ -133,7 +139,7 @@ def check_covariate(file: str, name: str, values: Array, rows: Rows | None = Non
 def check_joints(
     file: str, key: str, named: Iterable[str], joints: tuple[str, ...], lines: Mapping[str, int | None] | None = None
 ) -> None:
-    """Refuse declarations about unknown joints, with the line and the nearest name."""
+    """Raise a CampaignError for the first name that is no joint of the chain, with its line and the nearest name."""
     for joint in named:
         if joint not in joints:
             problem = f"the chain has no such joint{did_you_mean(joint, joints)}"
@@ -142,7 +148,7 @@ def check_joints(
 
 
 def checked_mapping(file: str, key: str, given: Any) -> Mapping[str, Any]:
-    """Require a mapping with text keys."""
+    """Return the value if it is a mapping with text keys; else raise a CampaignError."""
     if isinstance(given, Mapping) and all(isinstance(name, str) for name in given):
         return given
     expected = "values by name, as a dict"

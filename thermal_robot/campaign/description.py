@@ -21,7 +21,7 @@ _MOST_SESSIONS = 8  # Sessions named in one line; more would not fit beside each
 
 
 def text(campaign: Any) -> str:
-    """Blocks of aligned lines: facts, joints, conditions, repetition, warnings."""
+    """Describe a campaign in plain text, as blocks of lines: facts, joints, conditions, repetition, warnings."""
     blocks = [
         [f"Campaign {campaign.name}", *aligned(_facts(campaign))],
         ["Joints", *aligned(_joints(campaign))],
@@ -33,7 +33,7 @@ def text(campaign: Any) -> str:
 
 
 def html(campaign: Any) -> str:
-    """HTML tables of a notebook with the same content as :func:`text`."""
+    """Describe a campaign in HTML tables for a notebook, as :func:`text` but for the conditions not recorded."""
     head, *joints = _joints(campaign)
     warned = html_table([[warning] for warning in campaign.warnings], heading="Warnings")
     return (
@@ -98,7 +98,7 @@ def _joints(campaign: Any) -> Iterator[Sequence[str]]:
 
 
 def _covariates(campaign: Any) -> Iterator[Sequence[str]]:
-    """Yield a line per quantity; the joints of one quantity share a line, links have their own."""
+    """Yield a table row for each recorded condition: quantity, place, range, unit, gaps; its joints share one row."""
     if not campaign.covariates:
         yield ("none",)
         return

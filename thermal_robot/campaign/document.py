@@ -42,10 +42,10 @@ def _content(file: Path, most: int, name: str, kind: str) -> str:
 
 
 class Document:
-    """A parsed TOML file together with its text, so that an error can name the line.
+    """A parsed and validated TOML file together with its text, so that an error can name the line.
 
-    ``sections`` holds its values by section and key, each of its kind; what is not stated is absent. ``data`` is what
-    stands there as it is. ``name`` is what such a file is usually called, for messages.
+    ``sections`` holds the validated values by section and key, without those not stated; ``data`` the values as parsed.
+    ``kinds`` is the schema; ``name`` is the usual name of such a file, for messages.
     """
 
     def __init__(self, file: Path, kinds: Kinds = KINDS, name: str = FILE_NAME) -> None:
@@ -78,7 +78,7 @@ class Document:
         return None
 
     def _error(self, problem: str, section: str, key: str = "", column: str = "", **told: str) -> CampaignError:
-        """Error at a section or its key, with the line."""
+        """Build the CampaignError for a section or one of its keys, with the line number."""
         column = column or (f"{section}.{key}" if key else section)
         return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
 
@@ -107,7 +107,7 @@ class Document:
             raise self._error(problem, section, key, error.path, **told, expected=error.expected) from None
 
     def required(self, section: str, key: str) -> Any:
-        """Value of a required key."""
+        """Return the value of a required key; a missing one raises a CampaignError."""
         if key in self.sections.get(section, {}):
             return self.sections[section][key]
         known = self.kinds[section]
@@ -119,7 +119,7 @@ class Document:
 
 
 def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return values by section and key as the kinds want them; a :class:`MisfitError` tells another."""
+    """Validate values by section and key against the schema ``kinds``; a wrong one raises a :class:`MisfitError`."""
     own = {section: kinds[section] for section in sections}
     whole = {key: record(kind, may_lack=kind) if isinstance(kind, Mapping) else kind for key, kind in own.items()}
     return {section: whole[section](content, section) for section, content in sections.items()}
@@ -127,7 +127,7 @@ def fitted_sections(kinds: Kinds, sections: Mapping[str, Any]) -> dict[str, dict
 
 @dataclass(frozen=True)
 class Declaration:
-    """Content of campaign.toml."""
+    """Validated content of a campaign.toml: paths of table and robot, and settings in SI."""
 
     file: Path  # path of the file as the user gave it
     table: Path  # path of the table
@@ -152,14 +152,14 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
 
 
 def robot_reference(urdf: str, folder: Path) -> str | Path:
-    """Return what :func:`~thermal_robot.load_robot` wants: a known robot as it is named, a path from the folder."""
+    """Resolve a robot's reference for ``load_robot``: a built-in name stays, a path is relative to the folder."""
     return urdf if urdf.startswith((EXAMPLE_ROBOT_DATA, BUILTIN)) else folder / urdf
 
 
 def declared_file(path: Path, name: str = FILE_NAME, section: str = "measurements") -> Path:
-    """Return the file of a declaration, or of that in a folder; where there is none, say which are beside it.
+    """Return the path of a declaration file, from its own path or its folder's; one that is missing is refused.
 
-    ``section`` tells such files from others.
+    The CampaignError lists declarations beside it: TOML files with this ``section``, and subfolders with such a file.
     """
     file = path / name if is_folder(path) else path
     if is_file(file):
@@ -178,7 +178,7 @@ def declared_file(path: Path, name: str = FILE_NAME, section: str = "measurement
 
 
 def is_yaml(file: Path) -> bool:
-    """Whether a file is YAML by its name."""
+    """Whether a file's name ends in .yaml or .yml."""
     return file.suffix.lower() in (".yaml", ".yml")
 
 
@@ -193,12 +193,12 @@ def _yaml(file: str) -> Any:
 
 
 def yaml_text(plain: Any) -> str:
-    """YAML text of plain values, in their order, with all digits."""
+    """Convert plain values to YAML text, keys in their order, numbers with all digits."""
     return str(_yaml("YAML").safe_dump(plain, sort_keys=False, allow_unicode=True))
 
 
 def read_yaml(file: Path) -> list[Any]:
-    """Non-empty documents of a YAML file, of plain values only."""
+    """Parse all non-empty documents of a YAML file by a safe loader (plain values only); else a CampaignError."""
     yaml = _yaml(str(file))
     if not is_file(file):
         problem = "is a directory" if is_folder(file) else "there is no such file"

@@ -84,7 +84,7 @@ def listed(names: Iterable[str], limit: int = 12) -> str:
 
 
 def tilted(column: str) -> str | None:
-    """Link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
+    """Link in a column name ``tilt.<link>.x`` or ``.y``; empty for ``tilt.x`` (the base), ``None`` for other names."""
     found = re.fullmatch(r"tilt\.(?:(.+)\.)?[xy]", column, re.DOTALL)
     return None if found is None else found[1] or ""
 
@@ -98,28 +98,28 @@ def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
 
 
 def target_of(column: str) -> tuple[str, int] | None:
-    """Axis and number of ``x.1``; ``None`` for other columns."""
+    """Axis and number of a target in a column name such as ``x.1``; ``None`` for other columns."""
     found = re.fullmatch(r"([xyz])\.([1-9][0-9]*)", column)
     return None if found is None else (found[1], int(found[2]))
 
 
 def axes_of(target: int) -> tuple[str, str, str]:
-    """Position columns of one of several targets."""
+    """Names of the position columns of a target by its number k: ``x.k``, ``y.k``, ``z.k``."""
     return f"x.{target}", f"y.{target}", f"z.{target}"
 
 
 def of_kinds() -> set[str]:
-    """Return the columns of all kinds of measurement, and that which says the kind of each row."""
+    """Return the names of all figure and label columns of all kinds of measurement, and of the column ``kind``."""
     optional = {column for columns in OPTIONAL.values() for column in columns}
     return {KIND} | optional | {column for groups in KINDS.values() for group in groups for column in group}
 
 
 def reading_scale(column: str, length: float) -> float:
-    """Return the SI size of one unit of a measured figure, lengths in a unit of ``length`` m."""
+    """Return the SI factor of a measured column: ``length`` (m per unit) for lengths, 1 for quaternions and pixels."""
     return 1.0 if column in (*ORIENTATION, *KINDS["pixel"][0]) else length
 
 
 def split_name(column: str) -> tuple[str, str]:
-    """Quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
+    """Split a column name such as ``approach.elbow_joint`` at the dot into quantity and place (empty without a dot)."""
     quantity, _, place = column.partition(".")
     return quantity, place

@@ -1,9 +1,8 @@
-"""Plausibility checks of a campaign, a sentence each; marks of missing values and copied rows.
+"""Plausibility checks of a campaign, a sentence each; detection of missing-value markers and of copied rows.
 
-Marks of a lost beam, old readings and copies of other rows. Instruments write −9999, 999, 0 0 0 or their last reading
-where they see no target. Such a figure stands in several rows to the last digit, and it does not follow the robot:
-under any rigid base and tool a measured coordinate is linear in the nominal position and rotation of the tool frame (13
-figures), whatever the unit and the axes of the instrument.
+Instruments write −9999, 999, 0 0 0 or their last reading where they see no target. Such a figure is in several rows,
+equal to the last digit, and does not follow the robot: under any rigid base and tool a measured coordinate is linear in
+the nominal position and rotation matrix of the tool frame (13 coefficients), whatever the instrument's unit and axes.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ RARE = 0.05  # expected number of repeats that agree by chance, above which equa
 
 
 def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
-    """Rows (N,) with a mark of a missing value instead of a measurement, and a sentence for each mark."""
+    """Detect rows that hold a missing-value marker instead of a position: mask (N,), and a sentence for each marker."""
     places = [] if campaign.position is None else [(XYZ, campaign.position)]
     if campaign.targets is not None:
         axes = map(axes_of, campaign.targets.numbers)
@@ -48,7 +47,10 @@ def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
 
 
 def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Iterator[tuple[Mask, str]]:
-    """Yield rows and a sentence for each mark among the positions (N, 3) of some columns, m; NaN where not seen."""
+    """Yield mask (N,) and sentence of each missing-value marker among positions (N, 3), m, NaN where not seen.
+
+    A marker is a value that is equal at different commands and far off the regression on the nominal poses.
+    """
     q, seen = campaign.q, np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
     # places that most rows share were meant: a ball in its socket
@@ -70,7 +72,7 @@ def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Ite
 
 
 def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
-    """Rows of each value that occurs at several commands, the most frequent first."""
+    """Masks (N,) of the rows that share one exact value, for each value at different commands, most frequent first."""
     _, group, counts = np.unique(values[seen], axis=0, return_inverse=True, return_counts=True)
     groups = np.full(len(seen), -1)
     groups[seen] = group.reshape(-1)
@@ -79,18 +81,18 @@ def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
 
 
 def _moved(q: Array, rows: Mask) -> bool:
-    """Whether rows have different commands."""
+    """Whether the commands of some rows differ by more than 1e-3 rad or m in any joint."""
     return bool(rows.sum() > 1 and np.ptp(q[rows], axis=0).max() > SAME_COMMAND)
 
 
 def _astray(away: Array, rows: Mask, seen: Mask, times: float) -> bool:
-    """Whether rows are farther from the regression than the others, and a minority."""
+    """Whether the median residual of rows exceeds ``times`` the others' median, and they are fewer than the others."""
     others = seen & ~rows
     return bool(rows.sum() < others.sum() and np.median(away[rows]) > times * np.median(away[others]))
 
 
 def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
-    """Residual (N, 3) of the least-absolute-deviation regression of each coordinate on the nominal poses."""
+    """Absolute residuals (N, 3), m, of the least-absolute-deviation regression of coordinates on the nominal poses."""
     poses = tool_poses(campaign.robot, campaign.q)
     known = [np.ones((len(poses), 1)), poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)]
     different = len(np.unique(np.round(campaign.q[seen] / SAME_COMMAND), axis=0))
@@ -111,10 +113,10 @@ def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
 
 
 def copies(campaign: Campaign) -> Mask:
-    """Duplicated rows (N,): equal to an earlier one in every column, and not repeats.
+    """Mask (N,) of duplicated rows: equal to an earlier one in every recorded column, and not a repeated measurement.
 
-    A repeat may well measure the same digits, but not at the same time. Where none is recorded, equal rows are repeats
-    if the figures are so coarse that some would agree by chance.
+    A repeat may have the same digits, but not the same time. Without a time or order, equal rows count as repeats if
+    the figures are so coarse that more than 0.05 pairs are expected to agree by chance.
     """
     return np.asarray(_originals(campaign) != np.arange(campaign.samples))
 
@@ -134,7 +136,7 @@ def doubled(campaign: Campaign) -> Iterator[str]:
 
 
 def _originals(campaign: Campaign) -> NDArray[np.int64]:
-    """First row (N,) equal to each; the row itself where none is earlier."""
+    """Index (N,) of the first row that each row is a copy of, in every recorded column; its own where it is no copy."""
     recorded = [values[:, None] for name, values in campaign.covariates.items() if name not in campaign.derived]
     labels = [np.unique(label, return_inverse=True)[1][:, None] for label in campaign.labels.values()]
     measured = [part for part in (campaign.position, campaign.orientation) if part is not None]
@@ -148,7 +150,7 @@ def _originals(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def _by_chance(campaign: Campaign) -> float:
-    """Return the expected number of pairs of repeats with equal values, which may be coarser than their scatter."""
+    """Return the expected number of pairs of repeats with equal positions by chance, from scatter and resolution."""
     _, pose, counts = np.unique(campaign.q, axis=0, return_inverse=True, return_counts=True)
     position, pose = np.asarray(campaign.position), pose.reshape(-1)
     middle = np.array([np.bincount(pose, axis) for axis in position.T]).T / counts[:, None]
@@ -161,7 +163,7 @@ def _by_chance(campaign: Campaign) -> float:
 
 
 def step_of(values: Array) -> float:
-    """Resolution: the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
+    """Resolution of figures: the largest power of ten from 1e-6 to 1000 of which all are multiples; 0 without one."""
     for power in range(3, -7, -1):
         parts = values * 10.0**-power
         if np.abs(parts - np.round(parts)).max() < 1e-6 * max(1.0, float(np.abs(parts).max()) * 1e-6):
@@ -247,7 +249,7 @@ def _reach(campaign: Campaign) -> float:
 
 
 def another_unit(campaign: Campaign) -> float | None:
-    """Factor that converts the URDF's lengths to m; ``None`` where an arm may be so long."""
+    """Detect a URDF in a wrong length unit: factor that converts it to m; ``None`` if the arm's length is plausible."""
     length = sum(segment.length for segment in campaign.robot.segments)
     if length <= LONG_ARM:
         return THOUSAND if 0.0 < length < SHORTEST_ARM else None
@@ -261,7 +263,7 @@ def another_unit(campaign: Campaign) -> float | None:
 
 
 def in_another_unit(factor: float) -> str:
-    """Describe the unit of a URDF whose lengths times a factor are m."""
+    """Describe in words the wrong unit of a URDF, from the factor that converts its lengths to m."""
     if factor > 1.0:
         return "the links of the URDF are a thousand times too short"
     unit = min(URDF_UNITS, key=lambda own: abs(np.log(factor / LENGTH_UNITS[own])))
@@ -269,7 +271,7 @@ def in_another_unit(factor: float) -> str:
 
 
 def _length_unit(campaign: Campaign) -> Iterator[str]:
-    """Compare lengths with the arm's reach, to detect a wrong unit."""
+    """Yield doubts on the length unit, from target, noise and extent of positions compared with the arm's reach."""
     robot, reach, factor = campaign.robot, _reach(campaign), another_unit(campaign)
     if factor is not None:
         yield f"{in_another_unit(factor)}, {reach:.3g} m together"
@@ -292,7 +294,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
 
 
 def _apart(campaign: Campaign) -> Iterator[str]:
-    """Compare distances between measured points with the commanded ones, which no base frame changes."""
+    """Yield a doubt if two points were measured farther apart than their commands allow for any base and target."""
     reach = _reach(campaign)
     simulated = campaign.simulated_position is not None
     if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):
@@ -366,7 +368,7 @@ def _rows(campaign: Campaign, chosen: NDArray[np.int64]) -> str:
 
 
 def _declared(campaign: Campaign) -> Iterator[str]:
-    """Compare the labels of poses and the stated noise with what was commanded and measured."""
+    """Yield doubts on declarations: a pose label with different commands, noise too large or too fine to be real."""
     labels = np.empty(0, dtype=str) if campaign.pose_labels is None else campaign.pose_labels
     known = [str(label) for label in np.unique(labels[labels != ""])]
     different = [label for label in known if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND]

@@ -46,9 +46,9 @@ MINIMUM_POSES = 3  # Distinct configurations without which a rigid frame can tur
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
-    """Validate a table and build the campaign; errors name row and column.
+    """Validate a table and build the campaign in SI; a CampaignError names row and column.
 
-    Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
+    With ``measured`` false the rows are to be predicted, and measured columns are ignored.
     """
     units, told, left_out = settings.units, None, list[str]()
     table = named(table, robot, units)
@@ -84,7 +84,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
 
 
 def arrived(campaign: Campaign) -> Campaign:
-    """Campaign with directions of approach derived from the order of rows where none are recorded."""
+    """Add directions of approach derived from the order of rows, if none are recorded and moves are ``"direct"``."""
     recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
     if recorded or campaign.moves != "direct":
         return campaign
@@ -94,7 +94,11 @@ def arrived(campaign: Campaign) -> Campaign:
 
 
 def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
-    """Return what is declared where it follows from what was measured, and the columns that are read."""
+    """Complete settings and columns by what follows from the kinds of measurement.
+
+    Moves not stated are ``"unknown"`` where the robot is led to a socket or plane, else ``"direct"``; base and tool are
+    known for poses from the controller, the base also where no row is a position or pose.
+    """
     led = {*columns.kinds, settings.kind} & {*names.TOUCHED}  # by hand, from whatever side
     settings = replace(settings, moves=settings.moves or MOVES[bool(led)])
     if columns.kinds == ("controller",):  # poses like any other, in the controller's frames
@@ -108,7 +112,10 @@ def framed(settings: Settings, columns: Columns) -> tuple[Settings, Columns]:
 def readings(
     table: Table, columns: Columns, settings: Settings
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
-    """Return by column what rows of other kinds than position and pose read, and all labels, the kinds among them."""
+    """Read the figures (N,) of rows of other kinds than position and pose, by column in SI, and all label columns.
+
+    Figures are 0 in rows of another kind; labels include each row's kind. A missing value is refused.
+    """
     labels = {label: np.array(table.text(label), dtype=np.str_) for label in columns.labels}
     if not columns.kinds:
         return {}, labels
@@ -137,7 +144,7 @@ def readings(
 
 
 def _commands(table: Table, robot: Robot, units: Units) -> Array:
-    """Joint positions (N, n), rad or m."""
+    """Read the commanded joint positions (N, n), rad or m; one beyond 1e6 is refused."""
     columns = []
     for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True):
         figures = table.numbers(joint)
@@ -150,7 +157,7 @@ def _commands(table: Table, robot: Robot, units: Units) -> Array:
 def _covariates(
     table: Table, columns: Columns, robot: Robot, units: Units, commands: Array
 ) -> tuple[dict[str, Array], dict[str, NDArray[np.bool_]], list[str]]:
-    """Covariates in SI with gaps imputed, masks of the gaps, and sentences on the imputation."""
+    """Read the covariates (N,) in SI with gaps imputed, masks (N,) of the gaps, and sentences on the imputation."""
     covariates: dict[str, Array] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
     warnings: list[str] = []
@@ -172,7 +179,7 @@ def _covariates(
 
 
 def _restarts(order: Array, commands: Array) -> bool:
-    """Whether a sequence begins again at its first number, with other commands at the same numbers: it is no clock."""
+    """Whether ``order`` is no clock: it falls, only ever to its first number, at which commands then differ."""
     falls = np.flatnonzero(np.diff(order) < 0.0) + 1
     if not len(falls) or (order[falls] != order[0]).any():
         return False
@@ -181,7 +188,7 @@ def _restarts(order: Array, commands: Array) -> bool:
 
 
 def _pose(table: Table, group: Sequence[str], units: Units) -> Array:
-    """Vectors (N, 3), m, or unit quaternions (N, 4) wxyz."""
+    """Read a group of columns as positions (N, 3), m, or as normalised quaternions (N, 4) wxyz."""
     figures = np.column_stack([table.numbers(column) for column in group])
     if len(group) == len(names.POSITION):
         return figures * units.length_scale
@@ -190,7 +197,7 @@ def _pose(table: Table, group: Sequence[str], units: Units) -> Array:
 
 
 def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | None) -> dict[str, Any]:
-    """Stated noise of a campaign and its targets; of several targets, propagated to their pose."""
+    """Noise and targets of a campaign as keyword arguments; noise of several targets is propagated to their pose."""
     stated, turn, each, targets = settings.noise_position, settings.noise_orientation, None, None
     place = stated
     if told:
@@ -207,7 +214,7 @@ def _noise(table: Table, columns: Columns, settings: Settings, told: Posed | Non
 
 
 def _too_few(file: str, campaign: Campaign) -> list[str]:
-    """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
+    """Warn if different configurations are too few to determine the unknown frames; refuse them if none is repeated."""
     if campaign.position is None:  # what rows of other kinds share is counted with them
         return []
     equations = 6 if campaign.measures == "pose" else 3
@@ -232,10 +239,10 @@ LOOSE = 2.0  # Times the stated noise from which on targets are said to move aga
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
-    """Poses of the rows from several targets, with sentences on what is left out or doubtful.
+    """Compute the pose of each row from several targets (Procrustes), with sentences on what is left out or doubtful.
 
-    Errors: a simulator's prediction, incomplete coordinates, collinear targets in all rows, a target never seen with
-    the others.
+    Returns the table of rows that determine a pose, too. A CampaignError refuses a simulator's prediction, incomplete
+    coordinates, collinear targets in all rows, and a target never seen with three others.
     """
     several = columns.targets
     file, first = table.file, f"x.{several[0]}"
@@ -289,11 +296,11 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
 
 
 def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array, str]:
-    """Impute the gaps of a covariate (N,), and say in plain words how.
+    """Impute the gaps (NaN) of a covariate (N,); returns the filled values and a phrase that says how.
 
-    A direction, velocity or acceleration that nobody noted is 0, which says "unknown" or "at rest". A payload or speed
-    stays until it is changed. Everything else varies smoothly: linear in between, held at both ends. ``clock`` (N,)
-    tells when each row was measured; the rows follow each other where it is absent.
+    A missing direction, velocity or acceleration is 0, which means "unknown" or "at rest". A payload or speed keeps its
+    previous value. Everything else is interpolated linearly, and held at both ends. ``clock`` (N,) is the time of each
+    row; without it rows are taken in their order.
     """
     gaps = np.isnan(values)
     quantity, _ = split_name(column)
@@ -313,7 +320,7 @@ def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array,
 
 
 def stated_path(call: str, path: str | Path, name: str = FILE_NAME) -> Path:
-    """Return the path that a call was given of a file of this ``name``; refuse what is none, and an empty one."""
+    """Validate a path argument of a ``call`` and convert it to a Path; another type or an empty text is refused."""
     require(call, path, (str, os.PathLike), f"the path of a {name}, or of its folder")
     if path == "":  # which Path takes for the folder that one stands in
         raise CampaignError(call, "the path is empty", expected=f"that of a {name}, or of its folder")
@@ -321,7 +328,7 @@ def stated_path(call: str, path: str | Path, name: str = FILE_NAME) -> Path:
 
 
 def name_of(file: Path, usual: str = FILE_NAME) -> str:
-    """Return the name of what a file declares: its folder's, where the file is called as usual."""
+    """Return the name of a campaign from its file: the folder's name if the file has its usual name, else its stem."""
     file = Path(os.path.abspath(file))  # the parent of "." and ".." has a name, too
     return file.parent.name if file.name == usual else file.stem
 
@@ -342,7 +349,7 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
     path
         campaign.toml, or the directory that holds it.
     folder
-        Against which the paths in it are resolved; its own where absent.
+        Folder that the paths in campaign.toml are relative to; its own where absent.
 
     Returns
     -------
@@ -456,7 +463,7 @@ def campaign_from_table(
         One row per measurement. Messages speak of its rows by their integer index.
     angle_unit, length_unit
         Units of the columns; ``length_unit`` also of ``target``, ``noise_position`` and ``payload_com``. By default
-        those that the table carries in its ``attrs``, as one of :meth:`Campaign.to_frame` does, else rad and m.
+        those in the table's ``attrs``, which :meth:`Campaign.to_frame` sets, else rad and m.
     base, tool
         ``"unknown"`` or ``"known"``, as under ``[frames]`` in campaign.toml.
     target
@@ -468,13 +475,13 @@ def campaign_from_table(
     reference_temperature
         °C at which the URDF's lengths hold.
     moves
-        ``"direct"`` where the robot goes straight from pose to pose in the order of the rows, which tells directions of
-        approach where no column does; else ``"unknown"``, which ``None`` means for rows that name what the robot was
-        led to, such as a socket.
+        ``"direct"`` where the robot goes straight from pose to pose in the order of the rows, from which directions of
+        approach are derived where no column has them; else ``"unknown"``. ``None`` is ``"unknown"`` for rows in which
+        the robot was led to a socket or plane, else ``"direct"``.
     priors, gears
         Expected size by effect; transmission ratio by joint.
     about
-        What stands on the first page of a report, by its name: serial numbers, operator, date.
+        Entries for the first page of a report, by name: serial numbers, operator, date.
     name
         Name of the campaign.
     measured
@@ -531,9 +538,9 @@ SAME_PLACE = 1e-9  # m: by which the tool frame differs between readings of one 
 
 
 def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ...]) -> Campaign:
-    """Further rows, a campaign or a table of the old one's columns and units, as a campaign to append.
+    """Validate further rows, a campaign or a table in the old one's columns and units, as a campaign to append to it.
 
-    Raises :class:`CampaignError` if they are of another robot or kind, or lack a column that is needed.
+    Raises :class:`CampaignError` if robot, kind of measurement or declarations differ, or a needed column is missing.
     """
     if not isinstance(rows, Campaign):
         import pandas as pd

@@ -57,7 +57,7 @@ class Heading(NamedTuple):
 
 
 def bare(column: str) -> Heading:
-    """Header without its unit, and that unit as this program spells it."""
+    """Split a column header such as ``X [mm]`` or ``x_mm`` into name and unit; ``None`` without a known unit."""
     for pattern in (_IN_BRACKETS, _BEHIND):
         if found := pattern.fullmatch(column.strip()):
             word = (found["square"] or found.groupdict().get("round") or "").strip().lower()
@@ -69,7 +69,7 @@ def bare(column: str) -> Heading:
 
 
 def size(unit: str | None, other: str) -> float | None:
-    """Conversion factor between units, 1 where a header names none; ``None`` for different quantities."""
+    """Conversion factor from ``unit`` to ``other``; 1 where the header has no unit, ``None`` for another quantity."""
     if unit is None or unit == other:
         return 1.0
     (one, rate), (base, other_rate) = unit.partition("/")[::2], other.partition("/")[::2]
@@ -78,7 +78,7 @@ def size(unit: str | None, other: str) -> float | None:
 
 
 def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, str]:
-    """Column of each joint found by name: its own, ``<joint>/position``, ``…/<joint>/position``."""
+    """Column of each joint found by name: its own name, ``<joint>/position``, or the only ``…/<joint>/position``."""
     there, found = [*columns], {}
     for joint in joints:
         own = [name for name in (joint, f"{joint}/position", f"{joint}.position") if name in there]
@@ -89,13 +89,16 @@ def joint_columns(columns: Iterable[str], joints: Sequence[str]) -> dict[str, st
 
 
 def defined(robot: Robot) -> dict[str, None]:
-    """Columns of the format for a robot, in order, as keys of a dict; those of several targets and of kinds apart."""
+    """Column names that the format defines for a robot, in order, as keys of a dict, but for numbered targets.
+
+    Columns of other kinds of measurement than position and pose are left out, too.
+    """
     conditions = names.conditions(robot.joint_names, robot.urdf_links)
     return dict.fromkeys((*robot.joint_names, *names.RESERVED, *conditions))
 
 
 def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
-    """Columns under another name or with a unit, by the campaign's names for a robot.
+    """Match headers of other programs to the campaign's column names: header and its unit, by the campaign's name.
 
     Columns that have the campaign's own name are not in it; nor is what two columns could be, or whose unit is of
     another kind.
@@ -124,7 +127,10 @@ def headings(columns: Iterable[str], robot: Robot) -> dict[str, Heading]:
 
 
 def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Heading]:
-    """Columns of joints named by their numbers, from 0 or from 1; empty where there are none."""
+    """Match numbered columns (A1 … A6, target_q_0 …) to all joints in order; empty where there are none.
+
+    Reported positions beside commanded ones are matched to ``encoder.<joint>``.
+    """
     stems: dict[str, dict[int, Heading]] = {}
     for column, (own, unit) in plain.items():
         if known := _NUMBERED.fullmatch(own):
@@ -142,7 +148,10 @@ def _numbered(plain: dict[str, Heading], joints: Sequence[str]) -> dict[str, Hea
 
 
 def named(table: Table, robot: Robot, units: Units) -> Table:
-    """Table with the campaign's column names and declared units; translations are among its warnings."""
+    """Rename foreign columns of a table to the campaign's names and convert units in headers to the declared ones.
+
+    The warnings of the table name both.
+    """
     known = headings(table.columns, robot)
     called = {heading.column: name for name, heading in known.items()}
     columns: dict[str, Cells] = {}
@@ -190,10 +199,10 @@ class Columns:
 
 
 def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> Columns:
-    """Sort a table's columns for a robot; ``measured`` requires what each kind of measurement reads.
+    """Classify a table's columns by role; with ``measured`` those that the kinds of measurement need are required.
 
-    Rows are of the ``kind`` stated, unless a column says it. Without ``measured`` these columns are ignored. Refused
-    are a joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
+    Rows are of the stated ``kind``, unless a column ``kind`` says otherwise. Without ``measured`` measured columns are
+    ignored. A missing column of a joint or coordinate, an incomplete quaternion, a name with two meanings are refused.
     """
     _refuse_two_meanings(table, robot)
     beside = [name for name in robot.joint_names if name not in robot.chain.names]
@@ -230,7 +239,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool, kind: str = "") -> 
 
 
 def _kinds(table: Table, stated: str) -> tuple[str, ...]:
-    """Return the kinds of measurement of the rows; none where all are positions or poses by the columns there."""
+    """Return the sorted kinds of measurement of the rows; empty where all are positions, or all are poses."""
     if not stated and names.KIND not in table.columns:
         stated = _by_columns(table)
     if names.KIND in table.columns:
@@ -245,7 +254,7 @@ def _kinds(table: Table, stated: str) -> tuple[str, ...]:
 
 
 def _by_columns(table: Table) -> str:
-    """Return the one kind whose labels are there, in a table without measured positions; else none."""
+    """Infer the kind of measurement: the only one all of whose columns are in a table without positions; else empty."""
     if any(name in names.POSITION or names.target_of(name) for name in table.columns):
         return ""
     there = [k for k, (figures, labels) in names.KINDS.items() if labels and {*figures, *labels} <= {*table.columns}]
@@ -253,9 +262,9 @@ def _by_columns(table: Table) -> str:
 
 
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
-    """Numbers of several targets, with warnings on those left out; empty where there is one.
+    """Return the numbers of several targets (columns x.1 …), with warnings on those left out; empty where there is one.
 
-    Errors: a missing axis, too few targets, a target without a number among numbered ones.
+    A CampaignError refuses a missing axis, too few targets, and x, y, z without a number beside numbered ones.
     """
     named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
     known = sorted({target[1] for target in named if target})
@@ -277,7 +286,7 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
 
 
 def _judge(table: Table, column: str, robot: Robot) -> tuple[str, str]:
-    """Role of a column that is neither a joint nor a pose nor a label, and a warning if it is doubtful."""
+    """Role (covariate, extra, ignored) of a column that is no joint, pose or label, and a warning or empty text."""
     quantity, place = split_name(column)
     if table.is_empty(column):
         return _IGNORED, f"column {column!r} is empty and counts as absent"
@@ -324,7 +333,7 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
 
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:
-    """Refuse a table that lacks a column, with the most similar names."""
+    """Raise a CampaignError if a table lacks a wanted column; it names the most similar columns."""
     spare = [column for column in table.columns if column not in wanted]
     for name in wanted:
         if name not in table.columns:

@@ -53,7 +53,7 @@ _TEXT = text("text in quotes, a number or a date")
 
 
 def sigma(value: Any, path: str) -> float | None:
-    """Take a standard deviation; 0 and ``None`` say that none is given."""
+    """Validate a standard deviation; 0 and ``None`` give ``None``, a negative or vanishing one a MisfitError."""
     found: float = 0.0 if value is None else _SIGMA(value, path)
     if 0.0 < found < SMALLEST:
         raise MisfitError(path, value, _STATED, "smaller than any noise")
@@ -76,7 +76,7 @@ def _known(value: Any, path: str) -> bool:
 
 
 def _said(value: Any, path: str) -> str:
-    """Take text, a number or a date as text."""
+    """Validate text, a number or a date, and convert it to text."""
     plain = isinstance(value, (int, float, date)) and not isinstance(value, bool)
     return str(_TEXT(str(value) if plain else value, path))
 
@@ -85,7 +85,7 @@ ABOUT = mapping(_said)
 
 
 class Field(NamedTuple):
-    """Where campaign.toml states a setting, and what it may be."""
+    """Schema of a setting: its section and key in campaign.toml, its validator, and whether it is a length."""
 
     section: str
     key: str  # empty where the section is the setting, whose keys are the user's own
@@ -196,16 +196,16 @@ class Settings:
         return {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
 
     def of_rows(self) -> dict[str, Any]:
-        """Fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
+        """Return the settings that a :class:`~thermal_robot.Campaign` takes over unchanged, as keyword arguments."""
         frames = ("base_known", "tool_known", "target", "payload_com")
         known = ("moves", "reference_temperature", "gears", "units", "facts", "about")
         return {key: getattr(self, key) for key in (*frames, *known)}
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
-        """Return the settings by section and key as in campaign.toml, lengths in its unit.
+        """Build settings in SI from values by section and key of campaign.toml, whose lengths are in its length unit.
 
-        ``sections`` state both units at least; ``ends`` are the robot's reference, the ends of the chain and gravity.
+        ``sections`` have both units at least; ``ends`` are arguments that replace them, such as ``tool_frame``.
         """
         measurements = sections["measurements"]
         units = Units(measurements["angle_unit"], measurements["length_unit"])
@@ -245,7 +245,7 @@ _KEYS: dict[str, Kind] = {
 
 
 def settings_kind(value: Any, path: str) -> Settings:
-    """Validate the settings in a file (:mod:`thermal_robot.schema`)."""
+    """Validate a mapping from a model file and build the Settings; a wrong value raises a MisfitError."""
     # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
     unsaid = {"moves": "unknown", "turned": (), "kind": "", "facts": {}, "about": {}}
     values = record(_KEYS)({**unsaid, **value} if isinstance(value, Mapping) else value, path)
@@ -253,11 +253,11 @@ def settings_kind(value: Any, path: str) -> Settings:
 
 
 def scaled(value: Any, scale: float) -> Any:
-    """Length, or three of them, times a factor."""
+    """Multiply a length, or a tuple of three, by a factor."""
     return as_vector(scale * each for each in value) if isinstance(value, tuple) else scale * value
 
 
 def as_vector(values: Any) -> Vector:
-    """Three floats; ``ValueError`` for any other number of them."""
+    """Convert three numbers to a tuple of floats; any other number of them raises a ``ValueError``."""
     x, y, z = (float(value) for value in values)
     return x, y, z

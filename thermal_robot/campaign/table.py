@@ -1,6 +1,6 @@
-"""Tables of text or numbers with row numbers, from CSV, Parquet, spreadsheets and data frames.
+"""Tables of text or numbers with row numbers, read from CSV, Parquet, MATLAB, spreadsheets and data frames.
 
-It knows nothing of robots or of what columns mean.
+The module does not depend on robots or on the meaning of columns.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
 
 
 def without_names(header: Iterable[str], file: str) -> str:
-    """Warning if a header holds numbers alone and hence is a row; else empty."""
+    """Warning text if a header consists of two or more numbers only, so that it is a data row; else empty."""
     try:
         figures = [float(name.replace(",", ".").replace("−", "-")) for name in header]
     except ValueError:
@@ -58,7 +58,7 @@ class Table:
 
     @property
     def headless(self) -> str:
-        """Warning of :func:`without_names` on its header."""
+        """Warning text if the table's header is a data row (:func:`without_names`); else empty."""
         return "" if self.header is None else without_names(self.columns, self.file)
 
     @property
@@ -67,7 +67,7 @@ class Table:
         return self.header is None and all(name == str(k) for k, name in enumerate(self.columns, start=1))
 
     def error(self, problem: str, column: str, index: int | None = None, **told: str) -> CampaignError:
-        """Error at a column, in the row of an index from 0, else in the header."""
+        """Build a CampaignError that names the file, a column, and the row of an index from 0, else the header's."""
         row = self.header if index is None else int(self.rows[index])
         return CampaignError(self.file, problem, row=row, column=column, **told)
 
@@ -79,11 +79,11 @@ class Table:
         expected: str,
         found: Callable[[int], str] | None = None,
     ) -> None:
-        """Refuse the first of (N,) rows that are wrong; what was found is its cell, unless ``found`` says more."""
+        """Raise a CampaignError for the first true row of the mask ``wrong`` (N,), with its cell or ``found`` of it."""
         refuse(self.file, column, wrong, problem, expected, found or partial(self._shown, column), self.rows)
 
     def _shown(self, column: str, index: int) -> str:
-        """Cell in a message: text in quotes, a number without."""
+        """Format a cell for a message: text in quotes, a number without, "an empty cell" where there is nothing."""
         cell = self.columns[column][index]
         if isinstance(cell, str):
             return repr(cell) if cell else "an empty cell"
@@ -95,7 +95,7 @@ class Table:
         Raises
         ------
         CampaignError
-            Text, a number that is infinite or larger than any, or an empty cell where none may be.
+            Text, a number that is infinite or too large, or an empty cell without ``gaps``.
         """
         values, text = self._parsed(column)
         if text.any():
@@ -119,7 +119,7 @@ class Table:
         return ["" if cell.lower() in _EMPTY else cell for cell in cells]
 
     def take(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> Table:
-        """Rows of (N,) booleans, or by their indices from 0, with their numbers."""
+        """Return the table of some rows, chosen by a mask (N,) or by indices from 0; row numbers are kept."""
         index = np.arange(len(self.rows))[chosen]
         columns: dict[str, Cells] = {
             name: cells[index] if isinstance(cells, np.ndarray) else [cells[int(i)] for i in index]
@@ -132,16 +132,16 @@ class Table:
         return {name: self.numbers(name, gaps=True) for name in self.columns if self.first_text(name) is None}
 
     def frame(self, *, numbers: bool = False) -> pd.DataFrame:
-        """Return the data frame of the cells, with ``numbers`` where a column has nothing else.
+        """Convert the table to a data frame; with ``numbers``, columns of numbers only are parsed, else kept as text.
 
-        Decimal commas become numbers in any case.
+        Columns of numbers are parsed in any case where the file has decimal commas.
         """
         import pandas as pd
 
         return pd.DataFrame({**self.columns, **(self.numeric() if numbers or self.decimal_comma else {})})
 
     def first_text(self, column: str) -> int | None:
-        """Index of the first cell that is not a number, ``None`` for a numeric column."""
+        """Index from 0 of the first cell that is neither a number nor empty; ``None`` for a numeric column."""
         return first_true(self._parsed(column)[1])
 
     def is_empty(self, column: str) -> bool:
@@ -150,7 +150,7 @@ class Table:
         return bool((np.isnan(values) & ~text).all())
 
     def _parsed(self, column: str) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the number in each cell, NaN where there is none, and which cells (N,) are text."""
+        """Parse a column: number (N,) in each cell, NaN where there is none, and mask (N,) of the cells with text."""
         cells = self.columns[column]
         if isinstance(cells, np.ndarray):
             return np.array(cells, dtype=np.float64), np.zeros(len(cells), dtype=bool)
@@ -165,7 +165,7 @@ class Table:
 
 
 def _number(cell: str, comma: bool) -> float | None:
-    """Return the number in a cell, NaN for an empty one, ``None`` for text."""
+    """Parse a cell, with decimal ``comma`` or point: a number, NaN for an empty cell, ``None`` for text."""
     # 1.234,5 has a thousands separator, which cannot be told from a decimal point; Python alone writes 1_000
     if "_" in cell or (comma and "." in cell):
         return None
@@ -177,7 +177,7 @@ def _number(cell: str, comma: bool) -> float | None:
 
 
 def listed_rows(numbers: NDArray[np.int64]) -> str:
-    """Count rows and list a few of their numbers: ``3 rows (4, 7, 9)``."""
+    """Text with the count of rows and the first five of their numbers: ``3 rows (4, 7, 9)``."""
     more = "" if len(numbers) <= _FEW else " …"
     return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
 
@@ -277,7 +277,7 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
 
 
 def without_library(file: str, ending: str) -> CampaignError:
-    """Error of a file whose ending needs a library that is not installed."""
+    """Build the CampaignError for a file whose ending needs a library that is not installed."""
     extra, problem = "parquet", "Parquet files need pyarrow, which is not installed"
     if ending in WORKBOOKS:
         extra, problem = "excel", f"workbooks need {WORKBOOKS[ending]}, which is not installed"
@@ -293,7 +293,7 @@ def _read_text(path: Path, layout: Layout, encoding: str) -> Table:
 
 
 def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = True) -> Table:
-    """Table of lines of fields."""
+    """Build a table from lines of text fields, whose first is the header if ``named``; detect decimal commas."""
     header, cells, numbers = _records(file, lines, named)
     if len(numbers) < 2:
         raise CampaignError(file, "has a header but no rows", expected=_ONE_ROW)
@@ -307,10 +307,10 @@ def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = Tru
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
-    """Table of a pandas data frame; one without rows, or with a duplicate column, is refused.
+    """Convert a pandas data frame to a table; one without rows, or with a duplicate column, is refused.
 
-    Rows are numbered from ``first_row``; without it they are known by an integer index of the frame, so that
-    ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
+    Rows are numbered from ``first_row``; without it by the frame's index if this is of unique integers, so that
+    ``frame.loc[row]`` finds the row that a message names, else by position from 0.
     """
     import pandas as pd
 
@@ -332,7 +332,7 @@ def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: i
 
 
 def _as_text(cell: object) -> str:
-    """Value as one line of text, or its type where that fails."""
+    """Convert a cell's value to text without blanks at the ends, or to the name of its type where that fails."""
     try:
         return str(cell).strip()
     except Exception:  # a cell may hold anybody's object, and Python writes no whole number of 5000 digits
@@ -341,7 +341,7 @@ def _as_text(cell: object) -> str:
 
 @contextmanager
 def _reading(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever a library raises over a file into a sentence."""
+    """Context manager that turns any error of a reading library into a CampaignError that names the file."""
     try:
         yield
     except CampaignError:
@@ -369,7 +369,7 @@ def _read_parquet(path: Path) -> Table:
 
 
 def _read_workbook(path: Path, layout: Layout) -> Table:
-    """First sheet of a workbook, with the spreadsheet's row numbers."""
+    """Read the first sheet of a workbook as a table, with the spreadsheet's row numbers."""
     import pandas as pd
 
     with _reading(path, "workbook"):
@@ -387,7 +387,7 @@ def _read_workbook(path: Path, layout: Layout) -> Table:
 
 
 def _read_matlab(path: Path) -> Table:
-    """Only matrix of a MATLAB file; columns are called 1, 2, 3 …, rows are counted from 1 as MATLAB does."""
+    """Read the one matrix in a MATLAB file as a table with columns 1, 2, 3 … and rows from 1; else refuse the file."""
     import pandas as pd
     from scipy.io import loadmat
 
@@ -405,9 +405,10 @@ def _read_matlab(path: Path) -> Table:
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
-    """Yield lines; skipped ones are blank, so that each keeps its number; runs of blanks shrink if ``even``.
+    """Yield the lines of a text file; skipped ones and comments are blanked, so that line numbers stay.
 
-    Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
+    With ``even`` each run of white space becomes one blank. Of leading lines that begin with # the last is the header,
+    as numpy writes it, unless the layout states a comment.
     """
     marked: list[str] = []
     leading = not layout.comment
@@ -428,7 +429,7 @@ def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[st
 
 
 def _separator(lines: Iterator[str]) -> str:
-    """Detect the separator in the first line: white space where no other is in it, nor in the next line."""
+    """Detect the separator: semicolon or tab if in the first line, white space if two lines fit it, else comma."""
     held = (line for line in lines if line.strip())
     header, line = next(held, ""), next(held, "")
     parts, rest = header.split(), line.split()
@@ -438,9 +439,9 @@ def _separator(lines: Iterator[str]) -> str:
 
 
 def _records(file: str, lines: Iterable[list[str]], named: bool) -> tuple[list[str], list[list[str]], list[int]]:
-    """Header, cells by column, and the line numbers of header and rows.
+    """Split lines of fields into header, cells by column, and line numbers of header and rows.
 
-    Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
+    Blank lines are left out. Where columns are not ``named``, the header is 1, 2, 3 … with line number 0.
     """
     header: list[str] = []
     cells: list[list[str]] = []

@@ -53,7 +53,7 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """Targets, and the pose of their common frame in each row."""
+    """Result of the Procrustes analysis: targets, and the pose of their common frame in each row."""
 
     targets: Targets  # of the rows that tell a pose
     # position, orientation: (N, 3) m and (N, 4) unit quaternions wxyz of their common frame
@@ -63,7 +63,7 @@ class Posed:
 
 
 def telling(points: Array) -> Mask:
-    """Mask (N,) of rows with three or more of the targets (N, K, 3) that are not collinear."""
+    """Mask (N,) of rows that determine a pose: three or more of the targets (N, K, 3) seen, and not collinear."""
     return _wide(points, _seen(points))
 
 
@@ -71,7 +71,7 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     """Generalised Procrustes analysis: the places of the targets, and the pose of their common frame in each row.
 
     ``points`` are (N, K, 3) measured places, m, of K ``numbers`` in rows that are :func:`telling`; NaN where a target
-    was not seen. ``None`` is returned where one is never seen beside three others whose places are known.
+    was not seen. Returns ``None`` if a target is never seen together with three others whose places are known.
     """
     seen = _seen(points)
     found = _places(np.nan_to_num(points), seen)
@@ -100,7 +100,7 @@ def _seen(points: Array) -> Mask:
 
 
 def _wide(points: Array, seen: Mask) -> Mask:
-    """Mask (N,) of rows in which the seen ones of (N, K, 3) points are three or more, and wider than a line."""
+    """Mask (N,) of rows in which three or more of (N, K, 3) points are seen, and are at least 1 % as wide as long."""
     points, count = np.where(seen[:, :, None], points, 0.0), seen.sum(axis=1)
     middle = points.sum(axis=1) / np.maximum(count, 1)[:, None]
     extent = np.linalg.svd(np.where(seen[:, :, None], points - middle[:, None], 0.0), compute_uv=False)
@@ -109,7 +109,10 @@ def _wide(points: Array, seen: Mask) -> Mask:
 
 
 def _places(points: Array, seen: Mask) -> Array:
-    """Robust Procrustes mean, (K, 3), in the axes of the row that shows most targets; NaN of one that is not linked."""
+    """Robust generalised Procrustes mean (K, 3) of the targets' places, with Cauchy weights, in the frame of one row.
+
+    It is the row that shows most targets. A target never seen with three others whose places are known is NaN.
+    """
     first = int(np.argmax(seen.sum(axis=1)))
     places = np.where(seen[first][:, None], points[first], np.nan)
     extent = float(np.linalg.norm(np.ptp(points[first][seen[first]], axis=0)))
@@ -131,7 +134,10 @@ def _places(points: Array, seen: Mask) -> Array:
 
 
 def _spread(places: Array, seen: Mask) -> Array:
-    """Propagated standard deviation, (N, 6) of :class:`Targets`; of the place the root mean square over its axes."""
+    """Propagate unit noise of the targets seen to the common frame's position and rotation: standard deviations (N, 6).
+
+    Those of the position are averaged over its three axes (root mean square).
+    """
     jacobian = point_jacobian(places)
     each = jacobian.transpose(0, 2, 1) @ jacobian
     variance = np.linalg.inv(np.einsum("nk,kab->nab", seen.astype(float), each)).diagonal(axis1=1, axis2=2).copy()
@@ -140,30 +146,30 @@ def _spread(places: Array, seen: Mask) -> Array:
 
 
 def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
-    """Root mean square standard deviation of positions, m, and with several targets of rotations, rad.
+    """Root mean square over rows of the standard deviation of positions, m, and with several targets rotations, rad.
 
-    ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
+    ``sigmas`` (N,), m, are those of one point in each row. The second value is ``None`` without several targets.
     """
     alike = bool(sigmas.min() == sigmas.max())
     return propagated_sigma(float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean())), targets)
 
 
 def propagated_sigma(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
-    """Propagate the standard deviation of a point to positions, m, and with several targets to rotations, rad."""
+    """Propagate one point's sigma, m, to positions, m, and rotations, rad (``None`` without several targets)."""
     return (sigma, None) if targets is None else (sigma * float(targets.typical[0]), sigma * float(targets.typical[1]))
 
 
 def of_a_point(sigma: float, targets: Targets | None) -> float:
-    """Return the standard deviation of a point, m, from that of positions."""
+    """Return the standard deviation of one point, m, from that of positions: inverse of :func:`propagated_sigma`."""
     return sigma if targets is None else sigma / float(targets.typical[0])
 
 
 def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
-    """Relative standard deviation (N, m) of each figure of a row to that of all rows; ``None`` where it is 1.
+    """Ratio (N, m) of the standard deviation of each measured figure to that of all rows; ``None`` if all are 1.
 
-    ``sigmas`` (N,) are of a point in each row, m, ``None`` where one holds for all; ``whole`` of positions, of all
-    rows, m. Where orientations were measured, ``turned``, m is 6; their noise is the same in all rows unless targets
-    tell it.
+    ``sigmas`` (N,), m, are those of one point in each row, ``None`` if equal; ``whole``, m, is that of positions over
+    all rows. m is 6 if orientations were measured (``turned``), else 3; noise of orientations is equal in all rows
+    unless they come from several targets.
     """
     factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
     if targets is not None:

@@ -18,9 +18,9 @@ same for every campaign, so that a law that was found in one can be told in anot
 
 
 def moves(q: Array) -> NDArray[np.bool_]:
-    """Mask (n,) of the joints that move, of positions (N, n) in rad or m; one boolean for one joint's (N,).
+    """Mask (n,) of the joints whose positions (N, n) span more than 1e-4 rad or m; one boolean for one joint's (N,).
 
-    One that stays within :data:`~thermal_robot.campaign.settings.STILL` is held, whatever its encoder reads.
+    The limit is :data:`~thermal_robot.campaign.settings.STILL`, above the jitter of an encoder at rest.
     """
     return np.asarray(np.ptp(q, axis=0) > STILL if len(q) else np.zeros(q.shape[1:], dtype=bool))
 
@@ -28,12 +28,12 @@ def moves(q: Array) -> NDArray[np.bool_]:
 def since_turns(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Signed distance from the last reversal, (N,) by joint, rad or m; negative on the way down.
+    """Signed distance since the last reversal (N,), by joint, rad or m; strains of Prandtl–Ishlinskii stop operators.
 
-    At the first row of a session no turn is known: the distance is that from there. Beside it stands, by the name
-    :func:`strained`, what elements of each of :data:`SLIPS` are strained by, rad or m: springs that follow the joint
-    until they slip, the stop operators of Prandtl and Ishlinskii (Kuhnen, *Modeling, identification and compensation of
-    complex hysteretic nonlinearities*, 2003). At the first row of a session they are slack.
+    The distance is negative while the joint decreases. Before a session's first reversal it counts from the first row.
+    The strains (N,), rad or m, under the names of :func:`strained`, are of springs that follow the joint until they
+    slip at each of :data:`SLIPS` (Kuhnen, *Modeling, identification and compensation of complex hysteretic
+    nonlinearities*, 2003); zero at the first row of a session.
 
     ``q`` are (N, n) commanded positions of n joints, rad or m: the robot goes straight on to the next. ``time`` or
     ``order`` among the covariates says which row comes after which; without either the answer is empty. ``sessions``
@@ -53,12 +53,12 @@ def since_turns(
 def arrivals(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Directions of approach, (N,) by ``approach.<joint>``, from the order of rows.
+    """Directions of approach (N,) by ``approach.<joint>``, from the order of rows: sign of each joint's last move.
 
-    +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
-    keeps the side that it had. 0 where nothing is known: at the first row of a session, and where ``order`` counts
-    rows that are not there (:func:`_whole`). It holds for a robot that goes straight from pose to pose. The arguments
-    are those of :func:`since_turns`.
+    +1 where the joint increased on its way from the row before, −1 where it decreased; a joint that did not move keeps
+    its direction. 0 where it is unknown: at the first row of a session, and after rows that ``order`` shows to be
+    missing (:func:`_whole`). This holds for a robot that goes straight from pose to pose. The arguments are those of
+    :func:`since_turns`.
     """
     side, order = np.zeros_like(q), covariates.get("order")
     runs = [part for run in _runs(covariates, sessions, len(q)) for part in _whole(run, order)]
@@ -85,10 +85,10 @@ def _runs(
 
 
 def _whole(run: NDArray[np.int64], order: Array | None) -> list[NDArray[np.int64]]:
-    """Parts of a run, rows in order, between which poses are missing: where a counter of rows leaves out a number.
+    """Split a run (row numbers in order) where poses are missing: where the counter ``order`` leaves out a number.
 
-    An order counts if its numbers are whole and its smallest step is the commonest, as of a counter of which rows were
-    struck; a time in seconds has steps of any size.
+    ``order`` is a counter if its numbers are whole and its smallest step is the most frequent; a time in seconds has
+    steps of any size, and the run stays whole.
     """
     if order is None or len(run) < 2 or (order != np.round(order)).any():
         return [run]
@@ -99,7 +99,7 @@ def _whole(run: NDArray[np.int64], order: Array | None) -> list[NDArray[np.int64
 
 
 def strained(joint: str, slip: float) -> str:
-    """Name of the strain of a stop operator of a joint that slips after a distance, rad or m."""
+    """Name of the strain of a joint's stop operator that slips at a distance, rad or m."""
     return f"{joint}, slips at {slip:.6g}"
 
 

@@ -68,10 +68,10 @@ SI = Units()  # What everything is in once it has been read
 
 
 def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
-    """Return the unit of a column of a robot's table: in those of a file, else SI.
+    """Return the unit symbol of a table column: angles and lengths in ``units`` of a file, SI by default.
 
-    It is empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
-    quaternion) and for a column that the format does not define.
+    It is empty for a dimensionless column (direction of approach, share of the speed, order, part of a quaternion) and
+    for one that the format does not define.
     """
     kinds = dict(zip(robot.joint_names, robot.joint_types, strict=True))
     if column in kinds:
@@ -91,6 +91,6 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
 
 
 def scale_of(column: str, robot: Robot, units: Units) -> float:
-    """SI factor of a column of a robot's table; 1 where it is in SI, in °C, or dimensionless."""
+    """SI value of one unit of a table column; 1 where it is in SI, in °C, or dimensionless."""
     word = unit_of(column, robot, units).partition("/")[0]
     return (ANGLE_UNITS | LENGTH_UNITS).get(word, 1.0)

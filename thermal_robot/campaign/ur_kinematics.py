@@ -36,7 +36,7 @@ and of two models or of two conventions at least one origin differs by more."""
 
 
 def elements(robot: Robot, file: str) -> dict[str, int]:
-    """Chain element of each link's joint; a chain that lacks one, or whose axis is not z, is refused."""
+    """Index in the chain of the joint that carries each UR link; a missing joint, or an axis not z, is refused."""
     chain = robot.chain
     found = {}
     for link, ending in LINKS.items():
@@ -52,9 +52,9 @@ def elements(robot: Robot, file: str) -> dict[str, int]:
 
 
 def with_kinematics(robot: Robot, file: str | Path) -> Robot:
-    """Robot of ur_description, from base to flange, with the joint origins of a kinematics.yaml.
+    """Replace the joint origins of a ur_description robot by those of a kinematics.yaml (factory calibration).
 
-    Refused are a file that is none, one of another model, and a robot of other frames.
+    A CampaignError refuses another kind of file, one of another model, and a robot with other frames.
     """
     from scipy.spatial.transform import Rotation
 

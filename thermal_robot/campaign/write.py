@@ -96,9 +96,10 @@ def write_planned(
 def write_commands(
     commands: Campaign, path: str | Path, *, derived: Sequence[str] = (), recorded: bool = False
 ) -> None:
-    """Write a table of commands, with empty cells for the measurements.
+    """Write a CSV table of commands, with empty cells for the measurements.
 
-    ``derived`` are columns that are left out; where temperatures are ``recorded`` their cells stay empty, too.
+    ``derived`` are columns that are left out; with ``recorded`` cells of temperatures, to be recorded, are empty, too,
+    and those of the joints where the robot is led to sockets or planes.
     """
     frame = replace(commands, orientation=None).to_frame().drop(columns=list(derived), errors="ignore")
     measured = names.KINDS[commands.measures][0]
@@ -110,7 +111,7 @@ def write_commands(
 
 
 def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
-    """Write campaign.toml and the robot; return the path of the former."""
+    """Write campaign.toml and robot.urdf to a folder; return the path of campaign.toml."""
     import tomli_w
 
     file = folder / FILE_NAME
@@ -152,11 +153,11 @@ def with_prediction(
     outside: Sequence[Sequence[str]],
     units: Units,
 ) -> pd.DataFrame:
-    """N samples of a robot with predicted columns in place of measured ones; other columns stay.
+    """Replace the measured columns of N samples by predicted ones; other columns stay.
 
-    ``position`` and ``std`` are (N, 3) m, of the target and one standard deviation per axis, and are given in the
-    length unit; ``orientation`` (N, 4) unit quaternions wxyz; ``outside`` names per row the columns in which it leaves
-    what was measured.
+    ``position`` (N, 3), m, is that of the target, ``std`` (N, 3), m, its standard deviation per axis, both written in
+    the length unit; ``orientation`` (N, 4) are unit quaternions wxyz; ``outside`` lists per row the columns whose
+    values are outside the measured range.
     """
     place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
     turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
@@ -172,10 +173,10 @@ def with_commands(
     direction: ArrayLike,
     units: Units,
 ) -> pd.DataFrame:
-    """N samples of a robot with corrected commands, (N, n) rad or m, as joint positions.
+    """Replace the joint positions of N samples by corrected commands ``q`` (N, n), rad or m, in the table's units.
 
-    ``std`` (N, 3) m and ``outside`` are as of :func:`with_prediction`; ``direction`` (N,) rad is by how much the
-    target's direction is missed. All is given in the units of the table.
+    ``std`` (N, 3), m, and ``outside`` are as for :func:`with_prediction`; ``direction`` (N,), rad, is the angle by
+    which the target's direction is missed.
     """
     found = headings(samples.columns, robot)
     own, there = {}, {str(name).strip(): str(name) for name in samples.columns}
@@ -189,13 +190,13 @@ def with_commands(
 
 
 def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:
-    """Columns of the predictive uncertainty and of extrapolation."""
+    """Columns of a prediction's uncertainty: ``std.x`` … in the length unit, and ``outside`` as text."""
     columns: dict[str, Any] = dict(zip(names.STD, np.asarray(std).T / units.length_scale, strict=True))
     return {**columns, names.OUTSIDE: [" ".join(left) for left in outside]}
 
 
 def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[str, Any]) -> pd.DataFrame:
-    """Return the samples with further columns, in place of those of these names and of measured ones."""
+    """Return the samples with further columns; measured columns, and those of the same names, are dropped."""
     called = {heading.column: name for name, heading in found.items()}
     meant = [called.get(str(name).strip(), str(name).strip()) for name in samples.columns]
     goes = [name in names.MEASURED or names.target_of(name) is not None or name in columns for name in meant]
@@ -208,7 +209,7 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
     Raises
     ------
     CampaignError
-        An ending that no table has, a file that cannot be written, or a library that is missing.
+        An unknown ending, a file that cannot be written, or a library that is missing.
     """
     ending = Path(path).suffix.lower()
     if ending and ending not in TABLES:

@@ -1,4 +1,4 @@
-"""Files of those who measured without an instrument: hand-eye data, corners in images, a ball in sockets.
+"""Importers of measurements without a tracker: hand-eye samples, board corners in images, a ball in sockets.
 
 Source of MoveIt's: github.com/moveit/moveit_calibration, ``handeye_control_widget.cpp``: joint states are a map of
 ``joint_names`` and ``joint_values``, a list for each sample; samples a list of maps with ``effector_wrt_world`` and
@@ -52,7 +52,7 @@ _LEAST_TURN = 0.05  # rad: the axis of a smaller turn is lost in what a camera s
 
 
 def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
-    """(N, 4, 4) of all samples, whichever way the sixteen figures are laid out."""
+    """Homogeneous transforms (N, 4, 4) under a key of all samples, row- or column-major; an invalid one is refused."""
     try:
         found = np.array([sample[key] for sample in samples], dtype=float).reshape(-1, 4, 4)
     except (TypeError, KeyError, ValueError) as error:
@@ -66,7 +66,7 @@ def _poses(file: str, samples: Sequence[Any], key: str) -> Array:
 
 
 def _apart(one: Array, other: Array) -> float:
-    """Return how far the axes of turns are from one common rotation of the others: rms over their size."""
+    """Relative rms residual of the best rotation that takes rotation vectors ``one`` (N, 3) to ``other`` (N, 3)."""
     origin = np.zeros((1, 3))
     first, second = (np.concatenate([own, -own, origin]) for own in (one, other))
     turn = align(first, second, np.ones(len(first)))[:3, :3]
@@ -74,7 +74,10 @@ def _apart(one: Array, other: Array) -> float:
 
 
 def _on_the_hand(file: str, hand: Array, eye: Array) -> bool:
-    """Tell whether the camera moves with the hand, from poses (N, 4, 4) of both: see the module's text."""
+    """Whether the camera is on the hand, not in the room, from hand poses and seen board poses (N, 4, 4).
+
+    It is if one rotation maps the hand's motions in its own frame better to those seen than its motions in the world.
+    """
     hand, eye = hand[:, :3, :3], eye[:, :3, :3]
     seen = log3(eye[1:] @ eye[:-1].transpose(0, 2, 1))
     large = np.linalg.norm(seen, axis=1) > _LEAST_TURN
@@ -87,7 +90,7 @@ def _on_the_hand(file: str, hand: Array, eye: Array) -> bool:
 
 
 def _moveit(files: Sequence[Path], plan: Plan) -> Source:
-    """Read joint states and samples, in either order."""
+    """Read MoveIt's joint states and hand-eye samples, two files in either order, as a table of joints and poses."""
     read = [(str(file), (read_yaml(file) or [None])[0]) for file in files]
     (name, own), (file, listed) = sorted(read, key=lambda each: isinstance(each[1], list))
     if not isinstance(own, dict) or not isinstance(listed, list) or not {"joint_names", "joint_values"} <= {*own}:
@@ -138,7 +141,7 @@ def _board(file: Path) -> Array:
 
 
 def _on_board(corners: Table, file: Path, unit: str) -> Table:
-    """Corners with the places of their numbers on a board, in a unit of length."""
+    """Add columns X, Y, Z: the place of each row's corner number on a Kalibr board, in a unit of length."""
     name, points = column_name(corners, "corner"), _board(file) / LENGTH_UNITS[unit]
     numbers = corners.numbers(name)
     wrong = ~np.isin(numbers, np.arange(len(points)))
@@ -152,7 +155,7 @@ _CORNERS: dict[str, Any] = {"robot": {"moves": "unknown"}, "measurements": {"kin
 
 
 def _corners(files: Sequence[Path], plan: Plan) -> Source:
-    """Read corners by image, and the joints at each image; the one camera that the mapping states sees them."""
+    """Read corners by image, and join the joints at each image; the mapping, or a column, states the camera."""
     cameras, unit = [*plan.sections.get("camera", {})], plan.sections.get("measurements", {}).get("length_unit", "m")
     corners, states = (read_table(file, plan.layout()) for file in files[:2])
     if len(files) > 2:
@@ -188,7 +191,7 @@ _SOCKETS: dict[str, dict[str, Any]] = {
 
 
 def _mukca(files: Sequence[Path], plan: Plan) -> Source:
-    """Read the files of sockets among some files, or in folders at any depth; or one table of all rows."""
+    """Read MUKCa's joint readings at sockets: files ``hole_<k>.csv``, also in folders at any depth, or one table."""
     if len(files) == 1 and files[0].is_file() and not _HOLE.fullmatch(files[0].name):
         return Source(read_table(files[0], plan.layout()), planned(_SOCKETS))
     inside = [found for file in files for found in (sorted(file.rglob("hole_*.csv")) if file.is_dir() else [file])]

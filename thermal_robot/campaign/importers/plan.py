@@ -1,7 +1,7 @@
-"""Mapping of a foreign table to a campaign: a campaign.toml with sources for the columns.
+"""Mapping of a foreign table to a campaign: sections as in campaign.toml, and sources for the columns.
 
-A table becomes a campaign by it: every importer's last step. Columns are sums of others with scales, signs and
-instants; orientations quaternions, angles, vectors or matrices.
+Every importer ends with it. A campaign's column is a sum of table columns with scale and offset, a constant, a counter
+or a time stamp; orientations are read from quaternions, Euler angles, rotation vectors or matrices.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ JOINTS = "joints"  # Key of the list that names the columns of all joints, in th
 
 @dataclass(frozen=True)
 class Column:
-    """Source of one column: a sum of table columns, times ``scale``, plus ``offset``."""
+    """Source of a campaign column: a sum of table columns times ``scale`` plus ``offset``, a constant or a counter."""
 
     sources: tuple[str | int, ...] = ()  # names of columns, or numbers from 1; several are added
     scale: float = 1.0  # and offset: in the unit that the campaign's column has
@@ -49,7 +49,10 @@ class Column:
     count: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
 
     def numbers(self, table: Table) -> Array:
-        """Numbers (N,), NaN where a cell is empty; text and times of another pattern are refused."""
+        """Compute the column's numbers (N,), NaN where a cell is empty; text and times of another pattern are refused.
+
+        Times, and with ``since_first`` any values, are counted from the smallest one.
+        """
         rows = len(table.rows)
         if isinstance(self.value, str):
             problem, found = "text where a number should be", repr(self.value)
@@ -62,12 +65,12 @@ class Column:
         return values - np.fmin.reduce(values) if self.since_first or self.time else values
 
     def header_unit(self, table: Table) -> str | None:
-        """Return the unit in the header of its source; ``None`` for a sum, or with another scale than a sign."""
+        """Return the unit in its only source's header; ``None`` for a sum, offset, time, or scale other than ± 1."""
         plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
         return bare(column_name(table, self.sources[0])).unit if plain else None
 
     def complete(self, table: Table, name: str = "") -> Array:
-        """Numbers (N,) without gaps; ``name`` is the campaign's column, for the message."""
+        """Compute the column's numbers (N,), refusing empty cells; ``name`` is the campaign's column in the message."""
         values = self.numbers(table)
         problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
         column = " + ".join(map(str, self.sources))
@@ -75,14 +78,14 @@ class Column:
         return values
 
     def text(self, table: Table) -> list[str]:
-        """Texts (N,); those of several sources joined by a blank."""
+        """Return the column's cells as N texts; those of several sources are joined by a blank."""
         if self.count or self.value is not None:
             return [str(k) if self.count else str(self.value) for k in range(len(table.rows))]
         cells = (table.text(column_name(table, each)) for each in self.sources)
         return [" ".join(row) for row in zip(*cells, strict=True)]
 
     def _instants(self, table: Table, name: str) -> Array:
-        """Time stamps (N,) in s since an epoch."""
+        """Parse texts by the pattern ``time`` as time stamps (N,), s since 1970 UTC, NaN where empty; else refuse."""
         import pandas as pd
 
         cells = pd.Series(table.text(name), dtype=object)
@@ -97,7 +100,7 @@ class Column:
 
 
 def column_name(table: Table, source: str | int) -> str:
-    """Name of a table column, by its name or number; an unknown one is refused."""
+    """Name of a table column by its name, its name without a unit, or its number from 1; an unknown one is refused."""
     names = list(table.columns)
     if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
         return str(source)
@@ -113,7 +116,7 @@ def column_name(table: Table, source: str | int) -> str:
 
 
 def _either(of_text: Kind, other: Kind, kind: type) -> Kind:
-    """Return a validator that uses the first one for values of a type, the other one else."""
+    """Return a validator that applies ``of_text`` to values of the type ``kind``, and ``other`` to all else."""
     return lambda value, path: (of_text if isinstance(value, kind) else other)(value, path)
 
 
@@ -132,7 +135,7 @@ _ORIGINS = ("column", "sum", "value", "count")
 
 
 def column_kind(value: Any, path: str) -> Column:
-    """Validate a column's source: a name, a number, or an inline table."""
+    """Validate a column's source and build the Column: a name, a number from 1, or an inline table with one origin."""
     if not isinstance(value, Mapping):
         return Column((_SOURCE(value, path),))
     stated = record(_FIELDS, may_lack=_FIELDS)(value, path)
@@ -143,7 +146,7 @@ def column_kind(value: Any, path: str) -> Column:
 
 
 def columns_kind(value: Any, path: str) -> dict[str, Any]:
-    """Validate the sources by column of a section, ``joints`` being a list."""
+    """Validate the section ``columns`` of a mapping: a source by column, for ``joints`` a list of sources."""
     joints = list_of(column_kind)
     return {name: (joints if name == JOINTS else column_kind)(v, below(path, name)) for name, v in value.items()}
 
@@ -159,7 +162,7 @@ _SEQUENCES = tuple(
 
 @dataclass(frozen=True)
 class Orientation:
-    """Convention of the orientations in a table."""
+    """Convention by which a table's columns hold orientations: quaternion, Euler angles, rotation vector or matrix."""
 
     kind: str  # one of those above
     columns: tuple[Column, ...]  # where the figures come from; of a matrix row by row
@@ -200,7 +203,7 @@ class Orientation:
 
     @property
     def position(self) -> tuple[Column, ...]:
-        """Position columns of a matrix of twelve or sixteen entries; empty otherwise."""
+        """Sources of x, y and z in a homogeneous matrix of 12 or 16 entries; empty for other conventions."""
         return self.columns[3:12:4] if len(self.columns) > 9 else ()
 
 
@@ -215,7 +218,7 @@ _KEYS = {
 
 
 def orientation_kind(value: Any, path: str) -> dict[str, Orientation]:
-    """Validate the orientation convention; the one entry of the section is called ``stated``."""
+    """Validate the section ``orientation`` of a mapping; returns its Orientation under the only key ``stated``."""
     given = record(_KEYS, may_lack=("order", "sequence", "unit", "inverse"))(value, path)
     kind, counts = given["kind"], _COUNTS[given["kind"]]
     if len(given["columns"]) not in counts:
@@ -264,24 +267,24 @@ class Plan:
     sections: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def get(self, section: str, key: str, default: Any = None) -> Any:
-        """Value of a key, or the default."""
+        """Return the value of a key in a section, or the default."""
         return self.sections.get(section, {}).get(key, default)
 
     def over(self, other: Plan) -> Plan:
-        """Merge with another mapping, which fills what this one does not state."""
+        """Merge with another mapping; values of this one take precedence, key by key."""
         both = {*other.sections, *self.sections}
         merged = {each: {**other.sections.get(each, {}), **self.sections.get(each, {})} for each in both}
         return Plan(self.file or other.file, merged)
 
     def layout(self, section: str = "table") -> Layout:
-        """Layout of a table; the section is ``table``, or ``commands`` of the second one."""
+        """Layout of a table (separator, skipped lines, header, comment) from the section ``table`` or ``commands``."""
         stated = {key: value for key, value in self.sections.get(section, {}).items() if key not in JOINING}
         if "separator" in stated:
             stated["separator"] = _SEPARATORS[stated["separator"]]
         return Layout(**stated)
 
     def robot(self) -> Robot:
-        """Load the robot, which a mapping must name."""
+        """Load the robot that the mapping names, with its kinematics.yaml if stated; none named is refused."""
         urdf = self.get("robot", "urdf")
         if urdf is None:
             expected = "--robot URDF, or [robot] urdf in the file of --mapping"
@@ -306,7 +309,7 @@ IN_SI: dict[str, dict[str, Any]] = {"measurements": {"angle_unit": "rad", "lengt
 
 
 def planned(sections: Mapping[str, Mapping[str, Any]], file: str = "import") -> Plan:
-    """Return the plan that a format brings along, written as a mapping is; errors name the ``file`` it is from."""
+    """Build a mapping from sections in Python, validated like a user's file; errors name ``file``."""
     return Plan("", given(file, "", sections, lambda stated, _: fitted_sections(KINDS, stated)))
 
 
@@ -349,10 +352,10 @@ def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> Non
 
 
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
-    """Build a campaign from a foreign table, with sentences on the rows read and left out.
+    """Build a campaign from a foreign table by a mapping, with sentences on the rows and columns left out.
 
-    ``plan`` is all that is said of the table, the user's mapping first. What cannot be used is refused with row and
-    column of the table.
+    ``plan`` is the user's mapping merged with the format's. Rows without a measured position are left out. Errors name
+    row and column of the table.
     """
     table = source.table
     columns = _columns(table, plan, robot)
@@ -395,7 +398,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
 
 
 def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
-    """Source of each campaign column: as mapped, else the table column of that name."""
+    """Source of each campaign column: the mapping's, else the table column of that name or of a known other name."""
     stated, orientation = dict(plan.sections.get("columns", {})), plan.get("orientation", "stated")
     joints = stated.pop(JOINTS, ())
     if joints and len(joints) != robot.n:
@@ -413,7 +416,7 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:
-    """Cells of the campaign's columns; commands and measurements may have no gaps."""
+    """Compute each campaign column's cells: text of labels, else numbers; gaps in joints and x, y, z are refused."""
     whole = [name for name in (*robot.joint_names, *names.POSITION) if name in columns]
     cells: dict[str, Cells] = {}
     for name in dict.fromkeys([*whole, *columns]):

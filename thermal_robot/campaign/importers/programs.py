@@ -9,8 +9,8 @@ RAPID: ABB 3HAC16581-1, *Technical reference manual, RAPID Instructions, Functio
 ``[[rax_1, …, rax_6], [eax_a, …, eax_f]]`` in degrees, a robtarget ``[[x, y, z], [q1, q2, q3, q4], [cf1, cf4, cf6, cfx],
 [eax_a, …]]`` in mm with a quaternion whose scalar is q1; 9E9 is an external axis that is not there.
 
-Axes are commands. Places are none, as several postures have one: those of a second program count as measured. Points
-come as they are driven to where the program moves, else as they are declared.
+Joint targets are commands. Cartesian targets are not, as several postures reach them: those of a second program count
+as measured. Points are in the order of the motion statements, or without any in that of their declarations.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ Point = dict[str, Any]
 
 
 def _aggregate(text: str) -> list[Point]:
-    """Fields of an aggregate in braces (KRL)."""
+    """Parse the fields of a KRL aggregate (``A1 0.0,A2 -90.0``) as a list of one point: number by upper-case name."""
     fields = re.findall(rf"(\w+)\s+({_NUMBER})", text, re.IGNORECASE)
     return [{key.upper(): float(value) for key, value in fields}]
 
 
 def _targets(text: str) -> list[Point]:
-    """Targets in brackets (RAPID): one, or an array."""
+    """Parse RAPID jointtargets or robtargets, one or an array, as numbers by name, without absent axes (9E9)."""
     brackets = re.findall(r"\[([^][]+)\]", text)
     numbers = [[float(part) for part in re.findall(_NUMBER, bracket, re.IGNORECASE)] for bracket in brackets]
     points, at = [], 0
@@ -63,7 +63,7 @@ def _targets(text: str) -> list[Point]:
 
 
 class Language(NamedTuple):
-    """Syntax of a manufacturer's robot programs."""
+    """Syntax of a manufacturer's robot programs: file endings, comment, pattern of statements, parser of points."""
 
     endings: tuple[str, ...]
     data: str  # ending of the file beside a program that declares its points
@@ -103,7 +103,7 @@ _RAPID = Language(
 
 
 def _program(file: Path, language: Language) -> Table:
-    """Points of a program as a table: names, joint positions, positions."""
+    """Read a program's points as a table: those moved to, in order, else those declared; names, axes, positions."""
     import pandas as pd
 
     beside = [other for other in file.parent.glob(f"{file.stem}.*") if other.suffix.lower() == language.data]
@@ -126,7 +126,10 @@ def _program(file: Path, language: Language) -> Table:
 
 
 def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
-    """Read a program of joint targets and measured points, a table or a program, in either order."""
+    """Read two files, joint targets in a program and measured points in a table or program, and join them.
+
+    The join is by point names where they agree, else row by row; the files may be in either order.
+    """
     tables = [
         _program(file, language) if file.suffix.lower() in language.endings else read_table(file, plan.layout())
         for file in files
@@ -155,9 +158,9 @@ def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
 
 
 def _named(measured: Table, points: Sequence[str], stated: str | None) -> tuple[str, list[str]]:
-    """Measured column with the names of the points, empty without one, and these names as the program spells them.
+    """Find the measured column that has most of the program's point names; returns it and the points as spelled there.
 
-    Of KUKA's point P1 the variable is XP1, and capitals and small letters are the same.
+    The column is empty without any. Case is ignored, and KUKA's variable XP1 is its point P1.
     """
     best, called, most = "", list(points), 0
     for column in [column_name(measured, stated)] if stated else measured.columns:

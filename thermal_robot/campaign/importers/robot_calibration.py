@@ -38,7 +38,10 @@ _SAMPLE = "joint_states, and observations with a sensor_name and a list of featu
 
 
 def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
-    """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another."""
+    """Read samples of ROS robot_calibration, or capture poses joined with a table of measured points row by row.
+
+    The target in a sample is the first feature, or number ``feature``, of the sensor in ``[recording]`` of the mapping.
+    """
     file = next((file for file in files if is_yaml(file)), files[0])
     documents = read_yaml(file)
     listed_once = documents[0] if len(documents) == 1 and isinstance(documents[0], list) else []
@@ -60,7 +63,7 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _table(file: str, items: Sequence[Any], row: Callable[[Any], dict[str, float]], expected: str) -> Table:
-    """Table of the numbers by name in each item, rows counted from 1; an item without them is refused."""
+    """Build a table of the numbers that ``row`` reads from each item, rows counted from 1; a wrong item is refused."""
     import pandas as pd
 
     rows = []
@@ -95,7 +98,7 @@ def _observations(sample: Any) -> list[Any]:
 
 
 def _only_sensor(file: str, documents: Sequence[Any]) -> str:
-    """Name of the sensor, if all observations have the same."""
+    """Name of the one sensor of all observations; none or several are refused."""
     sensors = sorted({each["sensor_name"] for sample in documents for each in _observations(sample)})
     if len(sensors) != 1:
         problem = "it is not clear which sensor measured" if sensors else "there are no observations"
@@ -115,7 +118,7 @@ _UNIVERSE = "universe"  # What Pinocchio calls the frame before the first joint:
 
 
 def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
-    """Read the data; the first marker is the target."""
+    """Read FIGAROH's CSV data, marker 1 being the target, with frames and target place from its YAML if given."""
     tables, configurations = ([file for file in files if is_yaml(file) == wanted] for wanted in (False, True))
     files_of(tables, "DATA.csv [CONFIG.yaml]", 1, 1)
     table = read_table(tables[0], plan.layout())
@@ -129,7 +132,7 @@ def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _configured(file: Path) -> dict[str, dict[str, Any]]:
-    """Chain and marker in the YAML, in either layout."""
+    """Read tool frame, root frame and target place from FIGAROH's YAML, in either layout, as sections of a mapping."""
     whole = next(iter(read_yaml(file)), None)
     task = _within(whole, "tasks", "calibration") or _within(whole, "calibration")
     if not task:

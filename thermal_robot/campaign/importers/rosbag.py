@@ -71,7 +71,7 @@ class Stream:
 
 
 def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
-    """Time series sorted by time, without gaps and duplicate times."""
+    """Build a time series sorted by time, without NaN rows and duplicate times; fewer than two samples are refused."""
     kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
     _, first = np.unique(time[kept], return_index=True)
     if len(first) < 2:
@@ -100,9 +100,10 @@ def paired(
     velocity: float = VELOCITY,
     settling: float = SETTLING,
 ) -> Pairs:
-    """Pair two recordings at standstills, in the middle of each after settling.
+    """Pair the samples of two recordings nearest to the middle of each standstill of the joints, after settling.
 
-    ``lag``, s: the robot's clock shows that much more than the instrument's. The limits are as the constants above.
+    ``lag``, s, is robot clock minus instrument clock. A standstill has joint velocities below ``velocity`` for at least
+    ``standstill`` s; a target sample counts within ``tolerance`` s.
     """
     times = joints.time
     moved = joints.between(times + WINDOW / 2) - joints.between(times - WINDOW / 2)
@@ -127,7 +128,7 @@ LEAST = 60  # samples in motion that a fit of ten figures and its scatter want
 
 
 class Lag(NamedTuple):
-    """Clock offset of two recordings."""
+    """Estimated clock offset of two recordings, with its standard deviation and the residual of the fit."""
 
     value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
     std: float  # one standard deviation, s
@@ -135,7 +136,7 @@ class Lag(NamedTuple):
 
 
 def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
-    """Clock offset by cross-correlation of speeds, then least squares; its deviation by the jackknife.
+    """Estimate the clock offset by cross-correlation of speeds, then least squares; its deviation by the jackknife.
 
     Recordings that show no motion in common, or hardly any, are refused.
 
@@ -167,7 +168,7 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
 
 
 def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> float:
-    """Lag of the largest cross-correlation of the speeds of recordings that begin at 0, s."""
+    """Lag, s, at which the target's speeds in two recordings that begin at 0 have the largest cross-correlation."""
     from scipy.signal import correlate, correlation_lags
 
     spans = [stream.time[-1] for stream in (joints, target)]
@@ -182,14 +183,14 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
 
 
 def _speeds(stream: Stream, times: Array) -> Array:
-    """Central differences: speed (M,) m/s of the target at given times."""
+    """Speed (M,), m/s, of the interpolated target position at given times, by central differences."""
     return np.asarray(np.linalg.norm(np.gradient(stream.between(times)[:, :3], times, axis=0), axis=1))
 
 
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
-    """Least squares: lag, motion of the instrument's frame and place of the target; and what is left, m rms.
+    """Fit lag, pose of the instrument's frame and place of the target on the tool by nonlinear least squares.
 
-    The rotation is about the aligned start, so that all ten unknowns are near zero.
+    Returns the ten parameters and the residual, m rms. The rotation is relative to the aligned start, hence small.
     """
     from scipy.optimize import least_squares
 
@@ -244,7 +245,7 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
 
 
 def _named(table: Table) -> Table:
-    """Table with names of columns: sec, nanosec, frame, names and their positions, or x y z (qx qy qz qw)."""
+    """Name the columns of headerless CSV from ``ros2 topic echo``: time, and joints by name or x y z (qx qy qz qw)."""
     stamps, fields = list(table.columns)[:2], list(table.columns)[2:]
     time = table.numbers(stamps[0]) + table.numbers(stamps[1]) * _NANOSECOND
     # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
@@ -263,7 +264,7 @@ def _named(table: Table) -> Table:
 
 
 def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
-    """Column of each joint; empty where one is missing."""
+    """Column of each joint's position, by joint name; empty without any, an error where only some are recorded."""
     named = {
         table.text(name)[0]: name.replace("name", "position", 1)
         for name in table.columns
@@ -278,7 +279,7 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
 
 
 def _target(table: Table) -> dict[str, str]:
-    """Columns of the target's position, and of its orientation where all four are there."""
+    """Columns of the target's position, and its quaternion if complete, by campaign name; empty without a position."""
     parts: dict[str, str] = {}
     for name in table.columns:
         if found := _PART.search(name):
@@ -305,8 +306,8 @@ def read_bag(
 ) -> tuple[Stream | None, Stream | None]:
     """Time series of the chain's joints and of the target in a bag; ``None`` where no topic has such messages.
 
-    A topic is ``None`` where one alone has such messages. A bag that cannot be read is refused, and so are several
-    topics to choose from and a joint that is not recorded.
+    A topic may be ``None`` where only one has such messages. An unreadable bag, several topics to choose from, and a
+    joint that is not recorded are refused.
     """
     file = str(path)
     with opened(path) as reader:
@@ -317,7 +318,7 @@ def read_bag(
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """Give the ``AnyReader`` of a bag of ROS 1 or 2; refuse one that cannot be read."""
+    """Open a bag of ROS 1 or 2 and yield its ``AnyReader``; a bag that cannot be read raises a CampaignError."""
     file = str(path)
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
@@ -333,7 +334,7 @@ def opened(path: Path) -> Iterator[Any]:
 
 
 def messages(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
-    """Return the messages of one topic: when each was recorded, itself, and its type."""
+    """Return all messages of given types in the one topic that has them, or that stated: time in ns, message, type."""
     fitting = [c for c in reader.connections if c.msgtype in types]
     topics, kinds = sorted({c.topic for c in fitting}), " or ".join(types)
     if topic is None and len(topics) > 1:
@@ -350,7 +351,7 @@ def messages(file: str, reader: Any, types: Sequence[str], topic: str | None, ke
 
 
 def instant(stamp: int, message: Any) -> float:
-    """Return when a message was measured, s; when it was recorded where it does not say."""
+    """Return a message's time, s: of its header's stamp, or of its recording where the stamp is zero."""
     header = message.header.stamp
     return header.sec + header.nanosec * _NANOSECOND if header.sec or header.nanosec else stamp * _NANOSECOND
 
@@ -416,7 +417,7 @@ def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _streams(files: Sequence[Path], plan: Plan, robot: Robot) -> tuple[Stream, Stream]:
-    """Time series of joints and target, each from the one file that has it."""
+    """Read the time series of joints and of the target, each from the one file that has it; else refuse the files."""
     topics, read = [plan.get("recording", key) for key in ("joints", "pose")], []
     for file in files:
         bag = file.suffix.lower() in ENDINGS or is_folder(file)

@@ -44,9 +44,9 @@ class Imported(NamedTuple):
 
 
 def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str]) -> None:
-    """Refuse a folder in which files that are read, or a declaration that was not imported, would be overwritten.
+    """Refuse to import into a folder where input files, or a declaration that was not imported, would be overwritten.
 
-    ``names`` are those of the files that will be written, the declaration's first.
+    ``names`` are the names of the files that will be written, the declaration's first.
     """
     read = {Path(file).resolve() for file in files}
     for name in names:
@@ -62,8 +62,8 @@ def require_imported(files: Sequence[Path], directory: Path, names: Sequence[str
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan) -> Imported:
     """Import files of a format and write them as a campaign.
 
-    The directory is made if need be; a campaign in it is replaced where it was imported, too: what was measured may be
-    in any other, and nowhere else. ``plan`` is what the user says beyond the files; it counts for more than the format.
+    The directory is created if missing. A campaign in it is replaced only if it was imported, too; any other may hold
+    the only copy of measurements. ``plan`` is the user's mapping, which takes precedence over that of the format.
     """
     require_imported(files, directory, (FILE_NAME, TABLE_NAME, ROBOT_NAME))
     chosen = FORMATS[format]

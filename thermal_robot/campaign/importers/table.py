@@ -40,10 +40,10 @@ _FEW = 3  # Names of either table that a sentence shows: enough to see how the t
 
 
 def commands(file: Path, plan: Plan) -> Table:
-    """Read the second of two tables, laid out as ``[commands]``, or else as ``[table]``, says.
+    """Read the table of commands, the second of two, with the layout in ``[commands]`` of the mapping, else a guess.
 
-    A layout fits where the header, if it has any, is no row of numbers, and where no row is a header. What does not fit
-    is tried with a header or without, and as any table is read.
+    Tried in turn are the layout of ``[table]``, the same with or without a header, and the default, until the header is
+    no row of numbers and the first row no header.
     """
     if plan.sections.get("commands"):
         return read_table(file, plan.layout("commands"))
@@ -92,7 +92,7 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
 
 
 def _names_of(measured: Table, commanded: Table, key: str) -> str:
-    """Column of the commands with most names of points; refused without any."""
+    """Find the column of the commands that shares most names with the measured column ``key``; refused if none does."""
     points = measured.text(key)
     common = {name: len({*points} & {*commanded.text(name)} - {""}) for name in commanded.columns}
     best = max(common, key=lambda name: common[name])
@@ -107,7 +107,7 @@ def _names_of(measured: Table, commanded: Table, key: str) -> str:
 
 
 def _by_name(measured: Table, commanded: Table, key: str, taken: str) -> tuple[Table, Table, list[str]]:
-    """Join by name: the rows of both that belong together, and what was left out."""
+    """Inner join by point name: rows of both tables in the order of the measured ones, and notes on those left out."""
     points, called = measured.text(key), commanded.text(taken)
     where = {name: row for row, name in reversed([*enumerate(called)])}
     again = np.array([where[name] != row for row, name in enumerate(called)])
@@ -163,7 +163,7 @@ def _read_points(files: Sequence[Path], plan: Plan) -> Source:
 
 
 def _laid_out(file: Path) -> Layout:
-    """Detect the layout of a list of points; its first line that is no comment may be a header."""
+    """Detect the layout of a list of points: comments by //, and a header if the first line has no number."""
     layout = Layout(header=False, comment=COMMENT)
     table = read_table(file, layout)
     if len(table.columns) < len(POSITION):
@@ -174,7 +174,7 @@ def _laid_out(file: Path) -> Layout:
 
 
 def _called(table: Table, plan: Plan) -> Table:
-    """Name the columns collection, group, target, x, y, z as far as they are there."""
+    """Rename the columns of a list of points to collection, group, target, x, y, z, by header or by position."""
     there = list(table.columns)
     if table.header is not None:
         axes = {name: name.lower() for name in there if name.lower() in POSITION}
@@ -191,7 +191,7 @@ def _called(table: Table, plan: Plan) -> Table:
 
 
 def _names_before(table: Table) -> int:
-    """Return the number of leading name fields: text, or integers throughout where three fields remain."""
+    """Return the number (0 to 3) of leading columns that are names: text, or integers if three columns follow."""
     for count, name in enumerate(list(table.columns)[: len(_NAMES)]):
         spare = len(table.columns) - count > len(POSITION)
         if table.first_text(name) is None and not (spare and all(map(str.isdigit, table.text(name)))):
