@@ -127,7 +127,7 @@ def compare(
 def _opened(
     given: Any, stage: str, progress: Callable[[str], None], options: Mapping[str, Any]
 ) -> Diagnosis | ModelAsFit:
-    """Load or wrap a model, and diagnose what is neither model nor diagnosis."""
+    """Turn an argument of compare() into a diagnosis or a wrapped model; campaigns and their paths are diagnosed."""
     if is_model(given):
         return ModelAsFit.of(CorrectedModel.load(given, options["effects"]), Path(given).name)
     if isinstance(given, CorrectedModel):
@@ -138,7 +138,7 @@ def _opened(
 
 
 def _called(found: Sequence[Diagnosis | ModelAsFit], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the unique name of each campaign."""
+    """Return a name for each campaign: those given, else their own; equal ones get their number appended."""
     require(f"{CALL}, names", names, (list, tuple), "a name for each campaign")
     if names and len(names) != len(found):
         raise CampaignError(
@@ -191,7 +191,7 @@ def _compared(
 def _kept(
     listed: Sequence[Candidate], statistics: Sequence[Sums]
 ) -> tuple[Sequence[Candidate], list[Sums], tuple[str, ...]]:
-    """Parameters that the campaigns determine, renumbered, and the names of the others."""
+    """Keep the parameters that the campaigns together determine, renumbered; return the names of the others, too."""
     kept = identifiable(statistics)
     start, left, result = 0, [], []
     for item in listed:
@@ -206,7 +206,7 @@ def _kept(
 def _effects(
     listed: Sequence[Candidate], together: Joint, statistics: Sequence[Sums], names: Sequence[str]
 ) -> list[Compared]:
-    """Comparison of each effect, given those at work or named."""
+    """Compare each effect between campaigns by status, chi-square test and parameters, given all effects not absent."""
     status = [_judged(n, item, together, statistics, names) for n, item in enumerate(listed)]
     result = []
     for number, item in enumerate(listed):
@@ -233,7 +233,7 @@ def _effects(
 
 
 def _changes(listed: Sequence[Candidate], together: Joint, names: Sequence[str]) -> tuple[Change, ...]:
-    """Differences between campaigns; those of one effect at one place are one change."""
+    """Collect the differences between campaigns, largest chi-square first; those of one effect and place are merged."""
     by_place = sorted(together.changes, key=lambda c: (c.part.effect, c.part.place))
     found = (list(some) for _, some in groupby(by_place, key=lambda c: (c.part.effect, c.part.place)))
     changes = (_change(listed[some[0].part.effect], some, together, names) for some in found)
@@ -296,7 +296,10 @@ def _judged(
 
 
 def _agree(values: dict[int, Array], size: dict[int, float], metric: Array) -> bool:
-    """Whether any two campaigns need an effect at one place in the same size, or in sizes that are near."""
+    """Whether any two campaigns have nearly the same effect at one place: they differ by half of the larger at most.
+
+    Lengths are in the metric of the information; two that are equal because neither has the effect do not count.
+    """
     for a, b in combinations(values, 2):
         left = _length(values[a] - values[b], metric)
         if size[a] > 0.0 if left == 0.0 else left <= settings.AGREE * max(size[a], size[b]):
@@ -324,7 +327,10 @@ def _listed(names: Sequence[str]) -> str:
 def _parameters(
     item: Candidate, statistics: Sequence[Sums], own: list[int], names: Sequence[str]
 ) -> tuple[Parameter, ...]:
-    """Estimates of an effect's parameters by each campaign alone; ``own`` are their indices in ``statistics``."""
+    """Estimate an effect's parameters by each campaign alone (pseudo-inverse); ``own`` are indices in ``statistics``.
+
+    A value is ``None`` where a campaign does not see it fully, or to no better than one expected size.
+    """
     values, stds = np.full((2, len(statistics), len(own)), np.nan)
     for c, one in enumerate(statistics):
         covariance, seen = one.inverse
@@ -341,7 +347,7 @@ def _parameters(
 
 
 def _differ(values: Array, stds: Array, names: Sequence[str]) -> dict[str, Any]:
-    """Compare one parameter: the pair of campaigns that differ most, and the chi-square of equality in all."""
+    """Compare one parameter: the two campaigns most deviations apart, and the chi-square test that all are equal."""
     known = np.flatnonzero(np.isfinite(values)).tolist()
     if len(known) < 2:
         return {}
@@ -380,7 +386,7 @@ def _equal(statistics: Sequence[Sums], own: Sequence[int]) -> tuple[float, int, 
 
 
 def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int]:
-    """Quadratic form vᵀ M⁺ v and the rank of M, rounding errors of projected columns left out."""
+    """Quadratic form vᵀ M⁺ v of a vector v and a matrix M, and M's rank; eigenvalues of rounding size count as zero."""
     value, axes = np.linalg.eigh(0.5 * (matrix + matrix.T))
     seen = value > max(inference.INFORMATION_FLOOR, inference.PROJECTED_FLOOR * longest)
     along = axes[:, seen].T @ vector
@@ -388,7 +394,10 @@ def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int
 
 
 def _predicted(a: Diagnosis | ModelAsFit, b: Diagnosis | ModelAsFit, names: tuple[str, str]) -> Predicted:
-    """Cross-prediction by the models of two campaigns."""
+    """Cross-validate two campaigns' models: rms difference of predictions at common poses, and stated deviation.
+
+    Frames are projected out. Where nothing can be predicted the result has no poses and a note.
+    """
     nothing = Predicted(names, 0, 0.0, 0.0, 0.0, True)
     if a.model.simulated or b.model.simulated:
         return replace(nothing, note="predictions of a simulator stand in the place of the model's own")
@@ -416,13 +425,16 @@ def _predicted(a: Diagnosis | ModelAsFit, b: Diagnosis | ModelAsFit, names: tupl
 
 
 def _some(q: Array) -> Array:
-    """Evenly spaced rows."""
+    """Return at most 400 evenly spaced rows of joint positions (N, n)."""
     count = min(len(q), settings.POSES)
     return np.asarray(q[np.linspace(0, len(q) - 1, count).astype(int)])
 
 
 def _common(joints: Sequence[str], first: Ranges, second: Ranges) -> Ranges:
-    """Return the common measured range of each joint and column; where one campaign alone has the column, its own."""
+    """Intersect the measured ranges of two campaigns by joint and column; one that only one campaign has is its own.
+
+    Low is above high where ranges do not overlap.
+    """
     found = {}
     for name in dict.fromkeys((*joints, *first, *second)):
         low, high = np.array([ranges[name] for ranges in (first, second) if name in ranges]).T
@@ -433,14 +445,14 @@ def _common(joints: Sequence[str], first: Ranges, second: Ranges) -> Ranges:
 
 
 def _points(model: CorrectedModel, at: Observations) -> Array:
-    """Predicted target (N, 3) in the root frame, m."""
+    """Predict the target's position (N, 3), m, in the root frame by a corrected model."""
     _, instrument = displacement(at, model.effects)
     point = at.predicted_position + (0.0 if instrument is None else instrument)
     return np.asarray((point - model.frames.base[:3, 3]) @ model.frames.base[:3, :3])
 
 
 def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
-    """Orthonormal columns (3 N, g) of the unknown frames of either campaign."""
+    """Orthonormal basis (3 N, g) of the target's displacements by frames (base, tool) unknown in either campaign."""
     columns = np.zeros((len(at.q), 3, 0))
     if not (a.settings.base_known and b.settings.base_known):
         columns = np.concatenate([columns, at.base_sensitivity[:, :3, :]], axis=2)
@@ -450,12 +462,12 @@ def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
 
 
 def _left(values: Array, gauge: Array) -> Array:
-    """Project the gauge out of columns (N, 3) or (N, 3, K)."""
+    """Project the span of an orthonormal basis ``gauge`` (3 N, g) out of columns (N, 3) or (N, 3, K)."""
     return without(values.reshape(gauge.shape[0], -1), gauge).reshape(values.shape)
 
 
 def _variance(model: CorrectedModel, spread: Spread, at: Observations, gauge: Array) -> Array:
-    """Predictive variance (N, 3) per axis, root frame, m²."""
+    """Predictive variance (N, 3), m², per axis of the root frame: of the parameters without the gauge, and beyond."""
     turned = model.frames.base[:3, :3]
     moved = sensitivity(at, [effect for effect, _ in model.effects])
     moved = _left(np.einsum("ji,njk->nik", turned, moved), gauge)

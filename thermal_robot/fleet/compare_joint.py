@@ -38,11 +38,10 @@ Choice = tuple[Place, tuple[int, ...], tuple[int, ...], bool, float]
 class JointBlock:
     """One block of the joint fit: parameters of an effect, shared by all campaigns or different in some.
 
-    ``effect`` is its number in the list of those compared, ``place`` kind and name, empty for all its places;
-    ``parameters`` are numbers among all that are compared, ``where`` those of the campaigns, all for what is shared.
-    ``log_prior`` are log odds, ``spread`` is the deviation of the logarithm of its size. ``basis`` (P, D) holds the
-    parameters, in expected sizes, of a unit of each of its columns, of which those of ``positive`` (D,) cannot be
-    negative.
+    ``effect`` is the index of the effect, ``place`` kind and name of its place, empty for all places; ``parameters``
+    are indices among all compared ones, ``where`` those of the campaigns, all for a shared block. ``log_prior`` are
+    prior log odds, ``spread`` is the standard deviation of the logarithm of its size. ``basis`` (P, D) has the
+    parameters, in expected sizes, per unit of each of D coefficients; those in ``positive`` (D,) cannot be negative.
     """
 
     effect: int
@@ -56,9 +55,9 @@ class JointBlock:
     positive: NDArray[np.bool_]
 
     def excludes(self, other: JointBlock) -> bool:
-        """Whether two parts exclude each other: settings of one effect that share parameters and campaigns.
+        """Whether two blocks cannot be in one model: both shared, or both differing, with a common parameter.
 
-        One parameter may differ in two sets of campaigns, but not both alone and with its place in the same campaign.
+        They are of one effect; two differing blocks must also have a common campaign.
         """
         if (self.effect, self.shared) != (other.effect, other.shared):
             return False
@@ -68,9 +67,9 @@ class JointBlock:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Joint normal equations of all parts, from those of each campaign.
+    """Joint model-selection problem: all candidate blocks, and the normal equations of each campaign.
 
-    ``total`` is y'y in the range of the columns, ``equations`` its dimension, summed over the campaigns.
+    ``total`` is y'y within the range of the columns, ``equations`` the rank, both summed over the campaigns.
     """
 
     parts: tuple[JointBlock, ...]
@@ -80,7 +79,7 @@ class Problem:
 
     @classmethod
     def of(cls, listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Problem:
-        """Joint problem of the effects that are compared."""
+        """Build the problem of the compared effects, with a block for each shared or differing alternative."""
         parts = []
         for number, item in enumerate(listed):
             for place, own, where, shared, prior in _choices(item, statistics) if item.at else ():
@@ -96,7 +95,7 @@ class Problem:
         return cls(tuple(parts), statistics, total, equations)
 
     def gram(self, parts: Sequence[JointBlock]) -> Gram:
-        """Return the normal equations of a selection of parts."""
+        """Return the joint normal equations, summed over the campaigns, of a selection of blocks."""
         ends = np.cumsum([0, *(part.basis.shape[1] for part in parts)]).tolist()
         slices = tuple(slice(a, b) for a, b in pairwise(ends))
         matrix, vector = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
@@ -142,7 +141,7 @@ class Problem:
     def _promising(
         self, held: Sequence[JointBlock], bases: Sequence[Combination], best: float
     ) -> list[tuple[JointBlock, Combination]]:
-        """Parts with a first-order gain, the largest first, each with the combination that it joins."""
+        """Blocks whose first-order gain beats ``best``, largest first, each with the combination that it would join."""
         found: dict[JointBlock, tuple[float, Combination]] = {}
         used = sorted({b for base in bases for b in base.blocks})
         others = [part for part in self.parts if part not in held]
@@ -160,7 +159,7 @@ class Problem:
         return [(part, base) for part, (_, base) in sorted(found.items(), key=lambda item: -item[1][0])]
 
     def _beside(self, inside: Sequence[JointBlock], base: Combination, part: JointBlock, wanted: float) -> float:
-        """Log evidence of a combination with one more part; stopped early where clearly below ``wanted``."""
+        """Log evidence of a combination with one more block; −∞ where it stays clearly below ``wanted``."""
         parts, start = [*inside, part], _numbered(base, base.blocks)
         search = Search(self.gram(parts), [p.log_prior for p in parts])
         found = search.evaluate(range(len(parts)), start, wanted - inference.NEARLY)
@@ -168,13 +167,16 @@ class Problem:
 
 
 def _numbered(base: Combination, used: Sequence[int]) -> Combination:
-    """Return the combination with its blocks renumbered by their places among those in use."""
+    """Return the combination with its blocks renumbered by their positions in ``used``."""
     at = {b: n for n, b in enumerate(used)}
     return replace(base, blocks=tuple(at[b] for b in base.blocks), scales={at[b]: base.scales[b] for b in base.blocks})
 
 
 def _choices(item: Candidate, statistics: Sequence[Sums]) -> Iterator[Choice]:
-    """Yield the alternatives of an effect: shared, in all places and in each, then different by place and parameter."""
+    """Yield the alternative blocks of an effect: shared in all places or one; differing by place or parameter.
+
+    Differing ones come for each subset of campaigns that has information on both sides.
+    """
     everywhere, some, places = tuple(range(len(statistics))), campaign_subsets(len(statistics)), item.places
     among = len(places) if len(places) > 1 else 0
     shared: list[tuple[Place, tuple[int, ...]]] = [(("", ""), item.at)]
@@ -204,7 +206,7 @@ def _differing(item: Candidate) -> Iterator[tuple[Place, tuple[int, ...], float]
 
 
 def campaign_subsets(campaigns: int) -> tuple[tuple[int, ...], ...]:
-    """Subsets of campaigns that may differ from the others: all, or with many campaigns singles and splits in order."""
+    """Subsets of campaigns that may differ from the others: all; of more than five, singles and splits in time only."""
     every = range(campaigns)
     if campaigns <= settings.FEW:
         return tuple(s for size in range(1, campaigns) for s in combinations(every, size))
@@ -214,7 +216,7 @@ def campaign_subsets(campaigns: int) -> tuple[tuple[int, ...], ...]:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Part that differs: chi-square, degrees of freedom, p-value, and posterior probability."""
+    """Block that differs between campaigns: its score test (χ², degrees, p-value) and posterior probability."""
 
     part: JointBlock
     chi2: float
@@ -240,7 +242,7 @@ class Joint:
 
 
 def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
-    """Bayesian model selection over campaigns: which parameters they share and which differ."""
+    """Select by Bayesian model selection which parameters all campaigns share and which differ between them."""
     problem = Problem.of(listed, statistics)
     looked_at = len({(p.effect, p.parameters) for p in problem.parts if not p.shared})
     parts, search, best = _searched(problem, [any(item.named) for item in listed])
@@ -264,10 +266,10 @@ def joint(listed: Sequence[Candidate], statistics: Sequence[Sums]) -> Joint:
 
 
 def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[JointBlock], Search, Combination]:
-    """Parts that were evaluated together, the search over them, and the best combination.
+    """Search the best combination of blocks; returns the blocks considered, the search, and that combination.
 
-    All parts, where they are few. Otherwise the shared ones first; others join while their first-order gain is
-    positive, added or in place of a block.
+    All blocks are considered where they are few; otherwise the shared ones, and others as long as one improves the
+    evidence, added or in place of a block.
     """
     few = len(problem.parts) <= settings.AT_ONCE
     held = [part for part in problem.parts if few or part.shared]
@@ -297,7 +299,7 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[list[JointBlock]
 def _standing(
     search: Search, parts: Sequence[JointBlock], best: Combination, looked_at: int
 ) -> tuple[Combination, tuple[Change, ...]]:
-    """Backward elimination of differences that are insignificant after correction for the number of places."""
+    """Backward elimination of differing blocks that are insignificant (Bonferroni over all that were compared)."""
     while True:
         changes = [_change(search, parts, best, b) for b in best.blocks if not parts[b].shared]
         weakest = max(changes, key=lambda c: c.p_value, default=None)
@@ -310,7 +312,7 @@ def _standing(
 
 
 def _change(search: Search, parts: Sequence[JointBlock], best: Combination, number: int) -> Change:
-    """Score test of a differing part, given all others of the best explanation, without its prior."""
+    """Score test that a differing block is zero, jointly with all others of the best explanation, without its prior."""
     start = sum(parts[b].basis.shape[1] for b in best.blocks[: best.blocks.index(number)])
     own = slice(start, start + parts[number].basis.shape[1])
     values, covariance = search.gram.posterior(best)

@@ -54,10 +54,10 @@ Ranges = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True, eq=False)
 class ModelAsFit:
-    """Model file in place of a diagnosis and its fit, named ``campaign``.
+    """Model file in place of a diagnosis and of its fit, named ``campaign``.
 
-    ``corrected`` are observations of the corrected model at poses within the ranges that were measured, for the rows
-    are gone. There are no samples, and which other effects were compared the file does not say.
+    ``corrected`` are observations of the corrected model at random poses within the measured ranges, as the file has no
+    rows. ``samples`` is 0, and effects that are not in the file carry no information.
     """
 
     campaign: str
@@ -68,7 +68,7 @@ class ModelAsFit:
 
     @classmethod
     def of(cls, model: CorrectedModel, name: str) -> ModelAsFit:
-        """Wrap a model under a name; :class:`CampaignError` if it depends on a simulator, or lacks its uncertainty."""
+        """Wrap a model under a name; a :class:`CampaignError` if it corrects a simulator or lacks its uncertainty."""
         if model.simulated:
             problem = "this model corrects a simulator's predictions, which it does not hold"
             raise CampaignError(name, problem, expected="its campaign")
@@ -100,18 +100,21 @@ class ModelAsFit:
 
 
 def is_model(path: object) -> bool:
-    """Whether the path may be that of a model file."""
+    """Whether a value is the path of an existing file whose name ends in .json."""
     return isinstance(path, (str, Path)) and Path(path).suffix.lower() == ".json" and is_file(Path(path))
 
 
 def poses(model: CorrectedModel, ranges: Ranges) -> Array:
-    """Joint positions (N, n), uniform over the measured ranges, rad or m."""
+    """Draw 400 joint positions (N, n), rad or m, uniformly within the measured ranges, with a fixed seed."""
     low, high = np.array([ranges[name] for name in model.robot.joint_names]).T
     return np.asarray(np.random.default_rng(0).uniform(low, high, (settings.POSES, model.robot.n)))
 
 
 def observed(model: CorrectedModel, q: Array, ranges: Ranges) -> Observations:
-    """Observations of the corrected model at (N, n) poses, every condition going once through its range."""
+    """Observations of the corrected model at joint positions (N, n), conditions spread evenly over their ranges.
+
+    Each condition follows a golden-ratio sequence of its own; directions of approach take the ends of their range.
+    """
     covariates = {}
     for k, name in enumerate(model.needs):
         low, high = ranges.get(name, (0.0, 0.0))
@@ -128,12 +131,12 @@ def observed(model: CorrectedModel, q: Array, ranges: Ranges) -> Observations:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that is compared, in all its places and in one setting.
+    """An effect to be compared between campaigns, in all its places and in one setting.
 
-    ``compared`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their numbers
-    among all that are compared. Of each campaign ``parameters`` are the same with their responses there, empty where it
-    lacks what they need; ``named``: whether its diagnosis names the effect. A discovered law has its campaign's name
-    appended to its name and title.
+    ``compared`` are its P parameters without responses, ``sizes`` (P,) their expected sizes in SI, ``at`` their indices
+    among all compared parameters. Per campaign, ``parameters`` are the same with their responses in its rows, empty
+    where it lacks the columns; ``named`` is whether its diagnosis names the effect. A discovered law has its campaign's
+    name appended to its name and title.
     """
 
     name: str
@@ -157,10 +160,10 @@ class Candidate:
 def candidates(
     found: Sequence[Diagnosis | ModelAsFit], fits: Sequence[Fit | ModelAsFit], names: Sequence[str]
 ) -> tuple[Candidate, ...]:
-    """Effects to compare, those that may be re-zeroed between campaigns first.
+    """List the effects to compare: those found in any campaign, with a probability of 0.1 in one, or that can be reset.
 
-    All effects of the diagnoses, all that are probable enough in one, and those that may be re-set between campaigns,
-    such as joint zeros. A model file is both a diagnosis (``found``) and its fit.
+    Effects that can be reset between campaigns, such as joint zeros, come first. A model file is both a diagnosis
+    (``found``) and its fit.
     """
     listed: list[Candidate] = []
     for key, effect in _settings(fits, names):
@@ -202,7 +205,7 @@ def _settings(fits: Sequence[Fit | ModelAsFit], names: Sequence[str]) -> Iterato
 
 
 def _parameters(effect: Effect, fit: Fit | ModelAsFit) -> tuple[Parameter, ...]:
-    """Parameters of an effect in a campaign, as reported; empty where the campaign lacks its columns."""
+    """Parameters of an effect with their responses in a campaign, as reported; empty where it lacks the columns."""
     observations = fit.corrected
     try:
         effect = _there(effect, fit)
@@ -216,7 +219,7 @@ def _parameters(effect: Effect, fit: Fit | ModelAsFit) -> tuple[Parameter, ...]:
 
 
 def _there(effect: Effect, fit: Fit | ModelAsFit) -> Effect:
-    """Effect as it is in a campaign; a model has no record to take over."""
+    """Adapt an effect to another campaign's record (``Effect.elsewhere``); unchanged for a model file, without one."""
     recorded = isinstance(fit, Fit) or isinstance(effect, OfPosition)  # these have nothing of it but their range
     return gate.elsewhere(effect, fit.corrected) if recorded else effect
 
@@ -236,22 +239,25 @@ class Sums:
 
     @property
     def inverse(self) -> tuple[Array, Array]:
-        """Pseudo-inverse (P, P) of G, and the share (P,) of each parameter in its range."""
+        """Pseudo-inverse (P, P) of G, and the squared length (P,) of each parameter's axis projected on G's range."""
         value, axes = np.linalg.eigh(self.matrix)
         seen = value > inference.INFORMATION_FLOOR
         return (axes[:, seen] / value[seen]) @ axes[:, seen].T, np.asarray((axes[:, seen] ** 2).sum(axis=1))
 
     def some(self, kept: Sequence[int]) -> Sums:
-        """Return the normal equations with the other parameters fixed at zero."""
+        """Return the normal equations of the parameters ``kept``, the others being fixed at zero."""
         return Sums(self.matrix[np.ix_(kept, kept)], self.vector[list(kept)])
 
     def informs(self, own: Sequence[int]) -> bool:
-        """Whether it contains information on some parameters."""
+        """Whether G has information on any of the parameters ``own``: a diagonal element above the rounding floor."""
         return bool(np.diag(self.matrix)[list(own)].max(initial=0.0) > inference.INFORMATION_FLOOR)
 
 
 def sums(found: Diagnosis | ModelAsFit, fit: Fit | ModelAsFit, listed: Sequence[Candidate], number: int) -> Sums:
-    """Return the normal equations of campaign ``number`` in the parameters of the listed effects."""
+    """Return the normal equations of campaign ``number`` in all parameters of the listed effects, frames projected out.
+
+    With an unexplained residual the information is divided by its variance inflation.
+    """
     columns = [_columns(fit.corrected, item, number) for item in listed]
     if isinstance(found, ModelAsFit) or isinstance(fit, ModelAsFit):
         assert isinstance(fit, ModelAsFit)
@@ -271,14 +277,14 @@ def sums(found: Diagnosis | ModelAsFit, fit: Fit | ModelAsFit, listed: Sequence[
 
 
 def _columns(at: Observations, item: Candidate, number: int) -> Array:
-    """Columns (N, m, P) of an effect in expected sizes; zeros where the campaign lacks its columns."""
+    """Design-matrix columns (N, m, P) of an effect in expected sizes; zeros where the campaign lacks its conditions."""
     if not item.parameters[number]:
         return np.zeros((*moved_by(at, ()).shape[:2], len(item.compared)))
     return moved_by(at, item.parameters[number]) * item.sizes
 
 
 def _projected(full: Array, flat: int) -> tuple[Array, Array]:
-    """Products (P, P) and (P,) with the first columns projected out, rounding errors of their aliases set to zero.
+    """Schur complement: G (P, P) and b (P,) with the first ``flat`` columns projected out, small eigenvalues zeroed.
 
     Without that, rounding or a moving base would leave a tiny component of an alias of the frames, such as a shift of
     the first link, and estimate it to decimetres.
@@ -293,7 +299,7 @@ def _projected(full: Array, flat: int) -> tuple[Array, Array]:
 
 
 def identifiable(statistics: Sequence[Sums]) -> list[int]:
-    """Return the indices of the parameters that the campaigns together determine, without aliases of earlier ones."""
+    """Return the indices of the parameters that all campaigns together determine, without aliases of earlier ones."""
     together = np.sum([one.matrix for one in statistics], axis=0)
     value, axes = np.linalg.eigh(together)
     root = (axes * np.sqrt(np.maximum(value, 0.0))).T
@@ -326,9 +332,9 @@ def _of_model(known: ModelAsFit, listed: Sequence[Candidate], number: int, colum
 def _expressed(
     known: ModelAsFit, effect: Effect, own: Array, listed: Sequence[Candidate], columns: Sequence[Array], number: int
 ) -> Array | None:
-    """Return listed parameters (P, K) equivalent to one prior deviation of each of an effect's K; ``None`` without any.
+    """Express an effect's K parameters, per prior deviation, in the listed ones (P, K) by least squares over poses.
 
-    Tried are its own parameters, then, for an effect that contains joint zeros, these as well.
+    Tried are its own parameters, then joint zeros and the like as well; ``None`` if residuals exceed 1e-3 in both.
     """
     name = f"{effect.name} of {known.campaign}" if isinstance(effect, Discovered) else effect.name
     owner = np.repeat(np.arange(len(listed)), [c.shape[1] for c in columns])
@@ -351,7 +357,7 @@ def _expressed(
 
 
 def _without_prior(known: ModelAsFit, kept: NDArray[np.int64], prior: Array) -> tuple[Array, Array]:
-    """Information G and b of some of the model's parameters, in prior deviations, with the prior removed."""
+    """Information matrix G and b of the parameters ``kept`` of a model, in prior deviations, with the prior removed."""
     covariance = known.spread.covariance if known.spread.wider is None else known.spread.wider
     flat = len(covariance) - len(prior)
     values = np.concatenate([values for _, values in known.effects])[kept] / prior[kept]

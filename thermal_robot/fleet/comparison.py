@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
-"""Of an effect, in the order in which effects are listed."""
+"""Status of an effect in a comparison, in the order in which effects are listed."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Estimates of one parameter by each campaign alone, given all effects that are at work; SI.
+    """Estimates of one parameter by each campaign alone, jointly with all effects at work or named; SI.
 
     Attributes
     ----------
     name, kind, place, unit
         Name, kind and name of its place, and unit.
     values, stds
-        Per campaign; ``None`` where its data do not determine it.
+        Estimates and standard deviations per campaign; ``None`` where its data do not determine the parameter.
     between
-        The two campaigns that differ most in deviations; empty where fewer than two tell it.
+        The two campaigns that are most standard deviations apart; empty where fewer than two determine it.
     difference, std
         Later minus earlier of these two campaigns, and its standard deviation.
     chi2, degrees, p_value
@@ -89,7 +89,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Change:
-    """Difference between campaigns in the joint fit.
+    """Difference of an effect's parameters between groups of campaigns in the joint fit.
 
     Attributes
     ----------
@@ -133,15 +133,15 @@ class Predicted:
     Attributes
     ----------
     campaigns
-        The two.
+        Names of the two campaigns.
     poses
         Number of poses.
     rms, stated
-        Root mean square of the difference, and of its stated deviation, m.
+        Root mean square of the difference, and of its standard deviation as the models state it, m.
     beyond
-        Share of the poses at which they differ by more than twice that.
+        Share of the poses at which the difference exceeds twice its stated deviation there.
     agrees
-        Whether the root mean square is within twice the stated: otherwise a model is wrong, or the robot changed.
+        Whether ``rms`` is at most twice ``stated``: otherwise a model is wrong, or the robot changed.
     note
         Why nothing was predicted; empty where it was.
     """
@@ -204,12 +204,12 @@ class Comparison(RenderedPage):
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Names of the effects that the comparison confirms."""
+        """Names of the effects that the comparison confirms: shared, changed, or not compared."""
         return tuple(e.name for e in self.effects if e.status in ("shared", "changed", "not_compared"))
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the effects that a diagnosis names and the comparison contradicts."""
+        """Names of the effects that a diagnosis names and the comparison contradicts or does not need."""
         return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed") and e.named)
 
     @property
@@ -219,7 +219,7 @@ class Comparison(RenderedPage):
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Data frame of parameters by effect and name, with value and deviation for each campaign, SI."""
+        """Data frame of parameters by effect and name: value and deviation of each campaign, and tests, SI."""
         import pandas as pd
 
         rows = {}
@@ -232,7 +232,7 @@ class Comparison(RenderedPage):
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["effect", "parameter"])
 
     def effect(self, name: str) -> Effect:
-        """Comparison of one effect.
+        """Return the comparison of one effect by its name.
 
         Raises
         ------

@@ -30,7 +30,7 @@ _LISTS = (".csv", ".toml")
 
 @dataclass(frozen=True)
 class Listed:
-    """Campaigns of a fleet, named by their path from ``root``, with a label for each of ``names``."""
+    """Campaigns of a fleet: (path relative to ``root``, label values in the order of the label ``names``) of each."""
 
     root: Path
     names: tuple[str, ...]
@@ -42,13 +42,13 @@ class Listed:
 
 
 def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
-    """Find the campaigns of a fleet, in the order of the list, or of the names in a folder.
+    """Find the campaigns of a fleet in a folder, sorted by path, or in a list file, in its order.
 
-    The source is a folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels,
-    whose levels ``names`` names from the top, ``level_1`` and so on where left out. Or it is a list: CSV, or TOML with
-    ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on, and whose other
-    columns are labels. Raises :class:`CampaignError` on no such folder or file, one without campaigns, a campaign
-    listed twice, a label that cannot be one.
+    In a folder every ``campaign.toml`` below it is one, and the folders on the way to it are its labels; ``names`` are
+    the labels' names from the top level, ``level_1`` and so on where left out. A list is CSV, or TOML with
+    ``[[campaigns]]``: its column ``campaign`` has paths relative to the list's folder, its other columns are labels.
+    Raises :class:`CampaignError` for a missing folder or file, one without campaigns, a campaign listed twice, and a
+    label with a reserved, empty or repeated name.
     """
     require("diagnose_many()", source, (str, os.PathLike), "the path of a folder, or of a list of campaigns")
     path = Path(source)
@@ -65,7 +65,7 @@ def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
 
 
 def _below(root: Path, names: Sequence[str]) -> Listed:
-    """Every folder below with a campaign, labelled by the folders on the way; ``.`` is the root itself."""
+    """Find every folder below ``root`` with a campaign.toml, labelled by the folders on the way; ``.`` is the root."""
     # a file that cannot be opened, such as a broken link, is a campaign: its row says why
     having = (folder for folder, _, files in os.walk(root) if FILE_NAME in files)
     found = sorted(Path(os.path.relpath(folder, root)).as_posix() for folder in having)
@@ -82,7 +82,7 @@ def _below(root: Path, names: Sequence[str]) -> Listed:
 
 
 def _of_list(path: Path) -> Listed:
-    """Columns of text of a list, and the path of each campaign."""
+    """Read a list of campaigns in CSV or TOML: paths in the column ``campaign``, labels in the other columns."""
     if path.suffix.lower() == ".toml":
         columns, rows = _read_toml(path)
     else:
@@ -106,7 +106,7 @@ def _of_list(path: Path) -> Listed:
 
 
 def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
-    """Refuse a label that is a column of the table, or a duplicate."""
+    """Return the label names; one that is empty, a column of the fleet's table, or a duplicate is refused."""
     names = tuple(labels)
     for name in names:
         if name in OWN or not name.strip():
@@ -118,7 +118,7 @@ def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
 
 
 def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
-    """Columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
+    """Read a TOML list: columns of text by name, empty where a campaign lacks a label, and numbers from 1."""
     try:
         data: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

@@ -1,7 +1,7 @@
 """Parallel diagnosis of many campaigns by Dask workers, local or of a cluster.
 
-Finished rows of each campaign, by its fingerprint, are in an SQLite database, which survives a killed process. Only the
-process that runs the fleet opens it; a second one is refused.
+Finished rows of each campaign are stored by its fingerprint in an SQLite database, which survives a killed process.
+Only the process that runs the fleet opens it; a second one is refused.
 
 On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
 share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
@@ -57,7 +57,7 @@ Task = tuple[str, tuple[Any, ...]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Fleet:
-    """Diagnoses of many campaigns, and their summary.
+    """Result of a fleet's diagnosis: path of the table of all campaigns, and their summary.
 
     Attributes
     ----------
@@ -118,21 +118,21 @@ def diagnose_many(
     Parameters
     ----------
     source
-        A folder, with a ``campaign.toml`` somewhere below for each; or a list, CSV with a column ``campaign`` or TOML
-        with ``[[campaigns]]``, whose other columns are labels.
+        Folder with a ``campaign.toml`` at any depth for each campaign; or a list, CSV with a column ``campaign`` or
+        TOML with ``[[campaigns]]``, whose other columns are labels.
     out
-        Folder of the table and of what is done; made if need be.
+        Folder of the table and of finished results; created if missing.
     labels
-        Names of the levels of folders, from the top, ``["hall", "robot", "day"]``; campaigns of an equal ``robot`` are
-        of the same robot.
+        Names of the levels of folders, from the top, ``["hall", "robot", "day"]``; campaigns with the same label
+        ``robot`` are of one robot.
     only, without
         Names of effects, as in :func:`diagnose`.
     workers
-        Processes on this machine, each on one core; one a core where left out.
+        Number of processes on this machine, each on one core; by default as many as cores.
     scheduler
         Address of a Dask scheduler, whose workers see the same files under the same paths, instead of processes here.
     time_limit
-        Seconds that one campaign may take, tried twice; then it is a row that says so, and the rest goes on.
+        Seconds that one campaign may take; after two attempts it is a row with that reason, and the others continue.
     progress
         Called with a stage, how many campaigns are done, and how many there are.
 
@@ -182,7 +182,7 @@ def diagnose_many(
 
 
 def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple[list[Plain], bool]:
-    """Rows of one diagnosis, and whether a rerun may differ because the program failed."""
+    """Diagnose one campaign: its table rows, and whether a rerun may differ because the program itself failed."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what is worth a word stands in the rows
@@ -202,7 +202,7 @@ def _diagnosed(
     time_limit: float,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Diagnose what is not done yet, in the order of the list; duplicates once."""
+    """Diagnose in parallel the campaigns that are not stored yet, in the order of the list, and store their rows."""
     under_way: set[str] = set()
     finished, total = count(1), len(found.campaigns)
 
@@ -258,7 +258,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def _whole(found: Listed, done: Done) -> Iterator[Plain]:
-    """Yield all rows of the table, with names and labels."""
+    """Yield all rows of the fleet's table, in the order of the list, with campaign names and labels."""
     for number, rows in done.in_order():
         name, labels = found.campaigns[number]
         named = {CAMPAIGN: name, **dict(zip(found.names, labels, strict=True))}
@@ -266,13 +266,13 @@ def _whole(found: Listed, done: Done) -> Iterator[Plain]:
 
 
 def _without_path(message: str, folder: str) -> str:
-    """Message without the absolute path of its folder."""
+    """Remove a campaign's absolute folder path from a message."""
     place = folder if not is_file(Path(folder)) else os.path.dirname(folder)
     return " ".join(message.replace(place + os.sep, "").split())
 
 
 def fingerprint(folder: str, options: Sequence[object]) -> str:
-    """Hash of all that determines the rows of a campaign: name, files, program version, options."""
+    """SHA-256 hash of a campaign's name, its files (campaign.toml, table, URDF), the program's version and options."""
     from importlib.metadata import version
 
     declaration = read_declaration(Path(folder))
@@ -284,7 +284,7 @@ def fingerprint(folder: str, options: Sequence[object]) -> str:
 
 
 class Done:
-    """Store of finished rows by fingerprint, and the fingerprint of each campaign. Use :func:`opened`."""
+    """SQLite store of finished rows by fingerprint, and of each campaign's fingerprint; opened by :func:`opened`."""
 
     def __init__(self, database: sqlite3.Connection) -> None:
         self._database, self._written = database, time.monotonic()
@@ -323,9 +323,9 @@ _BEGIN = """
 
 @contextmanager
 def opened(file: Path) -> Iterator[Done]:
-    """Open or create the store; it is flushed to disk in any case.
+    """Open or create the SQLite store exclusively; it is committed to disk at the end in any case.
 
-    Raises :class:`CampaignError` if another run has it, or it is another file.
+    Raises :class:`CampaignError` if another run has it open, or the file is no such store.
     """
     with closing(sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)) as database:
         try:
@@ -393,9 +393,10 @@ def _local(distributed: Any, workers: int) -> Any:
 
 
 def answers(client: Any, work: Callable[..., Any], tasks: Iterator[Task]) -> Iterator[tuple[str, Any, str]]:
-    """Run tasks, a few at a time: yield each key with its answer, or with its error.
+    """Run tasks on a Dask client, one per worker thread at a time; yield (key, result or ``None``, error or empty).
 
-    Raises :class:`ThermalRobotError` if the scheduler is lost.
+    Tasks whose process was killed are retried once, alone, at the end. Raises :class:`ThermalRobotError` if the
+    scheduler is lost.
     """
     distributed = needed("distributed")
     ended: list[Task] = []

@@ -27,10 +27,10 @@ Codes = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Posterior of one quantity over n robots in G groups.
+    """Posterior of one quantity over n robots in G groups, in its unit.
 
-    ``means`` and their ``deviations`` (G,); ``spread`` between robots of a group, one sigma, and how well it is known;
-    ``apart`` (n,) the probability that a robot is unlike its group.
+    ``means`` (G,) of the groups and their standard ``deviations`` (G,); ``spread``, the standard deviation τ between
+    robots of a group, and its own ``spread_std``; ``apart`` (n,), the probability that a robot is an outlier.
     """
 
     means: Array
@@ -41,12 +41,12 @@ class Population:
 
     @property
     def nothing(self) -> float:
-        """Two-sided p-value of a zero mean of a single group."""
+        """Two-sided p-value, by the normal law, of the hypothesis that the (first) group's mean is zero."""
         return float(2.0 * ndtr(-abs(self.means[0]) / self.deviations[0]))
 
     @property
     def p_equal_means(self) -> float:
-        """P-value of equal group means: F test."""
+        """P-value of the F test that all group means are equal, each weighted by its inverse variance."""
         groups, robots = len(self.means), len(self.apart)
         weight = self.deviations**-2.0
         about = self.means - (weight * self.means).sum() / weight.sum()
@@ -54,7 +54,10 @@ class Population:
 
 
 def population(values: Array, deviations: Array, groups: Codes | None = None) -> Population:
-    """Empirical Bayes fit of (n,) values with their deviations; ``groups`` (n,) are codes 0 to G − 1, none empty."""
+    """Fit the random-effects model by empirical Bayes to values (n,) with standard deviations (n,), with outliers.
+
+    ``groups`` (n,) are codes 0 to G − 1, none empty; one group where left out.
+    """
     codes = np.zeros(len(values), dtype=np.int64) if groups is None else groups
     order = np.argsort(codes, kind="stable")
     unit = _unit(values, deviations, codes)
@@ -78,13 +81,17 @@ def population(values: Array, deviations: Array, groups: Codes | None = None) ->
 
 
 def _unit(values: Array, deviations: Array, codes: Codes) -> float:
-    """Scale of the grid of spreads: robust scatter about the group medians, with the median deviation."""
+    """Return the unit of the grid of τ: robust (MAD) scatter about group medians, in quadrature with the median s."""
     centres = np.array([np.median(values[codes == k]) for k in range(codes.max() + 1)])
     return float(np.hypot(1.4826 * np.median(np.abs(values - centres[codes])), np.median(deviations)))
 
 
 def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Array, Array, Array]:
-    """EM at T spreads: means and precisions (T, G), outlier probabilities (T, n), log posterior (T,)."""
+    """Run EM at each of T spreads: group means and precisions (T, G), outlier probabilities (T, n), log posterior (T,).
+
+    ``y`` and ``s`` (n,) are values and deviations sorted by group, ``starts`` (G,) the index at which each begins. The
+    means are integrated out of the log posterior by Laplace's method.
+    """
     counts = np.diff(np.append(starts, len(y)))
     variance = s**2 + tau[:, None] ** 2
     means = np.tile([np.median(part) for part in np.split(y, starts[1:])], (len(tau), 1))
@@ -108,16 +115,16 @@ def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Ar
 
 
 def _cauchy(square: Array) -> Array:
-    """Log density of outliers (Cauchy) at squared deviations, relative to 1/√2π of a deviation."""
+    """Log of √(2π) times the outliers' Cauchy density, at squared standardised deviations from the mean."""
     wide = settings.UNLIKE_WIDTH
     return np.asarray(np.log(np.sqrt(2.0 / np.pi) / wide) - np.log1p(square / wide**2))
 
 
 def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Array, Array]:
-    """Weighted mean of several values of the same robot.
+    """Inverse-variance weighted mean of the values of each robot, with Birge's ratio.
 
-    Where they differ by more than their deviations, the deviation of the mean is inflated (Birge, *Phys. Rev.* 40,
-    1932). Returns numbers of the n robots, and (n,) values and deviations.
+    Where a robot's values scatter more than their deviations say, the deviation of its mean is inflated by the root of
+    the reduced chi-square (Birge, *Phys. Rev.* 40, 1932). Returns the n robots' codes, and values and deviations (n,).
     """
     robots, which = np.unique(owners, return_inverse=True)
     weight = deviations**-2.0

@@ -87,10 +87,10 @@ def needed(module: str) -> Any:
 
 
 def rows_of(found: Diagnosis) -> list[Plain]:
-    """Rows of a diagnosis, without the campaign's name and labels.
+    """Table rows of a diagnosis as dicts of plain values, without the campaign's name and labels.
 
-    One for each effect, in the diagnosis's order; one without an effect where it is not usable. ``parameters`` are
-    those that the diagnosis tells and the data identify, ``free`` those of :func:`free`.
+    One for each effect, in the diagnosis's order; only one, without an effect, where it is not usable. ``parameters``
+    are those in the diagnosis that the data identify, ``free`` the estimates of :func:`free`.
     """
     campaign = {
         "model": found.robot,
@@ -129,12 +129,12 @@ def _of_effect(finding: Finding, alone: Sequence[Plain]) -> Plain:
 
 
 def failed(reason: str) -> list[Plain]:
-    """Row of a campaign that could not be diagnosed."""
+    """Table row, in a list, of a campaign that could not be diagnosed, with the reason."""
     return [{"outcome": FAILED, "reason": reason}]
 
 
 def schema(labels: Sequence[str]) -> pa.Schema:
-    """Columns of the table: campaign, labels, diagnosis, effect."""
+    """Arrow schema of the fleet's table: columns of campaign, labels, diagnosis and effect."""
     pa = needed("pyarrow")
     text, real = pa.string(), pa.float64()
     nested = {
@@ -147,7 +147,7 @@ def schema(labels: Sequence[str]) -> pa.Schema:
 
 
 def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None:
-    """Write the table by an atomic replace, in small memory; equal rows give equal bytes.
+    """Write the Parquet table of a fleet by an atomic replace, 4096 rows at a time; equal rows give equal bytes.
 
     Raises as :func:`~thermal_robot.files.whole`.
     """
@@ -159,10 +159,10 @@ def write_rows(path: Path, labels: Sequence[str], rows: Iterable[Plain]) -> None
 
 
 def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
-    """Least-squares estimates of each effect's parameters, given the others that are or may be at work.
+    """Least-squares estimates of each effect's parameters, jointly with the other effects found or probable enough.
 
-    Effects in all their places, including those of ``names`` that were removed: name, value, one sigma (SI) and unit of
-    the parameters that the data determine better than the prior.
+    Each effect of the fit, and of ``names`` that were refused, is estimated in all its places with a nearly flat prior.
+    Listed are name, value, one sigma (SI) and unit of the parameters known to better than one expected size.
     """
     e, likely = fit.explanation, _likely(fit)
     own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}
@@ -184,13 +184,13 @@ def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, list[Plain]]:
 
 
 def _everywhere(fit: Fit, name: str) -> int:
-    """Block of an effect in all its places, or the first that was compared."""
+    """Index of the block of an effect in all its places; where none was compared, of the effect's first block."""
     blocks = fit.blocks_of(name)
     return next((b for b in blocks if not fit.explanation.linear.blocks[b].effect.places), blocks[0])
 
 
 def _likely(fit: Fit) -> dict[str, int]:
-    """Most probable settings, by name, of effects that were not found but may be at work."""
+    """Index of the most probable block, by name, of each effect not found whose probability is at least 0.1."""
     e = fit.explanation
     found = {fit.families[b] for b in e.best.blocks}
     others = (name for name in dict.fromkeys(fit.families) if name not in found)
@@ -199,7 +199,10 @@ def _likely(fit: Fit) -> dict[str, int]:
 
 
 def _alone(e: Explanation, linear: Linear, problem: Gram, blocks: Sequence[int]) -> list[Plain]:
-    """Parameters of the first of some blocks without its prior, the others with theirs."""
+    """Posterior estimates of the first block's parameters, its prior nearly flat, the other blocks' Gaussian as usual.
+
+    Listed are those that the data see fully and determine to better than one expected size.
+    """
     problem = problem.some(blocks)
     tight = np.zeros_like(problem.matrix)
     for k, (number, at) in enumerate(zip(blocks, problem.slices, strict=True)):

@@ -30,7 +30,7 @@ _FOUND = ("found", "contained", "confounded")
 
 @dataclass(frozen=True)
 class Count:
-    """Numbers of robots in which an effect was found, is testable, and is confounded.
+    """Numbers of robots in which one effect was found, is testable, and is confounded.
 
     Attributes
     ----------
@@ -41,9 +41,9 @@ class Count:
     confounded
         Number of robots in which it is confounded with another effect.
     places
-        Places with the largest share, with the number of robots, most frequent first.
+        Number of robots by the place with the largest share of the effect, most frequent first.
     parameters
-        Whether it is a known effect, whose parameters can be compared.
+        Whether it is a known effect, whose parameters can be compared, not a discovered law.
     """
 
     effect: str
@@ -58,8 +58,8 @@ class Count:
 class Gathered:
     """Effect that is over-represented in one group of robots.
 
-    ``p_value`` is that of so many by chance (hypergeometric law), times the number of groups and effects that were
-    looked at.
+    ``p_value`` is the upper tail of the hypergeometric distribution of ``found``, times the number of pairs of group
+    and effect that were tested (Bonferroni).
     """
 
     effect: str
@@ -74,9 +74,10 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Case:
-    """Effect found in a campaign: probability, rms distances (m) before and after, held-out share, and place.
+    """Effect found in a campaign: its probability and place, rms distances (m) before and after the correction.
 
-    ``confounded_with`` are its alternatives. An empty ``effect`` stands for a gap that no effect explains.
+    ``shrinkage`` is the held-out share of the distance that it explains; ``confounded_with`` names effects that it may
+    be instead. An empty ``effect`` means that no effect explains the campaign's gap.
     """
 
     robot: str
@@ -92,7 +93,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Group:
-    """Group of robots: mean of a parameter, SI, with its standard deviation."""
+    """Group of robots with an equal label: mean of a parameter over it, SI, and the mean's standard deviation."""
 
     group: str
     robots: int
@@ -113,12 +114,12 @@ class Shared:
     mean, mean_std
         Mean over the fleet, and its standard deviation.
     spread, spread_std
-        Standard deviation between robots, corrected for measurement errors, and its own. Where groups differ it is that
-        within a group.
+        Standard deviation between robots, without measurement errors, and its own standard deviation; within a group
+        where groups differ.
     p_mean
-        P value of the mean being zero, times the number of parameters and labels that were looked at.
+        P-value of the hypothesis that the mean is zero, times the number of tests of parameters and labels.
     label, p_label
-        Label by which robots differ, and its p-value with the same correction; empty and 1 where they do not.
+        Label whose groups' means differ by an F test, and its p-value with the same correction; empty and 1 if none.
     groups
         Groups of that label, farthest from the overall mean first.
     """
@@ -139,7 +140,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Apart:
-    """Robot that is an outlier of its group in a parameter, SI, with the probability."""
+    """Robot that is an outlier in a parameter: its value, the ``usual`` mean of its group, and the probability; SI."""
 
     robot: str
     effect: str
@@ -156,7 +157,7 @@ SCHEMA = "thermal-robot/fleet/1"
 
 @dataclass(frozen=True)
 class Summary:
-    """Summary of a fleet. Long lists hold the most striking robots only; the table holds all.
+    """Summary of a fleet: counts, effects, common parameters, outliers; lists are cut at 500 entries, the table is not.
 
     Attributes
     ----------
@@ -170,13 +171,13 @@ class Summary:
     failures
         Campaigns without a diagnosis: name, outcome, reason.
     effects
-        Number of robots by effect, most frequent first.
+        Numbers of robots in which each effect was found, most frequent effect first.
     gathered
         Effects that were found in one group more often than chance allows, most striking first.
     shared
-        Per parameter that differs from zero over the whole fleet, or between groups: mean and spread.
+        Mean and spread of each parameter that differs significantly from zero over the fleet, or between groups.
     apart
-        Outlying robots relative to their group, most probable first.
+        Robots that are outliers of their group in a parameter, most probable first.
     found
         Campaigns with the largest gaps, and the effects found in each.
     parameters
@@ -203,7 +204,7 @@ class Summary:
 def summarise(
     table: Path, labels: Sequence[str] = (), progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> Summary:
-    """Summarise the table of a fleet (:func:`~thermal_robot.fleet.rows.write_rows`) by its labels.
+    """Summarise the Parquet table of a fleet: counts of effects, groups by labels, common parameters, outliers.
 
     ``progress`` is called with a stage, how many effects are compared, and how many there are.
     """
@@ -238,7 +239,7 @@ def _frames(table: Path, columns: Sequence[str]) -> Iterator[pd.DataFrame]:
 
 
 def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
-    """Campaigns in order: name, robot, labels, outcome, and the reason where there is no diagnosis."""
+    """Read one row per campaign, in order: name, robot (else its name), labels, model, outcome, reason of a failure."""
     import pandas as pd
 
     columns = [CAMPAIGN, *labels, MODEL, "outcome", "reason"]
@@ -251,7 +252,7 @@ def _campaigns(table: Path, labels: Sequence[str]) -> pd.DataFrame:
 
 
 def _findings(table: Path, campaigns: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return the findings by effect and robot: place, known, testable, at work, certain; and all cases.
+    """Read the findings: one row by effect and robot (place, known, testable, at work, certain), and all cases.
 
     A case is an effect that is at work in a campaign, or a campaign whose gap no effect explains.
     """
@@ -301,7 +302,7 @@ def _counts(findings: pd.DataFrame) -> tuple[Count, ...]:
 
 
 def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
-    """Campaigns with the largest gaps, and their explanation, if any."""
+    """Return the 500 cases with the largest rms distance before correction, with the effect of each, if any."""
     found = []
     largest = cases.sort_values("rms_before", ascending=False, kind="stable").head(settings.MOST_LISTED)
     for row in largest.to_dict("records"):
@@ -317,7 +318,7 @@ def _largest(cases: pd.DataFrame) -> tuple[Case, ...]:
 
 
 def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, ...]:
-    """Effects over-represented in a group, corrected for the number of groups."""
+    """Test by the hypergeometric distribution which effects are over-represented in a group (Bonferroni-corrected)."""
     from scipy.stats import hypergeom
 
     striking, tests = [], 0
@@ -338,7 +339,7 @@ def _gathered(findings: pd.DataFrame, robots: pd.DataFrame) -> tuple[Gathered, .
 
 
 def _parameter_values(table: Path, effect: str) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield name and unit of each parameter of one effect, with values and deviations by campaign."""
+    """Yield name and unit of each parameter of one effect, with a data frame of estimates and sigmas by campaign."""
     pa, compute = needed("pyarrow"), needed("pyarrow.compute")
     of_effect = [("effect", "==", effect)]
     read = needed("pyarrow.parquet").read_table(table, columns=[CAMPAIGN, "free"], filters=of_effect).combine_chunks()
@@ -355,7 +356,10 @@ def _shared(
     effects: Sequence[str],
     progress: Callable[[str, int, int], None],
 ) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
-    """Return the common parameters and outlying robots, most certain first, and the number of parameters compared."""
+    """Fit the population of each parameter; return significant ones, outlying robots, and the number compared.
+
+    Significance is Bonferroni-corrected; both lists begin with the most certain.
+    """
     import pandas as pd
 
     codes, names = pd.factorize(campaigns[ROBOT])
@@ -390,7 +394,10 @@ def _compared(
     who: Codes,
     labels: dict[str, tuple[Codes, Any]],
 ) -> tuple[Shared, Array, Array]:
-    """Return the population of a parameter, as one and by each label, with outlier probabilities of the robots."""
+    """Fit the population of a parameter as one group and by each label; the label with the smallest F test is kept.
+
+    Also returns each robot's usual value and outlier probability, within its group if the label is significant.
+    """
     whole = population(values, deviations)
     mean, std = float(whole.means[0]), float(whole.deviations[0])
     found = Shared(*what, len(who), mean, std, whole.spread, whole.spread_std, whole.nothing)

@@ -144,7 +144,7 @@ def _wrong(problem: str, column: str, found: str, expected: str) -> CampaignErro
 
 
 def _members(campaigns: Any, dates: Sequence[Any] | None) -> tuple[list[Campaign | Diagnosis], list[datetime]]:
-    """Campaigns in the order of time, with their dates, if any."""
+    """Validate campaigns, at least three, and their dates; return both in the order of time, dates empty if none."""
     require("wear()", campaigns, (Iterable,), _EXPECTED)
     listed = list(campaigns)
     if dates is not None:
@@ -174,7 +174,7 @@ def _opened(given: Any) -> Campaign | Diagnosis:
 
 
 def _fitted(given: Campaign | Diagnosis, candidates: Sequence[Effect]) -> Fit:
-    """Fit of one campaign alone."""
+    """Fit one campaign alone, or take the fit of its diagnosis; a campaign that is not usable is refused."""
     if isinstance(given, Diagnosis):
         if given.fit is None or not given.usable:
             why = given.reason if given.fit is not None else "was made without its fit: give the campaign itself"
@@ -188,7 +188,7 @@ def _fitted(given: Campaign | Diagnosis, candidates: Sequence[Effect]) -> Fit:
 
 
 def _notes(whole: Problem, visits: Sequence[Visit], factor: float) -> tuple[str, ...]:
-    """Remarks for the reader."""
+    """Remarks: campaigns that lack the columns of an effect found elsewhere, and overdispersion by ``factor``."""
     notes = []
     for effect in dict.fromkeys(effect for effect, _ in whole.keys):
         own = [k for k, (name, _) in enumerate(whole.keys) if name == effect]
@@ -238,7 +238,7 @@ def moment(given: Any) -> datetime:
 
 
 def as_date(first: datetime, day: float) -> str:
-    """ISO date of a number of days after the first, rounded to a day."""
+    """ISO date (without time) some days after the first; "later than 9999" beyond the calendar."""
     try:
         return (first + timedelta(days=round(day, 6))).date().isoformat()
     except OverflowError:  # the year 10000 is as good as never
@@ -246,7 +246,10 @@ def as_date(first: datetime, day: float) -> str:
 
 
 def comparable(problem: Problem, series: Series) -> NDArray[np.bool_]:
-    """Mask (P,) of the parameters of which a change of the expected size would be detectable."""
+    """Mask (P,) of the parameters whose changes can be compared between campaigns.
+
+    At least two campaigns have their columns, and a step in the middle of the series is known to 0.3 expected sizes.
+    """
     known = np.maximum(np.diag(series.information)[series.middle], 0.0)
     return np.asarray((problem.has.sum(axis=0) >= 2) & (known * settings.COMPARABLE**2 > 1.0))
 
@@ -285,13 +288,13 @@ def results(
 
 
 def _beside(found: Mapping[Moves, float], parameter: int, move: Move | None) -> Moves:
-    """Most probable combination in which a parameter has the given move, or stays."""
+    """Most probable combination of moves in which a parameter has the given move only, or with ``None`` stays."""
     own = [] if move is None else [move]
     return next(moves for moves in found if [m for m in moves if m.parameter == parameter] == own)
 
 
 def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> tuple[Worn, Array, Array]:
-    """Parameter under some moves: (2,) last value and change, and (2, 2) their covariance, SI."""
+    """Estimate a parameter under some moves: its result; last value and total change (2,); their covariance; SI."""
     bare, followed = problem.parameters[number], bool(series.followed[number])
     size, has = bare.size, problem.has[:, number]
     state, free = State.of(series, moves), State.of(series, moves, free=number)
@@ -320,7 +323,7 @@ def _over_time(problem: Problem, series: Series, number: int, moves: Moves) -> t
 
 
 def _jump(series: Series, move: Move, ways: Mapping[Move, float], worn: Worn) -> Jump:
-    """Jump with its 95 % credible set of dates."""
+    """Build the jump with the posterior of its date; its range spans the 95 % credible set of dates."""
     days = np.array([ways.get(Move(move.parameter, "jump", after), 0.0) for after in range(series.count - 1)])
     days = days / days.sum()
     likely = np.argsort(-days, kind="stable")
@@ -339,7 +342,7 @@ def _jump(series: Series, move: Move, ways: Mapping[Move, float], worn: Worn) ->
 def _crossing(
     limit: float, kind: str, line: Array, covariance: Array, series: Series, first: datetime | None
 ) -> Crossing:
-    """Time at which the absolute value of a parameter reaches a limit, SI."""
+    """Forecast when a parameter's absolute value reaches a limit, SI; for a trend by Fieller's interval."""
     if abs(line[0]) >= limit:
         return Crossing(limit, "passed")
     if kind in ("constant", "jump"):
@@ -357,7 +360,7 @@ def _crossing(
 
 
 def _alike(problem: Problem, series: Series, parameter: int) -> tuple[str, ...]:
-    """Names of parameters whose changes are confounded with this one's."""
+    """Names of parameters whose middle steps correlate by more than 0.95 with this one's: confounded changes."""
     own = series.information[np.ix_(series.middle, series.middle)]
     length = np.sqrt(np.maximum(np.diag(own), 1e-300))
     alike = (np.abs(own[parameter] / length[parameter] / length) > settings.SUBSTITUTE) & series.followed

@@ -1,6 +1,6 @@
 """Bayesian change-point analysis: evidence of any combination of moves between campaigns, from Gram matrices alone.
 
-In campaign k the parameters are θ_k = θ + Σ_i a_i s_i(k) e_i: a constant for all campaigns, and moves. Of a move i,
+In campaign k the parameters are θ_k = θ + Σ_i a_i s_i(k) e_i: a constant for all campaigns, and moves. In a move i,
 parameter e_i changes with a shape s_i over time: a step after campaign j (a jump), or a straight line (a trend). A walk
 is all steps of a parameter at once, the variance of each proportional to its time. With the whitened products of
 campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, everything follows from sums over k:
@@ -40,7 +40,7 @@ from thermal_robot.inference.algebra import equations_of, whitener
 
 
 class Move(NamedTuple):
-    """Change of one parameter over time: kind, and the campaign after which it jumps; −1 without a jump."""
+    """Change of one parameter over time: its index, kind (jump, trend, walk), campaign before a jump (−1 without)."""
 
     parameter: int
     kind: str
@@ -53,8 +53,8 @@ Moves = tuple[Move, ...]
 class Grid(NamedTuple):
     """Grid of prior scales and of overdispersion.
 
-    (H,) each: prior variance of moves, in expected sizes squared; φ²; log prior with the log likelihood if nothing
-    moves.
+    (H,) each: prior variance of moves, in expected sizes squared; overdispersion φ² of the campaigns; log prior of the
+    grid point plus log likelihood if nothing moves.
     """
 
     variance: Array
@@ -88,7 +88,7 @@ class Series:
 
     @cached_property
     def shapes(self) -> Array:
-        """Basis (K, K) of moves over the campaigns: unit steps after all but the last, then a line that rises by 1."""
+        """Shapes (K moves, K campaigns): unit steps after each campaign but the last, then a line rising by 1."""
         k = np.arange(self.count)
         steps = (k[None, :] > k[:-1, None]).astype(float)
         return np.vstack([steps, (self.times - self.times.mean())[None] / self.span])
@@ -139,7 +139,7 @@ class Series:
 
     @property
     def loose(self) -> Grid:
-        """Single grid point with the widest prior and no overdispersion."""
+        """Grid of a single point: the largest prior variance, and no overdispersion (φ² = 1)."""
         return Grid(self.grid.variance.max(keepdims=True), np.ones(1), np.zeros(1))
 
     @cached_property
@@ -149,11 +149,11 @@ class Series:
 
     @property
     def middle(self) -> NDArray[np.int64]:
-        """Index (P,) of each parameter's step in the middle of the series."""
+        """Indices (P,), among the moves' columns, of each parameter's step in the middle of the series."""
         return np.arange(len(self.followed)) * self.count + (self.count - 2) // 2
 
     def made_of(self, moves: Sequence[Move]) -> tuple[NDArray[np.int64], Array]:
-        """Columns (D,) of some moves, and the prior variance of each over the common one."""
+        """Column indices (D,) of some moves, and the ratio (D,) of each one's prior variance to the common one."""
         columns: list[int] = []
         shares: list[float] = []
         for move in moves:
@@ -168,9 +168,9 @@ class Series:
 
 
 class Beside(NamedTuple):
-    """Posterior of some moves at every point of a grid.
+    """Gaussian posterior of the amounts of some moves at every point of a grid.
 
-    (H,) log likelihood with the base, (H, D) mean, (H, D, D) covariance, and (D,) numbers of the moves' columns.
+    Log marginal likelihood with the grid's ``log_base`` (H,), mean (H, D), covariance (H, D, D), column indices (D,).
     """
 
     log_likelihood: Array
@@ -180,7 +180,7 @@ class Beside(NamedTuple):
 
     @classmethod
     def of(cls, series: Series, moves: Sequence[Move], grid: Grid) -> Beside:
-        """Posterior of some moves."""
+        """Compute the posterior of some moves at every grid point from the series' information and right-hand side."""
         columns, share = series.made_of(moves)
         own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
         deviation = np.sqrt(grid.variance[:, None] * share)
@@ -192,7 +192,7 @@ class Beside(NamedTuple):
         return cls(grid.log_base + gain, mean, covariance, columns)
 
     def left(self, series: Series, others: NDArray[np.int64], grid: Grid) -> tuple[Array, Array]:
-        """Information (H, C) on other columns given these, and their right-hand side; φ² = 1 in its units."""
+        """Information (H, C) on other single moves given these, and right-hand side (H, C), before dividing by φ²."""
         cross = series.information[np.ix_(others, self.columns)]
         along = cross @ self.covariance
         own = series.information[others, others] - (along * cross).sum(axis=2) / grid.inflation[:, None]
@@ -200,7 +200,7 @@ class Beside(NamedTuple):
 
 
 def log_prior(move: Move, series: Series) -> float:
-    """Log prior odds of one move against none: changes are few, and rarer for each of many parameters."""
+    """Log prior odds of one move: the probability of any change, shared among parameters, kinds, and days of a jump."""
     followed = max(int(series.followed.sum()), 1)
     one = 1.0 - (1.0 - settings.ANY_CHANGE) ** (1.0 / followed)
     days = series.count - 1 if move.kind == "jump" else 1
@@ -208,9 +208,9 @@ def log_prior(move: Move, series: Series) -> float:
 
 
 def explanations(series: Series) -> dict[Moves, float]:
-    """Return the combinations of moves with posterior probabilities, most probable first; ``()`` is no move.
+    """Return combinations of moves with their posterior probabilities, most probable first, by beam search.
 
-    Every single move is compared, then each more beside those that are likeliest so far (beam search).
+    ``()`` is no move. Every single move is compared, then every further one added to the likeliest combinations so far.
     """
     known: dict[Moves, float] = {(): float(logsumexp(series.grid.log_base))}
     beam: list[Moves] = [()]
@@ -228,7 +228,7 @@ def explanations(series: Series) -> dict[Moves, float]:
 
 
 def moves_of(found: Mapping[Moves, float], parameter: int) -> dict[Move, float]:
-    """Posterior probability of each move of one parameter; the rest to 1 is that it stays."""
+    """Posterior probability of each move of one parameter; what is missing to 1 is that it stays constant."""
     own: dict[Move, float] = {}
     for moves, probability in found.items():
         for move in moves:
@@ -238,7 +238,7 @@ def moves_of(found: Mapping[Moves, float], parameter: int) -> dict[Move, float]:
 
 
 def _one_more(series: Series, moves: Moves) -> dict[Moves, float]:
-    """Log posterior of combinations of these moves and one more, of a parameter without any."""
+    """Log posterior (unnormalised) of each combination of these moves and one more, of a parameter not moving yet."""
     grid, taken = series.grid, {move.parameter for move in moves}
     columns = np.array([c for c in series.columns if c // series.count not in taken], dtype=np.int64)
     beside = Beside.of(series, moves, grid)
@@ -260,7 +260,7 @@ def _one_more(series: Series, moves: Moves) -> dict[Moves, float]:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Posterior of P constants, then D moves, in expected sizes: mean (P + D,) and covariance (P + D, P + D)."""
+    """Gaussian posterior of P constants, then D moves, in expected sizes: mean (P + D,), covariance (P + D, P + D)."""
 
     series: Series
     columns: NDArray[np.int64]
@@ -269,7 +269,7 @@ class State:
 
     @classmethod
     def of(cls, series: Series, moves: Sequence[Move], free: int | None = None) -> State:
-        """Posterior at the most probable scale and overdispersion, one parameter ``free`` in each campaign."""
+        """Compute the posterior at the most probable grid point; the parameter ``free`` gets a value per campaign."""
         grid = series.grid
         point = int(np.argmax(Beside.of(series, moves, grid).log_likelihood))
         inflation = float(grid.inflation[point])
@@ -300,10 +300,10 @@ class State:
 
 
 def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float, float | None] | None:
-    """Time at which a straight line reaches ±limit, from now, with a 95 % interval (Fieller 1954).
+    """Time from now at which a straight line reaches ± limit, with a 95 % confidence interval (Fieller 1954).
 
-    From its (2,) value now and rate and their (2, 2) covariance. The upper end is ``None`` where the line may as well
-    never get there; all is ``None`` where it does not move.
+    ``value`` (2,) is its value now and its rate, with their covariance (2, 2). The upper end is ``None`` where the rate
+    may be zero, so that the line may never get there; the result is ``None`` where the rate is zero.
     """
     now, rate = float(value[0]), float(value[1])
     if rate == 0.0:
@@ -321,9 +321,9 @@ def fieller(value: Array, covariance: Array, limit: float) -> tuple[float, float
 
 
 def chances(series: Series, moves: Moves) -> Array:
-    """Bound (P,) on the false-alarm probability of the clearest move of each parameter.
+    """Bonferroni bound (P,) on the false-alarm probability of each parameter's most significant single move.
 
-    Each parameter is judged beside the ``moves`` of the others; 1 for one that is not followed.
+    Each parameter is tested given the ``moves`` of the others; 1 for one that is not followed.
     """
     found, owner = np.ones(len(series.followed)), series.columns // series.count
     moving = {move.parameter for move in moves}
@@ -336,20 +336,20 @@ def chances(series: Series, moves: Moves) -> Array:
 
 
 def scatter(series: Series, moves: Moves) -> float:
-    """Overdispersion φ² of the campaigns about some moves, at least 1."""
+    """Overdispersion φ²: reduced chi-square of the campaigns about constants and some moves, at least 1."""
     distance, degrees = _left(series, Beside.of(series, moves, series.loose))
     return max(distance / degrees, 1.0)
 
 
 def _left(series: Series, beside: Beside) -> tuple[float, float]:
-    """Chi-square Q of the campaigns about some moves, and its degrees of freedom ν."""
+    """Chi-square Q of the campaigns about constants and some moves, and its degrees of freedom ν, at least 2."""
     distance, degrees = series.scattered
     distance -= float(beside.mean[0] @ series.pull[beside.columns])
     return max(distance, 0.0), max(degrees - len(beside.columns), 2.0)
 
 
 def _chances(series: Series, moves: Moves) -> Array:
-    """Bound (C,) on the p-value of each single move given others, at the widest prior of the grid."""
+    """P-value (F test) over Bonferroni weight (C,) of each single move given ``moves``, at the grid's widest prior."""
     if not len(series.columns):
         return np.zeros(0)
     beside, information = Beside.of(series, moves, series.loose), np.diag(series.information)[series.columns]

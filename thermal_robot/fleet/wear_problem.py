@@ -1,12 +1,11 @@
 """Joint least squares of several campaigns of one robot: common parameters, frames of each campaign its own.
 
-Parameters are those of the effects that were named in any campaign, and what somebody could set anew
-(:attr:`Effect.told_inside`): a collision shows in the zeros of joints, whether or not those were off before. All
-campaigns are linearised about one common model, so that what is not linear is the same in all.
+The common parameters are those of the effects found in any campaign, and those that can be reset, such as joint zeros
+(:attr:`Effect.told_inside`): a collision changes joint zeros, whether or not these were off before. All campaigns are
+linearised about one common model, so that nonlinear terms are the same in all.
 
-A campaign's own are its unknown frames, and effects that begin anew with it: those of the instrument, of a frame, of
-its clock, and laws that nobody wrote down. They are taken off within it, the frames free, the others held by their
-sizes.
+Each campaign has parameters of its own: its unknown frames, and effects of its instrument, frames and clock, and
+discovered laws. They are projected out of its normal equations, frames without a prior, the others with their sizes.
 """
 
 from __future__ import annotations
@@ -43,8 +42,8 @@ class Problem:
     """Normal equations of K campaigns in their P common parameters, in units of the expected sizes.
 
     ``keys`` are names of effect and parameter, ``parameters`` the same without responses, ``titles`` their effects in
-    plain words; ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, what is a campaign's own taken off; ``has``
-    (K, P) tells whether a campaign can say anything of a parameter: it has the columns that its effect reads.
+    plain words; ``matrices`` (K, P, P) and ``vectors`` (K, P) are whitened, each campaign's own parameters projected
+    out; ``has`` (K, P) is whether a campaign has the columns that the parameter's effect reads.
     """
 
     keys: tuple[Key, ...]
@@ -56,7 +55,7 @@ class Problem:
 
 
 def require_alike(fits: Sequence[Fit]) -> None:
-    """Refuse campaigns of different robots; :class:`CampaignError` names one that is of another than the first."""
+    """Raise a CampaignError unless all campaigns have the joints, root and tool frame and URDF text of the first."""
     first, robot = fits[0].campaign, fits[0].campaign.robot
     for campaign in (fit.campaign for fit in fits[1:]):
         other = campaign.robot
@@ -77,9 +76,9 @@ def require_alike(fits: Sequence[Fit]) -> None:
 
 
 def problem(fits: Sequence[Fit]) -> Problem:
-    """Joint problem of fitted campaigns in the order of time, by Gauss-Newton on common values.
+    """Build the joint normal equations of fitted campaigns in the order of time, by three Gauss-Newton linearisations.
 
-    Raises :class:`EstimationError` if the unknown frames of one cannot be fitted.
+    All are about common parameter values. Raises :class:`EstimationError` if unknown frames cannot be fitted.
     """
     shared = _shared([effect for fit in fits for effect, _ in fit.effects], fits[0].nominal)
     reported = [
@@ -103,7 +102,7 @@ def problem(fits: Sequence[Fit]) -> Problem:
 
 
 def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect, ...]:
-    """Effects of all campaigns in their most frequent settings, in all places named."""
+    """Effects with common parameters: all that can be reset, and others found, each in its most frequent setting."""
     kept = [effect for effect in named if not _independent_per_campaign(effect, observations)]
     found = [e for e in library().values() if e.told_inside and not gate.missing(e, observations)]
     always = {effect.name for effect in found}
@@ -117,7 +116,7 @@ def _shared(named: Sequence[Effect], observations: Observations) -> tuple[Effect
 
 
 def _independent_per_campaign(effect: Effect, observations: Observations) -> bool:
-    """Whether an effect is independent in each campaign."""
+    """Whether an effect is each campaign's own: of frames, instrument, a discovered law, or base or tool over time."""
     if effect.name in FRAMES or effect.name.startswith(PREFIX):
         return True
     try:
@@ -144,8 +143,8 @@ class _GivenParameters(Effect):
 class _Visit:
     """One campaign, linearised about the common model.
 
-    ``here`` (P,) tells which of the common parameters it can tell; ``common`` are these with their responses in its
-    rows, ``own`` its own; ``linear`` is the last linearisation, about ``frames``, ``None`` before the first.
+    ``here`` (P,) masks the common parameters whose columns it has; ``common`` are these with their responses in its
+    rows, ``own`` its own parameters; ``linear`` is the last linearisation, about ``frames``, ``None`` before the first.
     """
 
     fit: Fit
@@ -158,7 +157,7 @@ class _Visit:
 
     @classmethod
     def of(cls, fit: Fit, keys: Sequence[Key], given: dict[Key, Parameter]) -> _Visit:
-        """Responses of the common parameters in a campaign's rows; none for an effect whose columns it lacks."""
+        """Prepare a campaign for linearisation: its own parameters, its whitening, and the ``given`` common ones."""
         fresh = [effect for effect, _ in fit.effects if _independent_per_campaign(effect, fit.nominal)]
         own = tuple(p for effect in fresh for p in _named(effect, gate.checked(effect, fit.nominal)))
         white = fit.explanation.whitening
@@ -167,7 +166,7 @@ class _Visit:
         return cls(fit, np.array([key in given for key in keys]), common, own, white, fit.nominal.frames)
 
     def products(self, sizes: Array, values: Array) -> tuple[Array, Array]:
-        """Return the normal equations (P, P) and (P,) about values of the common parameters, frames refitted."""
+        """Linearise about common parameter values (P,), frames refitted; return normal equations (P, P) and (P,)."""
         here, campaign = self.here, self.fit.campaign
         if self.linear is not None:
             common = self.linear.blocks[0].columns[:, :, : here.sum()]
@@ -188,7 +187,7 @@ class _Visit:
 
 
 def _reported_parameters(effects: Sequence[Effect], observations: Observations) -> Iterator[tuple[Key, Parameter]]:
-    """Yield the reported parameters that these rows determine, contained effects taken out of larger ones."""
+    """Yield keys and parameters of the effects whose columns are there, contained effects taken out of larger ones."""
     names = {effect.name for effect in effects if effect.told_inside}
     for effect in effects:
         if gate.missing(effect, observations):
@@ -201,7 +200,7 @@ def _reported_parameters(effects: Sequence[Effect], observations: Observations) 
 
 
 def _named(effect: Effect, parameters: Sequence[Parameter]) -> tuple[Parameter, ...]:
-    """Parameters with names that are unique among all effects."""
+    """Prefix the parameters' labels with the effect's name, so that they are unique among all effects."""
     return tuple(replace(p, label=f"{effect.name}: {p.label}") for p in parameters)
 
 

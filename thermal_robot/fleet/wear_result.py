@@ -40,18 +40,18 @@ class Visit:
 
 @dataclass(frozen=True)
 class Jump:
-    """Step change of a parameter between two campaigns.
+    """Step change of a parameter between two campaigns, with the posterior of its date.
 
     Attributes
     ----------
     after
-        Number of the last campaign before it, from 0.
+        Number of the last campaign before the step, from 0.
     probability
-        Probability of this date, given that the parameter jumped.
+        Posterior probability of this date, given that the parameter jumped.
     probabilities
-        (K − 1,) the same after each campaign.
+        (K − 1,) the same for a step after each campaign but the last.
     earliest, latest
-        Numbers of the campaigns between which it happened with 95 %: the last before it and the first after it.
+        Numbers of the campaigns between which the step is with at least 95 %: the last before and the first after it.
     size, std
         Size of the step, and its standard deviation; unit of the parameter.
     """
@@ -75,21 +75,21 @@ class Rate:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Time at which a parameter's absolute value reaches a limit.
+    """Forecast of the time at which a parameter's absolute value reaches a limit, by its trend.
 
     Attributes
     ----------
     limit
         Limit in the unit of the parameter.
     state
-        ``passed`` (it is beyond in the last campaign), ``expected`` (a trend leads there), ``never`` (it does not move,
-        or has jumped and stays), ``unknown`` (it wanders, or there are no dates for a rate).
+        ``passed`` (the limit is reached in the last campaign), ``expected`` (a trend leads there), ``never`` (the
+        parameter is constant, or has jumped and stays), ``unknown`` (a random walk, or no dates for a rate).
     day
-        Expected, in days since the first campaign; ``None`` unless ``expected``.
+        Expected time, in days since the first campaign; ``None`` unless ``expected``.
     low, high
-        95 % interval of it; ``high`` is ``None`` where the trend may be none.
+        95 % confidence interval of ``day``; ``high`` is ``None`` where the rate may be zero.
     dates
-        The three as dates; empty where there is none.
+        ``day``, ``low`` and ``high`` as ISO dates; empty where there is none.
     """
 
     limit: float
@@ -102,12 +102,12 @@ class Crossing:
 
 @dataclass(frozen=True, kw_only=True)
 class Worn:
-    """Change of one parameter over time; SI.
+    """Change of one parameter over a series of K campaigns: its kind, size, alarm and forecast; SI.
 
     Attributes
     ----------
     effect, title
-        Its effect's name, and in plain words.
+        Name and title of its effect.
     parameter, place, unit
         Name of the parameter, its joint or link, and its unit.
     comparable
@@ -115,27 +115,27 @@ class Worn:
     alarm
         Whether there is an alarm: its p-value is at most the false-alarm rate.
     chance
-        Bound on the probability that a series without any change shows one as clear, in whatever parameter, on whatever
-        day.
+        Bound on the false-alarm probability: that a series without any change shows one as significant, in any
+        parameter on any day.
     moved
-        Posterior probability that it moves, in whatever way.
+        Posterior probability that it is not constant.
     kind
-        ``constant``, ``jump``, ``trend`` or ``walk``: the most probable, of those in which it moves where it rings.
+        ``constant``, ``jump``, ``trend`` or ``walk``: the most probable one, not ``constant`` with an alarm.
     kinds
-        Probability of each.
+        Posterior probability of each kind.
     jump, rate
-        Step or rate of the change, if it is one; a rate needs dates.
+        The jump, or the rate of the trend, if its kind is that; a rate needs dates.
     change, change_std
-        Change from the first campaign to the last under this kind of change; 0 where it is constant.
+        Change from the first campaign to the last under its kind, and its standard deviation; 0 where constant.
     values, stds
-        (K,) as each campaign has it, all others as they are over time, and their standard deviations; ``None`` in a
-        campaign that says nothing of it.
+        (K,) estimates with a free value in each campaign, the other parameters following their kinds, and standard
+        deviations; ``None`` in a campaign that has no information on it.
     fitted
-        (K,) as its kind has it.
+        (K,) values under its kind of change.
     crossing
-        Crossing of the limit of its effect; ``None`` without one.
+        Forecast of reaching the limit of its effect; ``None`` without a limit.
     confounded_with
-        Parameters of whose changes the data cannot tell this one's.
+        Names of parameters whose changes the data cannot tell apart from its own.
     """
 
     effect: str
@@ -162,13 +162,13 @@ class Worn:
 
     @property
     def perhaps(self) -> bool:
-        """Whether it probably moves without an alarm."""
+        """Whether it moves with a posterior probability above 0.5, but without an alarm."""
         return self.comparable and not self.alarm and self.moved > settings.LIKELY
 
 
 @dataclass(frozen=True, repr=False)
 class Wear(RenderedPage):
-    """Change of one robot over time.
+    """Result of a change-point analysis: changes of one robot's parameters over several campaigns.
 
     Attributes
     ----------
@@ -181,11 +181,11 @@ class Wear(RenderedPage):
     parameters
         Parameters, alarms first, then by the probability of a change.
     false_alarm
-        Stated: at most so many series without any change ring at all.
+        False-alarm rate: probability at most that a series without any change has any alarm.
     scatter
         Overdispersion of the campaigns: their scatter over their standard deviations, at least 1.
     nothing
-        Probability that nothing moved.
+        Posterior probability that no parameter moved.
     notes
         Remarks, one sentence each.
     """
