@@ -132,7 +132,7 @@ class Table:
         return {name: self.numbers(name, gaps=True) for name in self.columns if self.first_text(name) is None}
 
     def frame(self, *, numbers: bool = False) -> pd.DataFrame:
-        """Convert the table to a data frame; with ``numbers``, columns of numbers only are parsed, else kept as text.
+        """Convert the table to a data frame; with ``numbers``, columns of numbers only are parsed, else cells stay.
 
         Columns of numbers are parsed in any case where the file has decimal commas.
         """

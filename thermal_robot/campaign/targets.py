@@ -47,7 +47,7 @@ class Targets:
     sigma: float  # one sigma per axis by which the targets move against each other, m: the median over the rows
 
     def take(self, rows: NDArray[np.int64] | Mask) -> Targets:
-        """Subset of the rows; positions and typical noise stay."""
+        """Return the targets of some rows, chosen by number or mask; places on the tool and typical noise stay."""
         return Targets(self.numbers, self.points[rows], self.places, self.spread[rows], self.typical, self.sigma)
 
 

@@ -75,7 +75,7 @@ def clock_of(covariates: Mapping[str, Array]) -> Array | None:
 def _runs(
     covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int
 ) -> Iterator[NDArray[np.int64]]:
-    """Yield the rows of each uninterrupted run in order; none where the order is unknown."""
+    """Yield the row indices of each session, sorted by time or order; none where neither is recorded or varies."""
     clock = clock_of(covariates)
     if clock is None or not samples or not np.ptp(clock) > 0.0:
         return

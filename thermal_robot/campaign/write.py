@@ -135,7 +135,7 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
 
 
 def _write(path: Path, write: Callable[..., Any], **how: str) -> None:
-    """Write a data frame by one of its methods, as a whole or not at all."""
+    """Write a file by a data frame's own method ``write``, atomically: as a whole or not at all."""
 
     def put(target: Path) -> None:
         with whole(target) as place:

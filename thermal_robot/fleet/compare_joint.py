@@ -113,7 +113,7 @@ class Problem:
         return Gram(matrix, vector, self.total, slices, bases, positive, ranks, spreads, self.equations, settings.HELD)
 
     def better(self, held: Sequence[JointBlock], bases: Sequence[Combination], best: float) -> list[JointBlock]:
-        """Parts that improve a combination, added or in place of one of its blocks.
+        """Blocks that improve the evidence of a combination, added or in place of one of its blocks.
 
         All are scored to first order; for each place the first that improves the exact evidence is returned, in the
         order of the first-order gain. For a shared effect, a difference in some campaigns or in the complement is

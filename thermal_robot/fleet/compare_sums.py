@@ -183,9 +183,9 @@ def candidates(
 
 
 def _settings(fits: Sequence[Fit | ModelAsFit], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
-    """Yield each effect once, in all its places and in the setting of the most certain fit.
+    """Yield each effect to compare once, in all its places and in the setting of the fit with the highest odds for it.
 
-    A setting that reads more columns, such as a clock, takes precedence.
+    A setting that reads more columns, such as a clock, takes precedence. Laws come once for each campaign.
     """
     known: dict[str, tuple[tuple[int, float], Effect]] = {}
     for fit in fits:

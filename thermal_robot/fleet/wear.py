@@ -262,7 +262,7 @@ def results(
     limits: Mapping[str, float],
     false_alarm: float,
 ) -> tuple[Worn, ...]:
-    """Results of all parameters: alarms first, then by the probability of a change.
+    """Assemble each parameter's kind of change, alarm and forecast; alarms first, then by probability of a change.
 
     ``found`` are the explanations of the series, the most probable first; ``first`` is the date of the first campaign,
     ``None`` without dates; ``limits`` are in SI, by effect.

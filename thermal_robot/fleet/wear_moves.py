@@ -128,7 +128,7 @@ class Series:
 
     @cached_property
     def grid(self) -> Grid:
-        """Grid of all prior scales and overdispersion factors."""
+        """Grid of all combinations of prior scale and overdispersion, with log prior and likelihood of no move."""
         scale, factor = np.array(settings.SCALES), np.array(settings.SCATTER)
         distance, degrees = self.scattered
         prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))

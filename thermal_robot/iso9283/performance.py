@@ -273,7 +273,7 @@ class Performance:
         return ", and ".join(part for part in (at_rest, along) if part)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, SI.
+        """Return all criteria as plain values for JSON, SI.
 
         Examples
         --------

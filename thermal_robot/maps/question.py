@@ -143,7 +143,7 @@ class Spec:
 
     @property
     def parts(self) -> int:
-        """Number of chunks."""
+        """Number of chunks, of 4096 places or configurations each."""
         return -(-self.over.count // CHUNK)
 
     def to_dict(self) -> dict[str, Any]:

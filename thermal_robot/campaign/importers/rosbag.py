@@ -57,15 +57,15 @@ class Stream:
     names: tuple[str, ...]  # of the k columns: joints, or x y z and perhaps qw qx qy qz
 
     def between(self, times: Array) -> Array:
-        """Linear interpolation, (M, k); held beyond the ends."""
+        """Interpolate the values linearly at (M,) times: (M, k); the end values are held beyond the ends."""
         return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
 
     def scaled(self, scale: Array) -> Stream:
-        """Time series times (k,) unit factors."""
+        """Return the time series with its k columns multiplied by unit factors (k,)."""
         return replace(self, values=self.values * scale)
 
     def nearest(self, times: Array) -> NDArray[np.int64]:
-        """Nearest neighbours in time: (M,) indices of samples."""
+        """Return the indices (M,) of the samples nearest in time to each of (M,) times, s."""
         after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
         return np.where(times - self.time[after - 1] < self.time[after] - times, after - 1, after)
 
