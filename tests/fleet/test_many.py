@@ -267,6 +267,14 @@ def test_a_fingerprint_follows_content_version_and_options_and_nothing_else(rv_m
         assert of(moved) != known, file
         (moved / file).write_bytes(before)
     assert of(moved) == known
+    declared = (moved / "campaign.toml").read_text()
+    (moved / "campaign.toml").write_text(declared.replace("[robot]\n", '[robot]\nkinematics = "k.yaml"\n'))
+    told = set()
+    for figure in ("0.1", "0.2"):
+        (moved / "k.yaml").write_text(figure)
+        told.add(of(moved))
+    assert len(told) == 2
+    (moved / "campaign.toml").write_text(declared)
     monkeypatch.setattr("importlib.metadata.version", lambda _: "99.0")  # another program may say something else
     assert of(moved) != known
 

@@ -169,5 +169,8 @@ def test_what_is_no_map_no_column_or_no_place_is_refused(rv_m2, made, tmp_path):
             ask("requierd")
     with pytest.raises(RobotError, match="nothing to map"):
         workspace_map(rv_m2, Positions((0, 1, 0), (0, 1, 1), (0, 1, 1)), tmp_path / "empty.parquet")
+    far = workspace_map(rv_m2, Positions((4, 5, 2), (0, 1, 2), (0, 1, 1)), tmp_path / "far.parquet")
+    with pytest.raises(CampaignError, match="reaches no place"):
+        plot_map(far)
     with pytest.raises(CampaignError, match="Positions or Joints"):
         workspace_map(rv_m2, 5, tmp_path / "empty.parquet")

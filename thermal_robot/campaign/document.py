@@ -136,6 +136,11 @@ class Declaration:
     gear_rows: Mapping[str, int | None]  # line of each key of ``[gears]``, for a message once the joints are known
     kinematics: Path | None = None  # path of the calibration that a robot of Universal Robots brings along
 
+    @property
+    def files(self) -> list[Path]:
+        """Input files of the campaign: campaign.toml, table, and the robot's own where it names any."""
+        return [self.file, self.table, *(own for own in (self.robot, self.kinematics) if isinstance(own, Path))]
+
 
 def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     """Read campaign.toml, or that of a directory; its paths are relative to ``folder``, by default its own."""

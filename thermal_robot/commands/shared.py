@@ -71,6 +71,4 @@ def read(options: argparse.Namespace) -> Campaign:
 
 def read_from(campaign: str | Path, folder: Path | None = None) -> list[Path]:
     """Input files of a campaign: its declaration, its table and, where it names a file, its URDF."""
-    declaration = read_declaration(Path(campaign), folder)
-    robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
-    return [declaration.file, declaration.table, *robot]
+    return read_declaration(Path(campaign), folder).files

@@ -276,10 +276,8 @@ def fingerprint(folder: str, options: Sequence[object]) -> str:
     from importlib.metadata import version
 
     declaration = read_declaration(Path(folder))
-    robot = declaration.robot
-    files = [declaration.file, declaration.table, *([robot] if isinstance(robot, Path) else [])]
     name = Path(os.path.abspath(declaration.file)).parts[-2:]  # it stands in messages
-    told = json.dumps([name, version("thermal-robot"), list(options), [checksum(file) for file in files]])
+    told = json.dumps([name, version("thermal-robot"), list(options), [checksum(file) for file in declaration.files]])
     return hashlib.sha256(told.encode()).hexdigest()
 
 

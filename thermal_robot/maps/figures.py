@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.errors import CampaignError
 from thermal_robot.maps.quantities import UNITS
 from thermal_robot.maps.stores import Map
 
@@ -58,16 +59,20 @@ def plot_map(found: Map, by: str = "required_warm") -> Figure:
     Raises
     ------
     CampaignError
-        A column that the map has not.
+        A column that the map has not, or a map without any place that the robot reaches.
     """
     from matplotlib.figure import Figure
 
     places, values = found.values(by, largest=larger_is_better(by))
+    if not len(places):
+        raise CampaignError(
+            "map", "nothing to draw: the robot reaches no place of it", expected="places within its reach"
+        )
     factor, unit = _SIZES[UNITS.get(by, "")]
     values = factor * values
     label = TITLES.get(by, by) + (f" ({unit})" if unit else "")
     figure = Figure(figsize=(7.2, 5.6), layout="constrained")
-    varies = [k for k in range(3) if len(places) and np.ptp(places[:, k]) > 1e-6]
+    varies = [k for k in range(3) if np.ptp(places[:, k]) > 1e-6]
     figure.suptitle(f"{found.notes['robot']}: {label}", fontsize=12)
     if found.notes["over"] == "positions" and len(varies) == 2:
         _plane(figure, found, places, values, varies, label, largest=larger_is_better(by))
