@@ -230,7 +230,7 @@ class Observations:
 
     @cached_property
     def tool_sensitivity(self) -> Array:
-        """Twist (N, 6, 6) of the target per unit twist of the tool, tool frame."""
+        """What rows see (N, 6, 6), root frame axes, of the target's twist per unit twist of the tool, own axes."""
         return self.sight.sees(_twist_map(self.chain.tool_rotation, self.lever))
 
 

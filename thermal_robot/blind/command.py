@@ -164,7 +164,7 @@ def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) 
 def _with_faults(
     cases: tuple[Case, ...], faults: Sequence[str], seed: int, robots: tuple[RobotChoice, ...]
 ) -> tuple[Case, ...]:
-    """Append cases with the user's faults: ``single`` if the library has an effect of that name, else ``unlisted``."""
+    """Append `OWN_CASES` cases of each user's fault, robots in turn: single if the library has it, else unlisted."""
     if not faults:
         return cases
     from thermal_robot.blind.reality.unlisted import load

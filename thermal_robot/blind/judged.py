@@ -275,7 +275,7 @@ def _true_and_false(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[
 
 
 def _shared(record: Record) -> Marks:
-    """Score the summary of a fleet: faults called shared, truly or falsely, and faults of single robots."""
+    """Judge a fleet's summary, yes or no: shared faults found, no false alarm, single robots' faults kept apart."""
     truth, told = record["truth"], said(record)
     called = [s for s in told["shared"] if not any(_same(s, true) for true in truth["shared"])]
     true_ones = {true["effect"] for true in truth["shared"]}

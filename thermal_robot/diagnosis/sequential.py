@@ -274,10 +274,11 @@ class State:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted(State):
-    """Converged fit of a choice to all rows: ``values`` are mean and covariance by effect, ``gram`` its linear problem.
+    """Fit of a choice to all rows after an iteration; that of :func:`converged_fit` is converged only if ``steady``.
 
     ``products``: Gram matrix (k + 1, k + 1) in units of ``sigma``, the gap at the point. ``squares`` (G,): sum of
-    squares, m² and rad², over ``count`` rows not set aside. ``steady``: also that the iteration has converged.
+    squares, m² and rad², over ``count`` rows not set aside. ``values``: mean and covariance by effect; ``gram``: its
+    linear problem.
     """
 
     best: Combination

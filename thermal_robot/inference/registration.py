@@ -247,7 +247,7 @@ def _some(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def _alike(campaign: Campaign) -> list[tuple[int, NDArray[np.int64]]]:
-    """Rows of each kind and artefact, and how many of them place it at least."""
+    """For each kind and artefact: the fewest rows that place it, and its rows."""
     found = list[tuple[int, NDArray[np.int64]]]()
     for own, rows in kinds_of(campaign):
         rows = np.arange(campaign.samples) if rows is None else rows

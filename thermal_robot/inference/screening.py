@@ -114,7 +114,7 @@ class Target:
         return max(int(len(self.white) - self.unseen - self.basis.shape[1]), 1)
 
     def score(self, columns: Array) -> Score:
-        """F test and BIC of further columns (N, m, K); :data:`NOTHING` where they leave too few degrees of freedom."""
+        """Test K columns (N, m, K) together by F and BIC; :data:`NOTHING` if none is new or few freedoms are left."""
         whole = equations_of(columns * self.root[:, :, None])
         flat = without(whole, self.basis)
         # what is left of an exact alias of the design is rounding, no column

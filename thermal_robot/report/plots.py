@@ -362,7 +362,7 @@ def _draw_map(axes: Axes, diagnosis: Diagnosis, plane: tuple[int, int]) -> None:
 
 
 def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
-    """Draw the scale of the arrows below the legend, as the length of a round gap, m."""
+    """Draw below the legend an arrow that says how long a gap of ``sample``, m, is drawn: ``factor`` times larger."""
     below = ScaledTranslation(0.09, -0.35, axes.figure.dpi_scale_trans)
     along = blended_transform_factory(axes.transData, axes.transAxes) + below
     start = axes.get_xlim()[0]

@@ -329,7 +329,7 @@ def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
 
 
 def _completed(held: Held, point: Array) -> tuple[float, float, float]:
-    """Merge held parameters and free coordinates into mean, log of the standard deviation, and ``arctan r``."""
+    """Fill the ``None`` of ``held`` from ``point``, in order: mean, log of the total deviation, ``arctan r``."""
     rest = iter(point)
     place, size, angle = (float(next(rest)) if value is None else value for value in held)
     return place, size, angle

@@ -377,7 +377,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class _Disc:
-    """Discs about the origin, radii ``(N,)``."""
+    """Regions to integrate over: discs about the origin, radii ``extent`` ``(N,)``."""
 
     extent: Array
 

@@ -349,7 +349,7 @@ def _servo(setting: Setting, values: Array) -> Array:
 
 
 def _lags(setting: Setting, values: Array) -> dict[str, float]:
-    """True parameters of :func:`_servo`: delay, friction and coefficient of acceleration of each joint."""
+    """True delay, friction and coefficient of acceleration ½ (1 + p²) T² by joint, from rows (T, friction, p)."""
     delay, friction, loop = values.T
     each = (("delay", delay), ("friction", friction), ("effect of acceleration", (1.0 + loop**2) / 2.0 * delay**2))
     return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(setting.world.names, of, strict=True)}
