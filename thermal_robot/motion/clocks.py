@@ -11,7 +11,7 @@ from scipy.stats import siegelslopes
 from thermal_robot.arrays import Array
 from thermal_robot.motion.following import Correlation, Moves, slope
 from thermal_robot.motion.log import CHANNELS, Channel, Motion, MotionLog
-from thermal_robot.motion.settings import CLEAR, CLUSTERS, FAR, FOLLOWS, OUTLIER, PIECE, RATES, STRIDE
+from thermal_robot.motion.settings import CLEAR, CLUSTERS, FAR, FOLLOWS, OUTLIER, PIECE, QUARTERS, RATES, STRIDE
 
 _COARSE = 0.4  # of STRIDE: step of the grid on which rates are searched
 _MOST = 8  # motions that tell a rate roughly
@@ -133,7 +133,7 @@ def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
         moves = Moves.of(motion)
         whole, share = Correlation.of(moves, _NEAR).best()
         if share > FOLLOWS:
-            told = [Correlation.of(part, _NEAR).best() for part in moves.parts(4)]
+            told = [Correlation.of(part, _NEAR).best() for part in moves.parts(QUARTERS)]
             near = [each for each, part in told if part > FOLLOWS] or [whole]
             error = max(float(np.std(near)) / np.sqrt(len(near)), moves.step / 2.0)
             names.append(motion.name)
