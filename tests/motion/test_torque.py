@@ -18,7 +18,7 @@ from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.rollout import rollout
 from thermal_robot.motion.torque import _prandtl
-from thermal_robot.motion.write import motion_urdf
+from thermal_robot.motion.write import motion_mjcf, motion_urdf
 from thermal_robot.robot import load_robot
 
 ARM = draw_arm(np.random.default_rng(4), 2)
@@ -85,6 +85,57 @@ def test_masses_of_two_links_stand_side_by_side_among_the_values():
     assert both.values["masses", "mass of joint_1"] > 0.2
     assert both.values["masses", "mass of joint_2"] == pytest.approx(0.5, rel=0.15)
     assert sorted(both.values.values()) == sorted(both.parameters["value"])
+
+
+def as_mjcf(text):
+    """The arm as an MJCF, with all digits of its masses."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    spec = mujoco.MjSpec.from_string(text)
+    spec.compiler.fusestatic, spec.compiler.boundmass, spec.compiler.boundinertia = False, 0.0, 0.0
+    spec.compile()
+    return spec.to_xml()
+
+
+def needed(text, log):
+    """Torques (N, 2) by MuJoCo's inverse dynamics, those measured, along all motions."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(text)
+    data, found, measured = mujoco.MjData(model), [], []
+    model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    for motion in log.motions:
+        number = int(motion.name[1:])
+        time = np.arange(0.0, 8.0, 0.01)
+        for data.qpos, data.qvel, data.qacc in zip(*(waves(number, time, k) for k in range(3)), strict=True):
+            mujoco.mj_inverse(model, data)
+            found.append(data.qfrc_inverse.copy())
+        measured.append(motion.torque.values[::5][: len(time)])
+    return np.array(found), np.concatenate(measured)
+
+
+def test_masses_that_were_found_are_written_and_mujoco_needs_the_torques():
+    """What goes away in MuJoCo's own inverse dynamics, of motions that were not fitted, is the share that was told."""
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    whole = log(heavier=(0.3, 0.5))
+    fitted, unseen = (replace(whole, motions=whole.motions[k::2]) for k in (0, 1))
+    heavy = diagnose_motion(fitted)
+    nominal = as_mjcf(ARM.urdf)
+    written, as_urdf = motion_mjcf(heavy, nominal), motion_urdf(heavy)
+    assert sum("masses of the link" in told for told in written.held) == 2, written.kept
+    (before, tau), (after, _) = (needed(text, unseen) for text in (nominal, written.text))
+    shrinkage = 1.0 - ((tau - after) ** 2).sum() / ((tau - before) ** 2).sum()
+    assert shrinkage == pytest.approx(heavy.held_out.shrinkage, abs=0.02)
+    assert shrinkage > 0.95
+    np.testing.assert_allclose(needed(as_mjcf(as_urdf.text), unseen)[0], after, atol=1e-6)
+
+
+def test_numbers_of_no_rigid_body_are_not_written():
+    pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    heavy = diagnose_motion(log(heavier=(0.0, 0.5)))
+    hollow = replace(heavy, values={("masses", "second moment of joint_2, xx"): -1.0})
+    for written in (motion_mjcf(hollow, as_mjcf(ARM.urdf)), motion_urdf(hollow)):
+        assert [told for told in written.kept if "no rigid body" in told]
+        assert not [told for told in written.held if "masses" in told]
 
 
 @pytest.mark.parametrize("kp", [None, 20.0])

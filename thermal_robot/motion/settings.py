@@ -125,6 +125,8 @@ PRANDTL = 4e-3
 """rad over which a joint's friction builds up, from end to end, when it turns back: what public logs of arms show."""
 LINK = 0.3
 """m: length of a link, of which a tenth is how far its centre of mass may be off."""
+SAME_LINK = 1e-3
+"""Of the largest number of a link: by no more may those of two robot files differ, which round to four digits."""
 AGREE = 0.1
 """Share by which the shrinkage of a simulator's own rollout may differ from the one that was told."""
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)

@@ -25,7 +25,8 @@ from thermal_robot.motion.model import SHARED, JointModel, Mask, Parameter, Rows
 from thermal_robot.motion.servo import STRIBECK_VELOCITY
 
 _SECOND = tuple(f"second moment of {{}}, {axes}" for axes in ("xx", "xy", "yy", "xz", "yz", "zz"))
-_INERTIAL = ("mass of {}", *(f"moment of {{}} along {axis}" for axis in "xyz"), *_SECOND)
+INERTIAL = ("mass of {}", *(f"moment of {{}} along {axis}" for axis in "xyz"), *_SECOND)
+"""Labels of a link's ten numbers, in Pinocchio's order; of its mass the share that all of them grow by."""
 
 
 class TorqueModel(JointModel):
@@ -59,7 +60,7 @@ class TorqueModel(JointModel):
             for k, (name, numbers) in enumerate(self._bodies.items()):
                 first = 0.1 * numbers[0] * settings.LINK
                 known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
-                for i, (what, (size, unit)) in enumerate(zip(_INERTIAL, known, strict=True), 10 * k):
+                for i, (what, (size, unit)) in enumerate(zip(INERTIAL, known, strict=True), 10 * k):
                     label = what.format(name)
                     found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {i}", label))
         return tuple(found)

@@ -23,6 +23,7 @@ from thermal_robot.kinematics import homogeneous
 from thermal_robot.kinematics.urdf import text_of, tree
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Servo
+from thermal_robot.motion.masses import into_body, into_link, links
 from thermal_robot.motion.mjcf import add_joint, add_mass, position_actuators
 from thermal_robot.motion.result import MotionDiagnosis
 
@@ -37,7 +38,6 @@ _CANNOT = {
     "contact": "it is the surroundings' and not the robot's",
     "offset": "it is the torque channel's and not the robot's",
     "torque_constant": "it is the torque channel's and not the robot's",
-    "masses": "torques of joints tell sums of the links' numbers, and no link's own",
 }
 """Effects that neither an MJCF nor a URDF holds, and why."""
 _OF_A_JOINT = (
@@ -121,7 +121,7 @@ def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
 
 
 def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
-    """Joint friction, damping, armature, servo gains, limits, delay and payload written into an MJCF by MjSpec.
+    """Joint friction, damping, armature, servo gains, limits, delay and masses written into an MJCF by MjSpec.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
             stick(spec, joints[cause.name])
         _into_servo(spec, servos.get(cause.name), cause, written)
         _tell_kept(cause, written, _CANNOT)
-    _into_masses(spec, found, written)
+    _into_masses(model, spec, found, written)
     spec.compile()
     written.text = spec.to_xml()
     return written
@@ -226,8 +226,10 @@ def _into_servo(spec: Any, actuator: Any, cause: Cause, written: Written) -> Non
         written.kept.append(f"delay of {cause.name}: {reason}")
 
 
-def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
-    """Add the payload that was found to the body, or to the body of the site, of the tool frame."""
+def _into_masses(model: Any, spec: Any, found: MotionDiagnosis, written: Written) -> None:
+    """Add the payload that was found to the body, or to the body of the site, of the tool frame; masses to links."""
+    for joint, (link, added) in links(found).items():
+        _tell_link(written, joint, added, into_body(model, spec, joint, link, added))
     tool, (mass, at) = found.log.robot.tool_frame, _payload(found, written)
     if not mass:
         return
@@ -241,10 +243,18 @@ def _into_masses(spec: Any, found: MotionDiagnosis, written: Written) -> None:
     written.held.append(f"payload at {tool}: {mass:.4g} kg")
 
 
+def _tell_link(written: Written, joint: str, added: Array, why_not: str) -> None:
+    told = f"masses of the link behind {joint}"
+    if why_not:
+        written.kept.append(f"{told}: {why_not}")
+    else:
+        written.held.append(f"{told}: {added[3, 3]:+.4g} kg, and its moments")
+
+
 def _payload(found: MotionDiagnosis, written: Written) -> tuple[float, Array]:
     """Payload to be added, kg, and its centre in the tool frame, m; what is no load at the tool is told as kept."""
     mass = found.values.get(("payload", ""), 0.0)
-    whole = dict.fromkeys(effect for effect, _ in found.values if effect in ("contact", "masses"))
+    whole = dict.fromkeys(effect for effect, _ in found.values if effect == "contact")
     written.kept += [f"{effect}: {_CANNOT[effect]}" for effect in whole]
     if mass < 0.0:
         said = f"payload: {-mass:.4g} kg less than the masses say; which of them, no log of one load tells"
@@ -253,7 +263,7 @@ def _payload(found: MotionDiagnosis, written: Written) -> tuple[float, Array]:
 
 
 def motion_urdf(found: MotionDiagnosis) -> Written:
-    """Joint friction, damping, limits and the payload written into the URDF of the log's robot (``<dynamics>``).
+    """Joint friction, damping, limits and masses written into the URDF of the log's robot (``<dynamics>``).
 
     Parameters
     ----------
@@ -298,7 +308,11 @@ def _attribute(
 
 
 def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
-    """Add the payload that was found as a link behind the tool frame."""
+    """Add the payload that was found as a link behind the tool frame; masses to their links."""
+    children = {joint.get("name"): joint.find("child").get("link") for joint in root.iterfind("joint")}
+    own = {link.get("name"): link for link in root.iterfind("link")}
+    for joint, (_, added) in links(found).items():
+        _tell_link(written, joint, added, into_link(own[children[joint]], added))
     tool, (mass, at) = found.log.robot.tool_frame, _payload(found, written)
     if not mass:
         return

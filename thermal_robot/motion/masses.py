@@ -1,0 +1,148 @@
+"""Inertial parameters that torques tell, added to the links of a robot file as pseudo-inertias.
+
+A body's mass m, first moment h and second moments Σ = ∫ x xᵀ dm are one symmetric matrix, J = [Σ h; hᵀ m], that moves
+between frames as T J Tᵀ, and is that of a rigid body where it is positive (Wensing, Kim and Slotine, *IEEE Robotics and
+Automation Letters* 3, 2018). Torques of joints tell sums of the links' numbers: what is added gives the torques that
+were found, though the numbers of one link may be another's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from thermal_robot.arrays import Array
+from thermal_robot.correction.mujoco_models import mujoco_or_error
+from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
+from thermal_robot.kinematics.loads import Dynamics
+from thermal_robot.kinematics.urdf import xyz_rpy
+from thermal_robot.motion import settings
+from thermal_robot.motion.result import MotionDiagnosis
+from thermal_robot.motion.torque import INERTIAL
+
+_UPPER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Rows and columns of an inertia in Pinocchio's order."""
+
+
+def pseudo(mass: float, first: Array, inertia: Array) -> Array:
+    """(4, 4) pseudo-inertia of a mass, kg, a first moment (3,), kg·m, and an inertia (3, 3) about the origin, kg·m²."""
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    return np.block([[second, first[:, None]], [first[None], np.array([[mass]])]])
+
+
+def about(mass: float, centre: Array, inertia: Array) -> Array:
+    """(4, 4) the same of an inertia (3, 3) about the centre of mass."""
+    place = homogeneous(np.eye(3), np.asarray(centre, dtype=float))
+    return np.asarray(place @ pseudo(mass, np.zeros(3), inertia) @ place.T)
+
+
+def at_centre(whole: Array) -> tuple[float, Array, Array]:
+    """Mass, centre (3,) and inertia (3, 3) about it, of a pseudo-inertia."""
+    mass, first = float(whole[3, 3]), whole[:3, 3]
+    second = whole[:3, :3] - np.outer(first, first) / mass
+    return mass, first / mass, np.trace(second) * np.eye(3) - second
+
+
+def rigid(whole: Array) -> bool:
+    """Whether a pseudo-inertia is that of a rigid body: with a mass, and no second moment about its centre negative."""
+    if whole[3, 3] <= 0.0:
+        return False
+    second = whole[:3, :3] - np.outer(whole[:3, 3], whole[:3, 3]) / whole[3, 3]
+    return bool(np.linalg.eigvalsh(second)[0] > 0.0)
+
+
+def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
+    """By the joint that carries it, pseudo-inertia (4, 4) of a link in the joint's frame, and what is added to it."""
+    robot = found.log.robot
+    told = {name: value for (effect, name), value in found.values.items() if effect == "masses"}
+    if not told:
+        return {}
+    gravity = robot.model.gravity.linear
+    bodies = Dynamics(robot.urdf, found.log.joints, robot.tool_frame, gravity, np.zeros(3)).bodies
+    added = dict[str, tuple[Array, Array]]()
+    for name, numbers in bodies.items():
+        more = np.array([told.get(what.format(name), 0.0) for what in INERTIAL])
+        if more.any():
+            added[name] = _of(numbers), _of(more[0] * numbers + np.concatenate([[0.0], more[1:]]))
+    return added
+
+
+def _of(numbers: Array) -> Array:
+    """(4, 4) pseudo-inertia of ten numbers in Pinocchio's order."""
+    inertia = np.zeros((3, 3))
+    for (i, j), value in zip(_UPPER, numbers[4:], strict=True):
+        inertia[i, j] = inertia[j, i] = value
+    return pseudo(float(numbers[0]), np.asarray(numbers[1:4]), inertia)
+
+
+def of_body(model: Any, body: int) -> Array:
+    """(4, 4) pseudo-inertia of a body of a ``mujoco.MjModel`` in its own axes, without those that it carries."""
+    turn = quaternion_to_rotation(model.body_iquat[body])
+    inertia = turn @ np.diag(model.body_inertia[body]) @ turn.T
+    return about(float(model.body_mass[body]), model.body_ipos[body], inertia)
+
+
+def carried(model: Any, body: int) -> Array:
+    """(4, 4) the same with all bodies that are fixed to it."""
+    whole = of_body(model, body)
+    for other in range(body + 1, model.nbody):
+        if model.body_parentid[other] == body and not model.body_jntnum[other]:
+            place = homogeneous(quaternion_to_rotation(model.body_quat[other]), model.body_pos[other])
+            whole = whole + place @ carried(model, other) @ place.T
+    return np.asarray(whole)
+
+
+def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> str:
+    """Add to the body of a joint, in a ``mujoco.MjSpec``; return why not, or nothing."""
+    body = int(model.jnt_bodyid[model.joint(joint).id])
+    place = homogeneous(np.eye(3), np.array(model.joint(joint).pos))
+    nominal = place @ link @ place.T
+    if not np.allclose(carried(model, body), nominal, atol=settings.SAME_LINK * np.abs(nominal).max()):
+        return "the MJCF's link has other masses, or another frame, than the robot of the log"
+    whole = of_body(model, body) + place @ added @ place.T
+    if not rigid(whole):
+        return "no rigid body has the numbers that torques tell of it alone"
+    mass, centre, inertia = at_centre(whole)
+    size, axes = np.linalg.eigh(inertia)
+    quaternion = np.zeros(4)
+    mujoco_or_error().mju_mat2Quat(quaternion, (axes * [1.0, 1.0, np.linalg.det(axes)]).ravel())
+    own = spec.bodies[body]
+    own.explicitinertial, own.mass, own.ipos, own.iquat, own.inertia = True, mass, centre, quaternion, size
+    return ""
+
+
+def into_link(link: Any, added: Array) -> str:
+    """Add to the ``<inertial>`` of a URDF's link; return why not, or nothing."""
+    inertial = link.find("inertial")
+    before = np.zeros((4, 4)) if inertial is None else _of_inertial(inertial)
+    if not rigid(before + added):
+        return "no rigid body has the numbers that torques tell of it alone"
+    if inertial is None:
+        inertial = etree.SubElement(link, "inertial")
+    for child in list(inertial):
+        inertial.remove(child)
+    mass, centre, inertia = at_centre(before + added)
+    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), centre))
+    etree.SubElement(inertial, "origin", xyz=xyz, rpy=rpy)
+    etree.SubElement(inertial, "mass", value=repr(mass))
+    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i, j in _UPPER}
+    etree.SubElement(inertial, "inertia", names)
+    return ""
+
+
+def _of_inertial(inertial: Any) -> Array:
+    """(4, 4) pseudo-inertia of an ``<inertial>`` in its link's frame."""
+
+    def told(element: str) -> Mapping[str, str]:
+        child = inertial.find(element)
+        return {} if child is None else child.attrib
+
+    origin, numbers = told("origin"), told("inertia")
+    roll, pitch, yaw = np.diag([float(x) for x in origin.get("rpy", "0 0 0").split()])
+    turn = exp3(yaw) @ exp3(pitch) @ exp3(roll)
+    own = np.array([[float(numbers.get("i" + "".join(sorted(a + b)), 0.0)) for b in "xyz"] for a in "xyz"])
+    centre = np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
+    return about(float(told("mass").get("value", 0.0)), centre, turn @ own @ turn.T)
