@@ -126,7 +126,8 @@ def test_masses_that_were_found_are_written_and_mujoco_needs_the_torques():
     shrinkage = 1.0 - ((tau - after) ** 2).sum() / ((tau - before) ** 2).sum()
     assert shrinkage == pytest.approx(heavy.held_out.shrinkage, abs=0.02)
     assert shrinkage > 0.95
-    np.testing.assert_allclose(needed(as_mjcf(as_urdf.text), unseen)[0], after, atol=1e-6)
+    # MuJoCo writes six digits of each number
+    np.testing.assert_allclose(needed(as_mjcf(as_urdf.text), unseen)[0], after, atol=1e-5)
 
 
 def test_numbers_of_no_rigid_body_are_not_written():

@@ -14,7 +14,8 @@ from thermal_robot.diagnosis.values import HeldOut, Unexplained
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.mjcf import servos_of_mjcf
-from thermal_robot.motion.result import MotionDiagnosis
+from thermal_robot.motion.model import ServoModel
+from thermal_robot.motion.result import MotionDiagnosis, rms
 from thermal_robot.motion.rollout import Rollout, rollout, simulated
 from thermal_robot.motion.write import causes, motion_mjcf, motion_urdf
 
@@ -203,3 +204,34 @@ def test_shrinkages_that_differ_by_more_than_a_tenth_do_not_agree():
     assert one.shrinkage_told == pytest.approx(0.96)
     assert one.shrinkage == pytest.approx(0.6)
     assert not one.agrees
+
+
+def test_what_the_mjcf_holds_is_in_the_nominal_model_and_stays_when_more_is_written(tmp_path):
+    """A joint with friction, damping, inertia and a delay of its own leaves no gap but MuJoCo's soft constraints."""
+    world = a_world()
+    faults = {
+        name: Fault(name, JOINT, size) for name, size in (("coulomb", 0.05), ("viscous", 0.2), ("armature", 0.01))
+    }
+    for name, fault in faults.items():
+        spec = world.spec(fault)
+        spec.compile()
+        file = tmp_path / f"{name}.xml"
+        file.write_text(spec.to_xml())
+        servos = servos_of_mjcf(file)
+        log = replace(world.log(world.simulated(fault)), servos=servos)
+        left = {}
+        for told, model in (("stated", ServoModel(log)), ("not", ServoModel(replace(log, servos=world.arm.servos)))):
+            model.refreshed(np.zeros(len(model.parameters)))
+            left[told] = rms(model.residuals(JOINT, np.zeros((1, len(model.parameters))))[0])
+        assert left["stated"] < 0.3 * left["not"], name
+    more = found_of(replace(log, servos=servos), {"armature": 0.01 / servos[log.joints[JOINT]].kp})
+    assert causes(more)[JOINT].torque("armature") == pytest.approx(0.02)
+
+
+def test_a_delay_that_is_stated_is_no_effect():
+    world = a_world()
+    log = world.log(world.simulated(Fault("delay", -1, 0.03)))
+    stated = {joint: replace(servo, delay=0.03) for joint, servo in log.servos.items()}
+    late, known = (ServoModel(replace(log, servos=servos)) for servos in (log.servos, stated))
+    one, other = (rms(model.residuals(JOINT, np.zeros((1, len(model.parameters))))[0]) for model in (late, known))
+    assert other < 0.1 * one

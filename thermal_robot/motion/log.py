@@ -81,6 +81,10 @@ class Servo:
         Error within which the servo does nothing, rad.
     gain, zero
         Share of the command and rad that it adds: at rest without load the joint is at (1 + gain) u + zero.
+    friction, damping, armature
+        Of the joint and its drive: Coulomb friction, N·m, viscous, N·m·s/rad, and inertia, kg·m².
+    delay
+        Dead time of the command, s.
     """
 
     kp: float | None = None
@@ -89,6 +93,10 @@ class Servo:
     dead_band: float | None = None
     gain: float | None = None
     zero: float | None = None
+    friction: float | None = None
+    damping: float | None = None
+    armature: float | None = None
+    delay: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ def position_actuators(model: Any) -> dict[str, int]:
 
 
 def servos_of_mjcf(file: Path) -> dict[str, Servo]:
-    """Return stiffness, damping, limit, gain and zero of the position actuators, by joint, as they act on the joint."""
+    """Return what position actuators and their joints are, by joint, as they act on it: all that a servo may state."""
     model, found = opened(file), {}
     for name, k in position_actuators(model).items():
         joint, gear = model.joint(name).id, float(model.actuator_gear[k, 0])
@@ -52,8 +52,15 @@ def servos_of_mjcf(file: Path) -> dict[str, Servo]:
         limits = [abs(gear) * float(model.actuator_forcerange[k, 1])] if model.actuator_forcelimited[k] else []
         limits += [float(model.jnt_actfrcrange[joint, 1])] if model.jnt_actfrclimited[joint] else []
         numbers = (-stiff * gear**2, -damp * gear**2, min(limits, default=0.0), 0.0, -gain / stiff - 1.0)
-        found[name] = Servo(*(float(x) or None for x in (*numbers, -offset / stiff / gear)))
+        dof, delays = int(model.jnt_dofadr[joint]), getattr(model, "actuator_delay", np.zeros(model.nu))
+        own = (model.dof_frictionloss[dof], damping_of(model, dof), model.dof_armature[dof], delays[k])
+        found[name] = Servo(*(float(x) or None for x in (*numbers, -offset / stiff / gear, *own)))
     return found
+
+
+def damping_of(model: Any, dof: int) -> float:
+    """Return a joint's damping, N·m·s/rad; the linear part where MuJoCo has a polynomial."""
+    return float(np.ravel(model.dof_damping[dof])[0])
 
 
 def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:

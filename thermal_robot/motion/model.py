@@ -309,8 +309,11 @@ class ServoModel(JointModel):
             stiffness = servo.kp * np.maximum(1.0 + x["kp"], settings.LEAST_STIFFNESS)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
             x["saturation"] = x["saturation"] + (stiffness / servo.limit if servo.limit else 0.0)
-        for name, stated in (("dead_zone", servo.dead_band), ("gain", servo.gain), ("zero", servo.zero)):
-            x[name] = x[name] + (stated or 0.0)
+            for name, torque in (("coulomb", servo.friction), ("lag", servo.damping), ("inertia", servo.armature)):
+                x[name] = x[name] + (torque or 0.0) / stiffness
+        for name in ("dead_band", "gain", "zero", "delay"):
+            number = {"dead_band": "dead_zone"}.get(name, name)
+            x[number] = x[number] + (getattr(servo, name) or 0.0)
         reach = self.commanded[:, joint].min(), self.commanded[:, joint].max()
         x["low"] = np.where(x["low"] > 0.0, reach[0] + x["low"], -np.inf)
         x["high"] = np.where(x["high"] > 0.0, reach[1] - x["high"], np.inf)

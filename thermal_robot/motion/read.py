@@ -41,6 +41,7 @@ _COLUMN = text("the name of a column")
 _PATH = text("the path of a table")
 _OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": NOT_NEGATIVE}
 _OF_A_SERVO |= {"gain": number(above=-1.0), "zero": number()}
+_OF_A_SERVO |= dict.fromkeys(("friction", "damping", "armature", "delay"), NOT_NEGATIVE)
 TOLERANCE = mapping(NOT_NEGATIVE)
 KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "robot": {

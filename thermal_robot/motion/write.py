@@ -46,6 +46,8 @@ _OF_A_JOINT = (
     ("damping", "damping", "viscous", "N·m·s/rad"),
 )
 """What an MJCF and a URDF call a joint's friction and damping, the effects that are these, and the unit."""
+_STATED = {"coulomb": "friction", "lag": "damping", "armature": "armature"}
+"""Effects that are told beyond what a servo states, by its name there."""
 _OF_THE_SERVO = dict.fromkeys(("armature", "delay", "gain", "zero", "kp", "droop"), "a URDF describes no servo")
 
 
@@ -105,9 +107,15 @@ class Cause:
         return None if low is None else self.reach[0] + low, None if high is None else self.reach[1] - high
 
     def torque(self, name: str) -> float | None:
-        """Return an effect as torque, N·m, N·m·s/rad or kg·m²; ``None`` where it is not found, or nothing tells it."""
+        """Return an effect as torque, N·m, N·m·s/rad or kg·m², with what the servo states of it; ``None`` if not found.
+
+        Or where nothing tells it.
+        """
         factor = 1.0 if self.torques else self.stiffness
-        return None if factor is None or name not in self.values else factor * self.values[name]
+        if factor is None or name not in self.values:
+            return None
+        stated = getattr(self.servo, _STATED[name]) if name in _STATED and self.servo.kp and not self.torques else None
+        return factor * self.values[name] + (stated or 0.0)
 
 
 def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
@@ -129,8 +137,8 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
         Of :func:`~thermal_robot.motion.diagnose.diagnose_motion`.
     mjcf
         The user's model, as a path or as its text, with the log's names of joints. What the diagnosis does not tell
-        stays; ``frictionloss``, ``damping`` and ``armature`` of the model, which the diagnosis does not know, are
-        replaced where it tells them.
+        stays; ``frictionloss``, ``damping``, ``armature`` and ``delay`` are replaced where it tells them, by what the
+        servos of the log state of them and what was found beyond.
 
     Raises
     ------
@@ -217,7 +225,7 @@ def _into_servo(spec: Any, actuator: Any, cause: Cause, written: Written) -> Non
         actuator.forcelimited = mujoco_or_error().mjtLimited.mjLIMITED_TRUE
         actuator.forcerange = [-limit / abs(gear), limit / abs(gear)]
         _said(written, cause, "forcerange", limit, "N·m")
-    delay = cause.values.get("delay", 0.0)
+    delay = cause.values.get("delay", 0.0) + (cause.servo.delay or 0.0)
     if "delay" in told and hasattr(actuator, "delay"):  # with the samples that MuJoCo keeps for it
         actuator.delay, actuator.nsample = delay, int(np.ceil(delay / float(spec.option.timestep))) + 1
         _said(written, cause, "delay", delay, "s")
