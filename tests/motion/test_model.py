@@ -13,7 +13,7 @@ pytest.importorskip("mujoco", reason="worlds are simulated by MuJoCo")
 from thermal_robot.blind.motions.fault import Fault
 from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.motion.diagnose import diagnose_motion
-from thermal_robot.motion.fit import Point, deflated, fit, ratios
+from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
@@ -128,11 +128,13 @@ def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(
     draw = np.random.default_rng(1)
     apart = {}
     for name in ("white", "together"):
-        rows = []
-        for one in point.rows:
-            each = draw.normal(size=one.motion.max() + 1)[one.motion]
-            rows.append(replace(one, residual=each if name == "together" else draw.normal(size=len(one.residual))))
-        apart[name] = ratios(replace(point, rows=rows, noise=np.ones(2)))
+        parts = []
+        for joint in model.joints:
+            rows = model.rows(joint, values)
+            each = draw.normal(size=model.clusters)[rows.motion]
+            left = each if name == "together" else draw.normal(size=len(rows.residual))
+            parts.append(Part.of(replace(rows, residual=left), values, model.clusters))
+        apart[name] = ratios(replace(point, rows=parts))
     seen = [model.index("zero", 0), model.index("gain", 0)]
     assert apart["white"][seen].max() < 5.0
     assert apart["together"][seen].min() > 20.0

@@ -73,9 +73,9 @@ def diagnose_motion(
     refused = _gate(choice)
     if refused:
         progress("without the motions that nothing explains")
-        motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
-        model = kind(replace(log, motions=motions))
-        choice = select(model, allowed, progress, choice.point.values)
+        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), choice.point.values
+        del model, choice  # of a long log each is large
+        choice = select(kind(replace(log, motions=motions)), allowed, progress, values)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)

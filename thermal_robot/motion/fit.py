@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from thermal_robot.arrays import Array
@@ -18,43 +19,78 @@ from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """A place in parameter space, and the model there.
+class Part:
+    """Normal equations of one joint, by motion: sums over its rows, whose derivatives are not kept.
 
-    ``values`` (P,); ``rows`` of each joint; ``noise`` (J,) root mean square of each joint's residual, rad.
+    ``residual`` (N,), rad, and its root mean square ``noise``; ``motion`` (N,). Of the white derivatives by the
+    parameters ``columns`` (P',): products with each other, ``matrix`` (M, P', P'), with the target r + Jθ, ``vector``
+    (M, P'), and the square of that, ``total`` (M,). ``values`` (P',): θ.
     """
+
+    residual: Array
+    motion: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Array
+    noise: float
+    matrix: Array
+    vector: Array
+    total: Array
+
+    @classmethod
+    def of(cls, rows: Rows, values: Array, count: int) -> Part:
+        """Sum the rows of a joint over each of ``count`` motions; ``values`` (P,) are those of all parameters."""
+        noise, own = max(np.sqrt(np.mean(rows.residual**2)), settings.LEAST_NOISE), values[rows.columns]
+        target = (rows.residual + rows.derivative @ own) / noise
+        ends = pairwise(np.searchsorted(rows.motion, np.arange(count + 1)))
+        each = [(rows.derivative[a:b] / noise, target[a:b]) for a, b in ends]
+        matrix, vector = np.array([x.T @ x for x, _ in each]), np.array([x.T @ y for x, y in each])
+        total = np.array([y @ y for _, y in each])
+        return cls(rows.residual, rows.motion, rows.columns, own, noise, matrix, vector, total)
+
+    @property
+    def bread(self) -> Array:
+        """(M, P') squares of the white derivatives."""
+        return np.diagonal(self.matrix, axis1=1, axis2=2)
+
+    @property
+    def score(self) -> Array:
+        """(M, P') slope of the log likelihood."""
+        return np.asarray(self.vector - self.matrix @ self.values)
+
+    @property
+    def moved(self) -> Array:
+        """(P',) root mean square by which each parameter moves the joint, rad."""
+        mean = self.bread.sum(axis=0) / len(self.residual)
+        return np.asarray(self.noise * np.sqrt(mean) * np.abs(self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Linearisation of the model at a place in parameter space: ``values`` (P,) and the sums of each joint there."""
 
     model: JointModel
     values: Array
-    rows: list[Rows]
-    noise: Array
+    rows: list[Part]
 
     @classmethod
     def at(cls, model: JointModel, values: Array, wanted: Mask | None = None) -> Point:
         """Linearise the model at some values by the parameters ``wanted``."""
-        rows = model.each(lambda joint: model.rows(joint, values, wanted))
-        noise = np.array([max(np.sqrt(np.mean(one.residual**2)), settings.LEAST_NOISE) for one in rows])
-        return cls(model, values, rows, noise)
+        count = model.clusters
+        return cls(model, values, model.each(lambda joint: Part.of(model.rows(joint, values, wanted), values, count)))
+
+    @property
+    def noise(self) -> Array:
+        """(J,) root mean square of each joint's residual, rad."""
+        return np.array([one.noise for one in self.rows])
 
     @cached_property
     def products(self) -> tuple[Array, Array, Array]:
-        """Products of the white derivatives with each other, (J, M, P, P), with the target r + Jθ, (J, M, P), and its.
-
-        By joint and motion.
-        """
-        count, width = 1 + max(int(one.motion.max()) for one in self.rows), len(self.values)
-        shape = len(self.rows), count
-        matrix, vector, total = np.zeros((*shape, width, width)), np.zeros((*shape, width)), np.zeros(shape)
-        for j, (one, noise) in enumerate(zip(self.rows, self.noise, strict=True)):
-            target = (one.residual + one.derivative @ self.values[one.columns]) / noise
-            ends = np.searchsorted(one.motion, np.arange(count + 1))
-            for m in range(count):
-                own = slice(ends[m], ends[m + 1])
-                columns = one.derivative[own] / noise
-                matrix[j, m][np.ix_(one.columns, one.columns)] = columns.T @ columns
-                vector[j, m, one.columns] = columns.T @ target[own]
-                total[j, m] = target[own] @ target[own]
-        return matrix, vector, total
+        """Products of all parameters' white derivatives (J, M, P, P), with the target (J, M, P), and its (J, M)."""
+        shape, width = (len(self.rows), self.model.clusters), len(self.values)
+        matrix, vector = np.zeros((*shape, width, width)), np.zeros((*shape, width))
+        for j, one in enumerate(self.rows):
+            matrix[j][:, one.columns[:, None], one.columns], vector[j][:, one.columns] = one.matrix, one.vector
+        return matrix, vector, np.array([one.total for one in self.rows])
 
 
 def fit(model: JointModel, values: Array, active: Mask, motions: Mask | None = None) -> Array:
@@ -123,14 +159,10 @@ def ratios(point: Point) -> Array:
     The sandwich's meat over its bread (White, *Econometrica* 50, 1982; Liang and Zeger 1986). The scores are those
     that remain once the parameter itself is fitted.
     """
-    count, found = 1 + max(int(one.motion.max()) for one in point.rows), np.ones(len(point.values))
+    found = np.ones(len(point.values))
     clustered, white = np.zeros(len(found)), np.zeros(len(found))
-    for one, noise in zip(point.rows, point.noise, strict=True):
-        ends = np.searchsorted(one.motion, np.arange(count + 1))
-        pieces = [slice(a, b) for a, b in pairwise(ends)]
-        score = np.array([one.derivative[p].T @ one.residual[p] for p in pieces]) / noise**2
-        bread = np.array([(one.derivative[p] ** 2).sum(axis=0) for p in pieces]) / noise**2
-        whole, (_, error) = bread.sum(axis=0), slope(bread, score)
+    for one in point.rows:
+        whole, (_, error) = one.bread.sum(axis=0), slope(one.bread, one.score)
         clustered[one.columns] += np.nan_to_num(error * whole) ** 2
         white[one.columns] += whole
     seen = white > 0.0

@@ -72,6 +72,11 @@ class JointModel(ABC):
         self.dynamics = Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
 
     @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        """Pool of threads, the same in all calls: each new thread would take memory of its own and keep it."""
+        return ThreadPoolExecutor(threads())
+
+    @cached_property
     def sizes(self) -> Array:
         """(P,) expected sizes of the parameters: one sigma of their priors."""
         return np.array([one.size for one in self.parameters])
@@ -177,8 +182,7 @@ class JointModel(ABC):
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
         """Return a function of every joint's number, several at a time."""
-        with ThreadPoolExecutor(threads()) as pool:
-            return list(pool.map(function, self.joints))
+        return list(self._pool.map(function, self.joints))
 
     def all_residuals(self, values: Array) -> list[Array]:
         """Residual (N,) of every joint at the parameters (P,)."""
@@ -336,8 +340,10 @@ class ServoModel(JointModel):
     def residuals(self, joint: int, values: Array) -> Array:
         """(S, N) measured minus simulated positions of a joint, rad, at the encoder's own stamps."""
         measured, at, beyond, _ = self._samples[joint]
-        simulated = self.positions(joint, values)
-        return np.asarray(measured - (1.0 - beyond) * simulated[:, at] - beyond * simulated[:, at + 1])
+        simulated, left = self.positions(joint, values), np.empty((len(values), len(measured)))
+        for one, own in zip(left, simulated, strict=True):  # one by one, as of all together each term would be large
+            one[:] = measured - (1.0 - beyond) * own[at] - beyond * own[at + 1]
+        return left
 
     def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
         """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
@@ -346,7 +352,8 @@ class ServoModel(JointModel):
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         found = self.residuals(joint, sets)
-        return Rows(found[0], (found[0] - found[1:]).T / steps, own, self.motion_of(joint))
+        found[1:] = (found[0] - found[1:]) / steps[:, None]
+        return Rows(found[0].copy(), found[1:].T, own, self.motion_of(joint))
 
     def noise(self, joint: int) -> float:
         """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""

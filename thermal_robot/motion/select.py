@@ -202,6 +202,5 @@ def seen(point: Point) -> Mask:
     found, model = np.zeros(len(point.values), dtype=bool), point.model
     for joint, one in zip(model.joints, point.rows, strict=True):
         least = model.log.visible_from(model.log.joints[joint], model.noise(joint))
-        moved = np.sqrt(np.mean(one.derivative**2, axis=0)) * np.abs(point.values[one.columns])
-        found[one.columns] |= moved >= least
+        found[one.columns] |= one.moved >= least
     return found
