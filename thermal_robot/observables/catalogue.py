@@ -36,17 +36,17 @@ def kinds_of(campaign: Campaign) -> list[tuple[Observable, Rows | None]]:
 
 
 def components(campaign: Campaign) -> int:
-    """Return m, the components of a row: 3 of place, 6 where any row sees turns."""
+    """Return the number m of components of a row's gap: 3 of position, 6 if any kind of row sees rotation."""
     return 6 if any(KINDS[kind].turns for kind in campaign.kinds) else 3
 
 
 def tool_width(campaign: Campaign) -> int:
-    """Return how many components of the tool frame matter: three of its place, and its turn where rows see that."""
+    """Return on how many tool-frame components rows depend: 3, its position, or 6 if any kind needs its rotation."""
     return 6 if any(KINDS[kind].turns or KINDS[kind].turned for kind in campaign.kinds) else 3
 
 
 def seen_components(campaign: Campaign) -> NDArray[np.int64] | None:
-    """(N, m/3) how many components of place, and of turn, each row sees; ``None`` where it is all in all."""
+    """(N, m/3) numbers of position and of rotation components that each row sees; ``None`` where all are 3."""
     found = np.zeros((campaign.samples, components(campaign) // 3), dtype=np.int64)
     for own, rows in kinds_of(campaign):
         found[slice(None) if rows is None else rows] = (own.places, 3 if own.turns else 0)[: found.shape[1]]
@@ -54,7 +54,7 @@ def seen_components(campaign: Campaign) -> NDArray[np.int64] | None:
 
 
 def figures_of_a_row(campaign: Campaign) -> tuple[float, float]:
-    """Mean numbers of components that a row sees: of place, and of place and turn."""
+    """Return the mean number per row of position components, and of position and rotation components, that are seen."""
     seen = seen_components(campaign)
     if seen is None:
         return 3.0, float(components(campaign))
@@ -63,7 +63,7 @@ def figures_of_a_row(campaign: Campaign) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Size:
-    """Size of the volume through which a target is led, the gauge of rows whose gaps no length of their own measures.
+    """Root-mean-square spread of the target's positions, the free scale (gauge) of rows that measure no own length.
 
     All lengths of the robot together, with what stands beside it, may be of any size as far as these rows tell: a
     smaller robot spreads less about its sockets. So their gaps are told as shares of the size (an invariant of that
@@ -88,13 +88,13 @@ class Size:
         return cls(middle, free, np.sqrt((before**2).sum() / (now**2).sum()) ** free)
 
     def grows(self, moved: Array) -> Array:
-        """(K,) relative growth of the size as the target moves by (N, 3, K)."""
+        """Return the relative growth (K,) of the rms spread as the target's positions move by (N, 3, K)."""
         return np.asarray(np.einsum("ni,nik->k", self.middle, moved) / (self.middle**2).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What all rows of a campaign say: of each kind its rows, and what they share."""
+    """Gap and Jacobian of all rows of a campaign, stacked over kinds of measurement, with the artefacts they share."""
 
     parts: tuple[tuple[Observable, Seen], ...]
     artefacts: Mapping[str, Any]
@@ -112,7 +112,7 @@ class Sight:
         instrument: Array | None,
         artefacts: Mapping[str, Any],
     ) -> Sight:
-        """Look at the rows from predicted poses of the target; artefacts that are not given are put where these say.
+        """Evaluate rows at predicted poses of the target, which also place artefacts not given or lacking parts.
 
         ``frames`` (4, 4) are the poses of the root frame in the measurement frame and of the target in the tool frame.
         """
@@ -136,7 +136,7 @@ class Sight:
 
     @property
     def gap(self) -> Array:
-        """(N, m) measured − predicted of all rows; zero along what one does not see."""
+        """(N, m) measured − predicted of all rows, times the size ratio; zero in components that a row does not see."""
         gap = self._gap
         return gap if self.size is None else gap * self.size.relative
 
@@ -152,7 +152,7 @@ class Sight:
         return whole
 
     def sees(self, twists: Array, there: bool = False) -> Array:
-        """(N, 6, K) what rows see of twists (N, 6, K) of the target; ``there``, where it is predicted."""
+        """(N, 6, K) components of target twists that rows observe; ``there`` takes them at the predicted position."""
         found = self._sees(twists, there)
         if self.size is None:
             return found
@@ -172,7 +172,7 @@ class Sight:
         return whole
 
     def columns(self) -> tuple[Array, tuple[str, ...]]:
-        """(N, m, w) derivative of the gap by all that rows share, and the artefact of each column."""
+        """(N, m, w) Jacobian of predicted − measured by the parameters of all artefacts, and whose each column is."""
         found = dict[str, Array]()
         for own, seen in self.parts:
             for name in self.shared[own.kind]:
@@ -185,12 +185,12 @@ class Sight:
 
 
 def of_model(campaign: Campaign) -> bool:
-    """Whether the rows are a model's word alone, so that no robot can be the cause of what differs."""
+    """Whether every row is another model's output and no measurement, so that no robot can cause a difference."""
     return all(own.of_model for own, _ in kinds_of(campaign))
 
 
 def instrument_rows(campaign: Campaign) -> NDArray[np.bool_]:
-    """(N,) the rows that an instrument with a frame of its own measured."""
+    """(N,) mask of the rows that an instrument with a frame of its own measured."""
     seen = np.zeros(campaign.samples, dtype=bool)
     for own, rows in kinds_of(campaign):
         seen[slice(None) if rows is None else rows] = own.locates

@@ -19,7 +19,7 @@ from thermal_robot.observables.observable import Along, Artefact, Seen, in_mm
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """Where a wire leaves its box, ``place`` (3,) m, measurement frame, and what it reads of no length, ``zero`` m."""
+    """Anchor point of a wire or ballbar: ``place`` (3,) m, measurement frame; its reading at no length, ``zero`` m."""
 
     place: Array
     zero: float = 0.0
@@ -28,16 +28,16 @@ class Anchor:
 
     @property
     def words(self) -> str:
-        """Where its wire leaves it, mm."""
+        """Position of the anchor point in words, mm."""
         return f"at {in_mm(self.place)}"
 
     def moved(self, step: Array) -> Anchor:
-        """Return the anchor after a step of its place and its zero."""
+        """Return the anchor after an additive step (4,) of its place and its zero, m."""
         return replace(self, place=self.place + step[:3], zero=self.zero + float(step[3]))
 
 
 class Distance(Along):
-    """Distance of the target from a point that nobody measured, m."""
+    """Distance of the target from an anchor point of unknown position, m."""
 
     kind: ClassVar[str] = "distance"
     says: ClassVar[str] = "distance to a point"
@@ -55,7 +55,7 @@ class Distance(Along):
         return Anchor(found[:3] + middle, float(found[3]))
 
     def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
-        """(n,) how much farther the target is predicted than read, m, and (n, 3) the line to it, measurement frame."""
+        """(n,) predicted − read distance, m, and (n, 3) unit vectors from anchor to target, measurement frame."""
         names, number = seen.shared(self.label)
         lines = seen.where - np.array([artefacts[name].place for name in names])[number]
         far = np.linalg.norm(lines, axis=1)
@@ -63,5 +63,5 @@ class Distance(Along):
         return far + zeros - seen.readings("distance")[:, 0], lines / far[:, None]
 
     def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 4) derivative of what is read by the anchor's place and zero."""
+        """(n, 4) derivative of predicted − read distance by the anchor's place and zero."""
         return np.column_stack([-self.read(seen, artefacts)[1], np.ones(len(seen.position))])

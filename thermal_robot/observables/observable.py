@@ -31,20 +31,20 @@ class Artefact(Protocol):
 
     @property
     def words(self) -> str:
-        """Where it is, mm."""
+        """Position of the artefact in words, mm."""
 
     def moved(self, step: Array) -> Any:
-        """Return it after a step (width,) of its parameters."""
+        """Return the artefact updated by a step (width,) of its parameters."""
 
 
 def in_mm(point: Array) -> str:
-    """Coordinates of a point (3,) m, in words."""
+    """Format a point (3,), m, as text with coordinates rounded to whole mm."""
     return f"({', '.join(f'{round(1e3 * part)}' for part in point)}) mm"
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Rows of one kind with what is predicted of them.
+    """Rows of one kind of measurement, with the target's poses predicted for them.
 
     Attributes
     ----------
@@ -66,22 +66,22 @@ class Seen:
     instrument: Array | None = None
 
     def own(self, values: Any) -> Any:
-        """Return the rows of this kind of an array over all rows."""
+        """Select the rows of this kind from an array over all rows of the campaign."""
         return values if self.rows is None else values[self.rows]
 
     def labels(self, name: str) -> NDArray[np.str_]:
-        """(n,) labels of a column."""
+        """(n,) labels of these rows in one of the campaign's label columns."""
         return np.asarray(self.own(self.campaign.labels[name]))
 
     def shared(self, label: str) -> tuple[list[str], NDArray[np.int64]]:
-        """Return what rows of a label share, by name, and (n,) the number of that of each row."""
+        """Group rows by the value of a label: names "<label> <value>" of the groups, and (n,) index of each row's."""
         values, number = self.campaign.numbered[label]
         number = self.own(number)
         there = np.unique(number)
         return [f"{label} {values[k]}" for k in there], np.searchsorted(there, number)
 
     def readings(self, *names: str) -> Array:
-        """(n, k) figures of columns, SI."""
+        """(n, k) values of k columns of readings in these rows, SI."""
         return np.column_stack([self.own(self.campaign.readings[name]) for name in names])
 
     @property
@@ -90,7 +90,7 @@ class Seen:
         return np.asarray(self.position @ self.base[:3, :3].T + self.base[:3, 3])
 
     def in_root(self, vectors: Array) -> Array:
-        """(..., 3) vectors of the measurement frame in the axes of the root frame."""
+        """Rotate vectors (..., 3) from the axes of the measurement frame into those of the root frame."""
         return np.asarray(vectors @ self.base[:3, :3])
 
 
@@ -133,28 +133,28 @@ class Observable(ABC):
     fewest: ClassVar[int] = 1
 
     def has_length(self, seen: Seen) -> bool:
-        """Whether a gap of these rows is told in metres that something else than the robot defines."""
+        """Whether something other than the robot defines the scale of these rows' gaps; true by default."""
         return True
 
     def per_metre(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n,) units of a reading to a metre of the gap."""
+        """(n,) factors from the gap in m to the unit of the reading; 1 by default."""
         return np.ones(len(seen.position))
 
     def shares(self, seen: Seen) -> tuple[str, ...]:
-        """Return the names of what the rows share; nothing without a ``label``."""
+        """Return the names of the artefacts of these rows, one a value of ``label``; empty without a ``label``."""
         return tuple(seen.shared(self.label)[0]) if self.label else ()
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
-        """Return by name what the rows share, where the predicted poses put it; nothing by default.
+        """Return starting values of these rows' artefacts, by name, from the predicted poses; none by default.
 
-        ``known`` are those that need none: artefacts of before, and those that rows of other kinds have told.
+        ``known`` are those that need none: given before, or placed by rows of other kinds.
         """
         return {}
 
     def unplaced(self, seen: Seen, known: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-        """Yield the artefacts that nothing has placed yet, by name, with the mask (n,) of their rows.
+        """Yield name and mask of rows (n,) of each artefact that is not in ``known``.
 
-        Raises :class:`EstimationError` where these are fewer than ``fewest``: they would place it anywhere.
+        Raises :class:`EstimationError` where it has fewer than ``fewest`` rows, which do not determine it.
         """
         names, number = seen.shared(self.label)
         for k, name in enumerate(names):
@@ -169,7 +169,7 @@ class Observable(ABC):
                 yield name, here
 
     def covers(self, seen: Seen, name: str, artefact: Any) -> bool:
-        """Whether an artefact of this name holds all that the rows have to do with; that of fewer rows may not."""
+        """Whether an artefact has all parts that these rows refer to (one of fewer rows may not); default true."""
         return True
 
     @abstractmethod
@@ -178,10 +178,10 @@ class Observable(ABC):
 
     @abstractmethod
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) what rows see of twists (n, 6, K) of the target, root frame axes."""
+        """(n, 6, K) components of target twists (n, 6, K) that rows observe, zero in the others, root frame axes."""
 
     def sees_there(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """:meth:`sees` of the target where it is predicted, for a kind that looks where it should be."""
+        """:meth:`sees` with twists taken at the predicted target position, for a kind that takes them elsewhere."""
         return self.sees(seen, artefacts, twists)
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
@@ -190,43 +190,43 @@ class Observable(ABC):
 
 
 class Along(Observable):
-    """A reading of one component, along a line that what it shares defines.
+    """Measurement of one scalar along a unit vector that an artefact defines: a plane's normal, a line to an anchor.
 
-    A member says where what its rows share starts, what is read, and its derivative.
+    A subclass gives the artefact's starting value, the reading and its derivative.
     """
 
     places: ClassVar[int] = 1
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
-        """Return what the rows share, where the predicted poses put it."""
+        """Return starting values of the artefacts that are not in ``known``, from the predicted target poses."""
         return {name: self.start(seen, here, name) for name, here in self.unplaced(seen, known)}
 
     @abstractmethod
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
-        """Return one artefact, from the rows (n,) that have to do with it."""
+        """Return the starting value of one artefact, fitted to the rows of the mask ``here`` (n,)."""
 
     @abstractmethod
     def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
-        """(n,) predicted − read, m, and (n, 3) the unit vector along which, measurement frame."""
+        """(n,) predicted − read, m, and (n, 3) the unit vector along which it is read, measurement frame."""
 
     @abstractmethod
     def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, w) derivative of predicted − read by the parameters of an artefact, as if all rows had to do with it."""
+        """(n, w) derivative of predicted − read by an artefact's parameters, in all rows as if each referred to it."""
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) read − predicted along its line, m."""
+        """(n, 3) read − predicted, m, as a vector along the row's unit vector, root frame axes."""
         beyond, along = self.read(seen, artefacts)
         return seen.in_root(-beyond[:, None] * along)
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) the displacement along the line."""
+        """(n, 6, K) the target's displacement projected onto the row's unit vector; zero rotation."""
         along = seen.in_root(self.read(seen, artefacts)[1])
         moved = np.zeros_like(twists)
         moved[:, :3] = along[:, :, None] * np.einsum("ni,nik->nk", along, twists[:, :3])[:, None]
         return moved
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 3, w) what the parameters of one artefact do to the rows that have to do with it."""
+        """(n, 3, w) derivative of predicted − read, along the unit vector, by one artefact; zero in other rows."""
         names, number = seen.shared(self.label)
         here = number == names.index(name)
         along = seen.in_root(self.read(seen, artefacts)[1])

@@ -28,7 +28,7 @@ HAND = "hand"
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera in the room, or the board that one on the hand sees.
+    """Unknown pose of a camera in the room, or of the board that a camera on the hand sees, with the camera's lens.
 
     ``pose`` (4, 4) in the measurement frame; ``lens`` fx, fy, cx, cy in pixels; ``far`` m of the median point, held.
     """
@@ -40,16 +40,16 @@ class View:
 
     @property
     def width(self) -> int:
-        """Six of its pose, and four of the lens where it is refined."""
+        """Number of free parameters: 6 of the pose, and 4 of the lens where it is refined."""
         return 10 if self.refined else 6
 
     @property
     def words(self) -> str:
-        """Where it stands, mm, and along what it looks."""
+        """Position, mm, and direction of the third axis (a camera's line of sight) in words."""
         return f"at {in_mm(self.pose[:3, 3])}, looking along {tuple((np.round(self.pose[:3, 2], 2) + 0.0).tolist())}"
 
     def moved(self, step: Array) -> View:
-        """Return it after a twist in its own axes and a change of the lens, in shares of the focal length."""
+        """Return the view after a twist in its own axes and, if refined, a change of the lens in shares of fx."""
         lens = self.lens + self.lens[0] * step[6:] if self.refined else self.lens
         return replace(self, pose=self.pose @ exp6(step[:6]), lens=lens)
 
@@ -71,13 +71,13 @@ class Pixel(Observable):
 
     @staticmethod
     def _points(seen: Seen) -> Array:
-        """(n, 3) of the board, in its own frame, m; zero where the target itself is seen."""
+        """(n, 3) observed points of the board in its own frame, m; zero where the target itself is seen."""
         if BOARD[0] not in seen.campaign.readings:
             return np.zeros_like(seen.position)
         return seen.readings(*BOARD)
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
-        """Return the cameras, or what they see, by linear resection."""
+        """Return starting poses of cameras (direct linear transformation) or of boards seen from the hand."""
         found = dict[str, Artefact]()
         for name, here in self.unplaced(seen, known):
             facts = self._facts(seen, name)
@@ -96,10 +96,10 @@ class Pixel(Observable):
         return found
 
     def _looked(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, ...]:
-        """Return of each row its point in the camera's frame (n, 3) and that frame's axes in the root's (n, 3, 3).
+        """Return each row's observed point in the camera's frame (n, 3) and the camera's axes in the root's (n, 3, 3).
 
-        Beside them (n, 3) from the target's origin to the point, root frame, (n,) −1 for a camera on the hand and 1 for
-        one in the room, and (n, 4) lenses and (n,) distances.
+        Then the vector (n, 3) from the target's origin to the point, root frame, m, a sign (n,), −1 for a camera on the
+        hand and 1 for one in the room, lenses (n, 4), px, and held distances (n,), m.
         """
         names, number = seen.shared("camera")
         views = [artefacts[name] for name in names]
@@ -116,12 +116,12 @@ class Pixel(Observable):
         return inside, axes, arm, np.where(hand, -1.0, 1.0), lens, far
 
     def per_metre(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n,) pixels to a metre across the line of sight: focal length over the distance that is held."""
+        """(n,) pixels per metre across the line of sight: focal length fx over the median distance that is held."""
         *_, lens, far = self._looked(seen, artefacts)
         return np.asarray(lens[:, 0] / far)
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) read − predicted across the line of sight, root frame axes, m."""
+        """(n, 3) reprojection error, read − predicted, as a displacement at the held distance, root frame axes, m."""
         inside, axes, _, _, lens, far = self._looked(seen, artefacts)
         predicted = lens[:, :2] * inside[:, :2] / inside[:, 2:] + lens[:, 2:]
         away = (seen.readings("u", "v") - predicted) * far[:, None] / lens[:, :2]
@@ -129,13 +129,13 @@ class Pixel(Observable):
 
     @staticmethod
     def _across(inside: Array, axes: Array, far: Array, moved: Array) -> Array:
-        """(n, 3, K) what a motion (n, 3, K) of the point in the camera's axes does to its image, as a displacement."""
+        """(n, 3, K) displacement across the line of sight, root axes, of a point moving by (n, 3, K) in camera axes."""
         depth = inside[:, 2, None, None]
         image = (moved[:, :2] - inside[:, :2, None] / depth * moved[:, 2:]) / depth
         return np.asarray(axes[:, :, :2] @ (image * far[:, None, None]))
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) how the image moves, as a displacement, with the target or the camera that it is."""
+        """(n, 6, K) motion of the image point, as a displacement, under twists of the target or the hand's camera."""
         inside, axes, arm, sign, _, far = self._looked(seen, artefacts)
         moved = twists[:, :3] + np.cross(twists[:, 3:], arm[:, :, None], axis=1)
         found = np.zeros_like(twists)
@@ -143,7 +143,7 @@ class Pixel(Observable):
         return found
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 3, w) how the image moves with the pose and the lens of a camera, or with the pose of its board."""
+        """(n, 3, w) derivative of predicted − read by a camera's pose and lens or its board's pose; else zero."""
         inside, axes, _, sign, lens, far = self._looked(seen, artefacts)
         own: View = artefacts[name]
         points, turn = self._points(seen), seen.base[:3, :3].T @ own.pose[:3, :3]
@@ -164,13 +164,13 @@ class Pixel(Observable):
 
 
 def _rays(pixels: Array, lens: Array) -> Array:
-    """(n, 3) unit vectors of pixels (n, 2) in the camera's frame."""
+    """Back-project pixels (n, 2) to unit vectors (n, 3) in the camera's frame."""
     rays = np.column_stack([(pixels - lens[2:]) / lens[:2], np.ones(len(pixels))])
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def _rigid(linear: Array, shift: Array) -> Array:
-    """(4, 4) the rotation next to a linear map, with a shift."""
+    """(4, 4) transform: the rotation nearest to a linear map (by singular value decomposition) and a translation."""
     u, _, vt = np.linalg.svd(linear)
     return homogeneous(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt, shift)
 

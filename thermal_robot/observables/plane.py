@@ -30,18 +30,18 @@ class Plane:
 
     @cached_property
     def tangents(self) -> Array:
-        """(2, 3) unit vectors along the plane."""
+        """(2, 3) orthonormal vectors that span the plane."""
         return np.asarray(np.linalg.svd(self.normal[None])[2][1:])
 
     @property
     def words(self) -> str:
-        """Where it lies: its point next to the origin, mm, and its normal."""
+        """Position in words: the plane's point nearest to the origin, mm, and its unit normal."""
         return (
             f"through {in_mm(self.offset * self.normal)}, normal to {tuple((np.round(self.normal, 2) + 0.0).tolist())}"
         )
 
     def moved(self, step: Array) -> Plane:
-        """Return the plane after a turn of its normal, two components, and a change of its offset."""
+        """Return the plane after a step (3,): tilt of the normal along both tangents, rad, and of the offset, m."""
         normal = self.normal + step[:2] @ self.tangents
         length = float(np.linalg.norm(normal))
         return replace(self, normal=normal / length, offset=(self.offset + float(step[2])) / length)
@@ -56,7 +56,7 @@ class OnPlane(Along):
     fewest: ClassVar[int] = 3
 
     def has_length(self, seen: Seen) -> bool:
-        """Whether heights were read: the rest of it is no length."""
+        """Whether any height read above the plane is not zero; contact alone defines no length."""
         return bool(np.any(self._heights(seen)))
 
     @staticmethod
@@ -65,7 +65,7 @@ class OnPlane(Along):
         return np.zeros(len(seen.position)) if own is None else np.asarray(seen.own(own))
 
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
-        """Return the plane nearest to where the target is predicted, heights allowed for."""
+        """Return the plane fitted to predicted positions by total least squares, or by regression of heights read."""
         places, heights = seen.where[here], self._heights(seen)[here]
         middle, above = places.mean(axis=0), heights - heights.mean()
         normal = np.linalg.svd(places - middle)[2][-1]
@@ -75,13 +75,13 @@ class OnPlane(Along):
         return Plane(normal, float(np.median(places @ normal - heights)))
 
     def read(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
-        """(n,) how far the predicted target is above where it was read, m, and (n, 3) the normal, measurement frame."""
+        """(n,) predicted − read height above the plane, m, and (n, 3) its unit normal, measurement frame."""
         names, number = seen.shared(self.label)
         normals = np.array([artefacts[name].normal for name in names])[number]
         offsets = np.array([artefacts[name].offset for name in names])[number]
         return (normals * seen.where).sum(axis=1) - offsets - self._heights(seen), normals
 
     def slopes(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 3) derivative of what is read by the plane's turn and offset."""
+        """(n, 3) derivative of predicted − read height by the plane's tilt (two components) and offset."""
         own: Plane = artefacts[name]
         return np.column_stack([seen.where @ own.tangents.T, -np.ones(len(seen.position))])

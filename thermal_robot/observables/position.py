@@ -21,7 +21,7 @@ class Position(Observable):
     locates: ClassVar[bool] = True
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) measured − predicted position, m."""
+        """(n, 3) measured − predicted position, less the instrument's own displacement, root frame axes, m."""
         whole = seen.campaign.position
         shift = (seen.readings(*names.POSITION) if whole is None else seen.own(whole)) - seen.where
         if seen.instrument is not None:
@@ -29,7 +29,7 @@ class Position(Observable):
         return seen.in_root(shift)
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) the displacement; its turn is not read."""
+        """Return the twists (n, 6, K) unchanged; a row reads their displacement, and not their rotation."""
         return twists
 
 
@@ -41,7 +41,7 @@ class Pose(Position):
     turns: ClassVar[bool] = True
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 6) displacement, m, and rotation vector, rad; of several targets about their own axes."""
+        """(n, 6) measured − predicted: displacement, m, rotation vector, rad; about own axes if of several targets."""
         whole = seen.campaign.orientation
         quaternions = seen.readings(*names.ORIENTATION) if whole is None else seen.own(whole)
         linear = super().gap(seen, artefacts)
@@ -50,7 +50,7 @@ class Pose(Position):
         return self.sees(seen, artefacts, np.hstack([linear, turn])[:, :, None])[:, :, 0]
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) twists whose turns are about the target's own axes where several targets tell its pose.
+        """(n, 6, K) twists with rotations about the target's own axes where several targets give its pose.
 
         There the noise of the turn differs by these axes; else they stay about those of the root frame.
         """

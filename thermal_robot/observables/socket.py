@@ -31,12 +31,12 @@ class Stand:
 
     @property
     def width(self) -> int:
-        """Three a socket."""
+        """Number of free parameters: three coordinates a socket."""
         return int(self.points.size)
 
     @property
     def words(self) -> str:
-        """Where its sockets are, mm."""
+        """Positions of its sockets in words, mm."""
         return ", ".join(f"socket {s} at {in_mm(p)}" for s, p in zip(self.sockets, self.points, strict=True))
 
     def moved(self, step: Array) -> Stand:
@@ -52,11 +52,11 @@ class Socket(Observable):
     label: ClassVar[str] = "stand"
 
     def has_length(self, seen: Seen) -> bool:
-        """No: a smaller robot spreads less about its sockets."""
+        """False: contact with sockets defines no length, as a smaller robot spreads less about them."""
         return False
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
-        """Return the stands, their sockets in the middle of where the target is predicted."""
+        """Return the stands by name, each socket at the median of the target positions predicted in it."""
         (stands, number), sockets, where = seen.shared(self.label), seen.labels("socket"), seen.where
         found: dict[str, Artefact] = {}
         for k, stand in enumerate(stands):
@@ -66,12 +66,12 @@ class Socket(Observable):
         return found
 
     def covers(self, seen: Seen, name: str, artefact: Stand) -> bool:
-        """Whether the stand has all sockets of these rows."""
+        """Whether the stand has every socket in which these rows sit."""
         (names, number), sockets = seen.shared(self.label), seen.labels("socket")
         return {*np.unique(sockets[number == names.index(name)]).tolist()} <= {*artefact.sockets}
 
     def points(self, seen: Seen, artefacts: Mapping[str, Any], end: str) -> Array:
-        """(n, 3) the socket of each row by one of its labels, measurement frame, m; NaN where the stand has none."""
+        """(n, 3) position of the socket that column ``end`` names, measurement frame, m; NaN if the stand lacks it."""
         points = np.full_like(seen.position, np.nan)
         (names, number), sockets = seen.shared(self.label), seen.labels(end)
         for k, name in enumerate(names):
@@ -90,19 +90,19 @@ class Socket(Observable):
         return columns
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) socket − predicted target, m."""
+        """(n, 3) socket − predicted target position, root frame axes, m."""
         return seen.in_root(self.points(seen, artefacts, "socket") - seen.where)
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) displacement at the socket, where the target should be: v + ω × gap."""
+        """(n, 6, K) twists with the displacement taken at the socket, where the target should be: v + ω × gap."""
         moved = twists.copy()
         moved[:, :3] += np.cross(twists[:, 3:], self.gap(seen, artefacts)[:, :, None], axis=1)
         return moved
 
     def sees_there(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) displacement at the predicted target: v."""
+        """Return the twists (n, 6, K) unchanged: their displacement v is that of the predicted target position."""
         return twists
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 3, w) what the points of the stand do to predicted − socket."""
+        """(n, 3, w) derivative of predicted target − socket by the sockets' positions in one stand, root frame axes."""
         return -self.at_socket(seen, artefacts, name, "socket")

@@ -25,21 +25,21 @@ class Spacing(Socket):
     places: ClassVar[int] = 1
 
     def has_length(self, seen: Seen) -> bool:
-        """Yes: it is nothing else."""
+        """True: the reading is itself a length."""
         return True
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
-        """Return the stands that the ball tells; one in which it never sat has no sockets."""
+        """Return the stands that rows of other kinds have placed; a stand without sockets for one that none has."""
         return {name: known.get(name, Stand((), np.zeros((0, 3)))) for name in self.shares(seen)}
 
     def covers(self, seen: Seen, name: str, artefact: Stand) -> bool:
-        """Yes: a socket in which the ball never sat has no place, and its rows are no equations."""
+        """True always: a row that names a socket without a position has a zero gap and is no equation."""
         return True
 
     def _lines(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
-        """(n,) distance of the two sockets, m, and (n, 3) the unit vector to the one from the other, root frame.
+        """(n,) distance of a row's two sockets, m, and (n, 3) unit vector from the second to the first, root frame.
 
-        Zero where one of them has no place.
+        Both are zero where one of the sockets has no position.
         """
         one, other = (self.points(seen, artefacts, end) for end in ENDS)
         apart = np.nan_to_num(one - other)
@@ -47,18 +47,18 @@ class Spacing(Socket):
         return far, seen.in_root(apart / np.where(far > 0.0, far, 1.0)[:, None])
 
     def gap(self, seen: Seen, artefacts: Mapping[str, Any]) -> Array:
-        """(n, 3) read − fitted distance along the line of the two, m."""
+        """(n, 3) read − fitted distance, m, as a vector along the line of the two sockets, root frame axes."""
         far, along = self._lines(seen, artefacts)
         return np.asarray((seen.readings("distance")[:, 0] - far)[:, None] * along)
 
     def sees(self, seen: Seen, artefacts: Mapping[str, Any], twists: Array) -> Array:
-        """(n, 6, K) nothing: the robot is not there."""
+        """(n, 6, K) zeros: the reading does not depend on the robot."""
         return np.zeros_like(twists)
 
     sees_there = sees
 
     def column(self, seen: Seen, artefacts: Mapping[str, Any], name: str) -> Array:
-        """(n, 3, w) what the points of the stand do to fitted − read."""
+        """(n, 3, w) derivative of fitted − read distance, along their line, by the sockets' positions in one stand."""
         along = self._lines(seen, artefacts)[1]
         one, other = (self.at_socket(seen, artefacts, name, end) for end in ENDS)
         return np.asarray(along[:, :, None] * np.einsum("ni,niw->nw", along, one - other)[:, None])
