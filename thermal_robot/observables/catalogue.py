@@ -77,7 +77,7 @@ class Size:
 
     @classmethod
     def of(cls, campaign: Campaign, pose: tuple[Array, Array], tool: Array, free: Array) -> Size:
-        """Compare predicted places with those of the commands as declared, for the rows ``free`` (N, 1).
+        """Compare the spread of predicted tool positions with that of the commands as declared; ``free`` (N, 1) rows.
 
         Places are those of the tool frame: how far from it the target sits is no size of the robot. ``pose`` is the
         target's, (N, 3) m and (N, 3, 3), ``tool`` (4, 4) that of the target in the tool frame.

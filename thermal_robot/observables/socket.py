@@ -52,7 +52,7 @@ class Socket(Observable):
     label: ClassVar[str] = "stand"
 
     def has_length(self, seen: Seen) -> bool:
-        """False: contact with sockets defines no length, as a smaller robot spreads less about them."""
+        """Return false: sockets define no length, as a smaller robot spreads less about them."""
         return False
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:

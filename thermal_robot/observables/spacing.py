@@ -25,7 +25,7 @@ class Spacing(Socket):
     places: ClassVar[int] = 1
 
     def has_length(self, seen: Seen) -> bool:
-        """True: the reading is itself a length."""
+        """Return true: the reading is itself a length."""
         return True
 
     def artefacts(self, seen: Seen, known: Mapping[str, Any]) -> dict[str, Artefact]:
@@ -33,7 +33,7 @@ class Spacing(Socket):
         return {name: known.get(name, Stand((), np.zeros((0, 3)))) for name in self.shares(seen)}
 
     def covers(self, seen: Seen, name: str, artefact: Stand) -> bool:
-        """True always: a row that names a socket without a position has a zero gap and is no equation."""
+        """Return true: a row that names a socket without a position has a zero gap and is no equation."""
         return True
 
     def _lines(self, seen: Seen, artefacts: Mapping[str, Any]) -> tuple[Array, Array]:
