@@ -21,17 +21,17 @@ _SIGMA = 1.4826  # standard deviation over median absolute deviation of a normal
 
 
 def reclocked(motion: Motion, clock: Callable[[Array], Array]) -> Motion:
-    """Return a motion whose measured channels have other stamps, those of the command kept."""
+    """Return a motion with the stamps of all channels but the command mapped by the function ``clock``."""
     return motion.with_channels(CHANNELS[1:], lambda channel: Channel(clock(channel.time), channel.values))
 
 
 def two_clocks(log: MotionLog) -> bool:
-    """Whether commands and readings have stamps of their own."""
+    """Whether commands and encoder readings have different stamps in any motion."""
     return any(not np.array_equal(each.command.time, each.position.time) for each in log.motions)
 
 
 def jitter(log: MotionLog) -> tuple[float, float, float]:
-    """Return the scatter of the encoder's steps over their median, and the share of it that the readings feel.
+    """Return the robust scatter of the encoder's steps over their median, and the share of it that the readings follow.
 
     Second differences of q follow those of the stamps times the velocity where the stamps are right, and do not where
     the samples are even and only their stamps late; the share is their slope, with its standard error.
@@ -54,7 +54,7 @@ def jitter(log: MotionLog) -> tuple[float, float, float]:
 
 
 def evened(motion: Motion) -> Motion:
-    """Return a motion whose readings have even stamps: those of the line through their own; late rows stay late."""
+    """Return a motion with its readings' stamps on a line fitted over sample number; missing rows leave their gap."""
     t = motion.position.time
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(np.diff(t) / np.median(np.diff(t))), 1.0))])
     line = np.polynomial.Polynomial.fit(number, t, 1)
@@ -62,7 +62,7 @@ def evened(motion: Motion) -> Motion:
 
 
 def rate(log: MotionLog) -> tuple[float, float]:
-    """Rate of the command's clock over the readings', and its standard error: drift of the lag along the motions.
+    """Estimate the command clock's rate over the readings' and its standard error: regression of the lag on time.
 
     A grid of rates finds where the moves are most alike; then the lags of pieces of ten seconds are fitted by a line in
     each motion with a common slope. The standard error is that of the scatter between motions or, in few, between
@@ -80,7 +80,7 @@ def rate(log: MotionLog) -> tuple[float, float]:
 
 
 def _searched(log: MotionLog) -> float:
-    """Return the rate of a grid at which the moves of the longest motions are most like their commands'."""
+    """Return the grid's clock rate at which moves of the longest motions correlate best with their commands'."""
     longest = sorted(log.motions, key=lambda motion: -float(motion.position.time[-1]))[:_MOST]
     spans = [float(m.position.time[-1] - m.position.time[0]) for m in longest]
     lengths = [float(np.ptp(m.command.time)) / span for m, span in zip(longest, spans, strict=True)]
@@ -99,7 +99,7 @@ def _likeness(motion: Motion, r: float) -> float:
 
 
 def _drift(motions: Sequence[Motion]) -> tuple[float, float, bool]:
-    """Slope of the lag over time within the motions, its standard error, and whether lags are far or not to be had."""
+    """Regress the lag on time in motions: slope, standard error, and whether lags are large or mostly undetermined."""
     squares, products, sizes, lost = [], [], [0.0], 0
     for motion in motions:
         moves = Moves.of(motion)
@@ -123,10 +123,10 @@ def _drift(motions: Sequence[Motion]) -> tuple[float, float, bool]:
 
 
 def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
-    """Return by how much the readings' stamps are late, s, and its standard error, by motion; those that stand out.
+    """Return by motion how late the readings' stamps are, s, and its standard error, if negative or an outlier.
 
-    A reading before its command is no robot's; else a motion whose lag stands out from the others', once the lag that
-    friction makes, an angle over a speed, is taken off.
+    Negative: the readings precede their command. An outlier: the lag differs from that of the other motions, once the
+    lag that friction makes, an angle over a speed, is taken off.
     """
     names, rows = [], []
     for motion in log.motions:
@@ -149,7 +149,7 @@ def shifts(log: MotionLog) -> dict[str, tuple[float, float]]:
 
 
 def _usual_lag(lag: Array, slow: Array) -> tuple[Array, float]:
-    """Return the lag that the other motions lead to expect, s, and how they scatter about it (Siegel's line)."""
+    """Return (M,) lags, s, that Siegel's repeated-median line over slowness predicts, and robust scatter about it."""
     if len(lag) < FAR * 2:
         return np.full(len(lag), np.median(lag)), np.inf
     angle = max(float(siegelslopes(lag, slow).slope), 0.0) if np.ptp(slow) > 0.0 else 0.0

@@ -63,7 +63,7 @@ def _unit_kind(quantity: str) -> Kind:
 
 
 def channels_kind(value: Any, path: str) -> dict[str, Stated]:
-    """Take what columns are called, and their units, by channel: a name, or ``{column = …, unit = …}``."""
+    """Check ``[channels]``, by channel a column's name or ``{column = …, unit = …}``; return name and SI unit."""
     if not isinstance(value, Mapping):
         raise MisfitError(path, value, "columns by channel")
     found = {}
@@ -95,7 +95,7 @@ class Source:
 
 
 def sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> list[Source]:
-    """Return where each quantity of each joint stands.
+    """Return which column of which table holds each quantity of each joint.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> Iterato
 
 
 def scale_of(source: Source, channels: Mapping[str, Stated], units: Units, joint_type: str) -> float:
-    """Return the SI value of one of a column's units: its own, its quantity's, or the file's; °C stays."""
+    """Return the factor from a column's unit to SI: the column's stated unit, else its quantity's, else the file's."""
     for channel in (f"{source.quantity}.{source.joint}", source.quantity):
         if channel in channels and channels[channel].scale:
             return channels[channel].scale

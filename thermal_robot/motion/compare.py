@@ -121,7 +121,7 @@ class MotionComparison(Rendered):
 
 
 def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequence[str] = ()) -> MotionComparison:
-    """Wald test of every parameter that two diagnoses of one robot's motion tell.
+    """Wald test of equality of each servo parameter in two diagnoses of one robot; none where only one tells it.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def compare_motions(first: MotionDiagnosis, second: MotionDiagnosis, names: Sequ
 def _compared(
     key: tuple[str, str, str, str], pair: list[Estimate | None], both: tuple[MotionDiagnosis, MotionDiagnosis]
 ) -> Compared:
-    """Compare a parameter, by effect, name (its joint in it), unit and joint."""
+    """Return difference, standard error, z and two-sided p-value of a parameter ``key``: effect, name, unit, joint."""
     effect, name, unit, joint = key
     (before, std_before), (after, std_after) = ((one.value, one.std) if one else (None, None) for one in pair)
     title = (both[0] if pair[0] else both[1]).title(effect, joint)

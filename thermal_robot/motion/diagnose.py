@@ -82,7 +82,7 @@ def diagnose_motion(
 
 
 def _gate(choice: Choice) -> dict[str, float]:
-    """Return kinds of motion of which much more remains than of the others, with how many times as much.
+    """Return kinds of motion whose rms residual over noise exceeds GATE times the kinds' median, with that ratio.
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
     """
@@ -147,7 +147,7 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
 
 
 def _findings(choice: Choice, before: list[Array], weights: Array) -> tuple[tuple[Finding, ...], dict[str, float]]:
-    """Return a finding for every effect, the largest share first, and the share of each joint."""
+    """Return a finding for every effect, largest held-out share first, and the share of the squared gap by joint."""
     point, model, deviations = choice.point, choice.point.model, choice.deviations()
     whole = sum(float(w * (one**2).sum()) for one, w in zip(before, weights, strict=True))
     scale = np.array([point.noise[j] ** 2 * weights[j] for j in model.joints]) / max(whole, 1e-300)
@@ -163,7 +163,7 @@ def _findings(choice: Choice, before: list[Array], weights: Array) -> tuple[tupl
 
 
 def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: Array) -> Finding:
-    """Return the finding of one effect: held-out shares (J,) by parameter are those without it."""
+    """Return the finding of one effect; ``share`` has the rise of held-out loss (J,) without each parameter."""
     model = choice.point.model
     own = [p for p, one in enumerate(model.parameters) if one.effect == name]
     title = (TITLES | SHARED_TITLES | TORQUE_TITLES)[name]
@@ -190,7 +190,7 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
 
 
 def _unexplained(choice: Choice) -> Unexplained:
-    """Test what remains against smooth curves of position, velocity, load and time, motions held out."""
+    """Test residuals above the noise for curves over position, velocity, load and time, cross-validated by motion."""
     model, rows = choice.point.model, choice.point.rows
     tested = [
         (_curve_gain(rows[j].residual, values, rows[j].motion), name, j)
@@ -211,7 +211,7 @@ def _unexplained(choice: Choice) -> Unexplained:
 
 
 def _curve_gain(left: Array, values: Array, motion: NDArray[np.int64]) -> float:
-    """Share of a residual that a curve of ten levels of a quantity explains in motions held out."""
+    """Share of a residual's squares that its means in ten quantile bins of a quantity explain, leaving motions out."""
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, settings.LEVELS + 1)[1:-1]))
     level = np.digitize(values, edges)
     count = 1 + int(motion.max(initial=0))

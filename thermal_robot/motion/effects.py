@@ -1,6 +1,6 @@
 """Effects of a servo: what each is called, which number of the servo model it moves, how large it can be, its units.
 
-What was fitted over the servo's stiffness a data sheet gives times the stiffness.
+Values fitted as a torque over the servo's stiffness are multiplied by the stiffness for a data sheet.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ SOURCED, UNSOURCED = 1.0, 1.5
 class ServoEffect:
     """One number of the servo model, or of the torque channel's, that may differ from what the maker states.
 
-    ``size`` is its one sigma in ``unit``, of some in shares of what the torque limit deflects, L/K in rad, or of the
-    limit itself, N·m, and over the fastest speed. ``torque`` is name and unit once it is multiplied by a stiffness.
+    ``size`` is the prior's standard deviation in ``unit``; with ``of_limit`` in shares of torque limit over stiffness,
+    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed. ``torque``: name and unit times the stiffness.
     """
 
     name: str
@@ -86,7 +86,7 @@ _SHARES = {"gain", "kp", "load_friction", "torque_constant", "masses"}
 
 
 def size(effect: ServoEffect, servo: Servo) -> float:
-    """Return the expected size of an effect in one joint, in its unit."""
+    """Return the prior standard deviation of an effect in a joint; ``of_limit``: times torque limit over stiffness."""
     if not effect.of_limit:
         return effect.size
     return effect.size * (servo.limit or settings.TORQUE_LIMIT) / (servo.kp or settings.STIFFNESS)

@@ -1,7 +1,7 @@
 """Faults of a log, found before faults of the robot: stamps, stale readings, exchanged joints, signs, units.
 
-Each is a statistic with a standard error by the scatter between motions, told from :data:`CLEAR` of them on. What can
-be undone is undone, and told; a joint whose readings are of no use is left out.
+Each is a statistic with its standard error from the scatter between motions, and is reported beyond :data:`CLEAR`
+standard errors. What can be undone is undone; a joint whose readings are of no use is left out.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Fault:
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """A log without its faults: what could be undone is; ``joints`` are those that may be fitted."""
+    """A log with its faults undone where that is possible; ``joints`` are those that may be fitted."""
 
     log: MotionLog
     joints: tuple[str, ...]
@@ -102,12 +102,12 @@ _Checked = tuple[MotionLog, list[Fault], set[str]]
 
 
 def _changed(log: MotionLog, channels: Sequence[str], values: Callable[[Array], Array]) -> MotionLog:
-    """Return the log with other values of channels, by their names."""
+    """Return the log with the values of some channels, given by name, mapped by a function."""
     return log.with_motions(lambda motion: motion.with_channels(channels, lambda c: Channel(c.time, values(c.values))))
 
 
 def _named(log: MotionLog, struck: Mask, what: str, size: Array, error: Array, told: str, *more: Array) -> list[Fault]:
-    """Return a fault of each joint that is struck; of the sentence {0} is its name, {1} and {2} size and error."""
+    """Return a fault for each joint of a mask; in its sentence {0} is the joint, {1} and {2} size and its error."""
     each = [(log.joints[j], float(size[j]), float(error[j]), *(of[j] for of in more)) for j in np.flatnonzero(struck)]
     return [Fault(one[0], what, one[1], one[2], told.format(*one)) for one in each]
 
@@ -155,7 +155,7 @@ def _shifts(log: MotionLog) -> _Checked:
 
 
 def _swaps(log: MotionLog) -> _Checked:
-    """Assign readings to commands by the share of the moves that each explains, and test it between motions."""
+    """Assign readings to commands by the share explained (linear assignment); exchange them where significant."""
     from scipy.optimize import linear_sum_assignment
 
     pieces = [(moves, Correlation.of(moves)) for moves in clusters(log)]
@@ -194,7 +194,7 @@ def _turned(log: MotionLog, joints: Mask, *channels: str) -> MotionLog:
 
 
 def _gains(log: MotionLog) -> _Checked:
-    """Compare the units of position and command by the sizes of the moves that follow."""
+    """Compare the sizes of measured moves that follow their command with it; convert known units, drop unknown ones."""
     pieces = [Correlation.of(moves) for moves in clusters(log)]
     each = np.array([(piece.commanded, piece.measured, np.diag(piece.explained)) for piece in pieces]) + _TINY
     commanded, measured, explained = each.swapaxes(0, 1)
@@ -216,7 +216,7 @@ def _gains(log: MotionLog) -> _Checked:
 
 
 def _remedy(size: float, speeds: float) -> tuple[str, float]:
-    """Return what a factor between position and command is, and its exact value; 1 where nothing tells."""
+    """Return the unit whose factor is nearest that of position over command, and the factor; "", 1 if none is near."""
     known = {word: 1.0 / scale for word, scale in UNITS["q"].items() if scale != 1.0}
     known |= {f"rad, the command for {word}": 1.0 / factor for word, factor in known.items()}
     if speeds > 0.0:
@@ -227,7 +227,7 @@ def _remedy(size: float, speeds: float) -> tuple[str, float]:
 
 
 def _speeds(log: MotionLog) -> _Checked:
-    """Compare unit and sign of velocity and position, by the integral of velocity over windows of one second."""
+    """Regress position changes on the integral of velocity in 1 s windows; rescale velocity, or drop a foreign one."""
     squares, products, moved = _windows(log)
     scale, error = slope(squares, products)
     foreign = (np.abs(_likeness(log)) < settings.LIKE) & (moved.sum(axis=0) > settings.FROZEN)
@@ -244,7 +244,7 @@ def _speeds(log: MotionLog) -> _Checked:
 
 
 def _loads(log: MotionLog) -> _Checked:
-    """Compare the signs of recorded torques and of those that the URDF's masses need along the measured motion."""
+    """Regress recorded torques on the rigid-body model's along the motion; reverse those of clearly negative slope."""
     if not (log.robot.has_masses and explains_torques(log)):
         return log, [], set()
     found, error = TorqueModel(log).signs()
@@ -254,13 +254,13 @@ def _loads(log: MotionLog) -> _Checked:
 
 
 def _likeness(log: MotionLog) -> Array:
-    """Return (joints,) the correlation of position with the integral of velocity, 1 without a velocity."""
+    """(joints,) correlation of position changes with the integral of velocity in 1 s windows; 1 without velocity."""
     squares, products, moved = (each.sum(axis=0) for each in _windows(log))
     return np.where(squares > _TINY, products / np.sqrt(np.maximum(squares * moved, _TINY)), 1.0)
 
 
 def _windows(log: MotionLog) -> tuple[Array, Array, Array]:
-    """Return sums over windows, (clusters, joints): integrals² of velocity, integrals · moves, moves²."""
+    """Return sums over windows, (clusters, joints): integrals² of velocity, integrals · position changes, changes²."""
     sums = []
     for motion in log.motions:
         if motion.velocity is None:
@@ -282,7 +282,7 @@ def _windows(log: MotionLog) -> tuple[Array, Array, Array]:
 
 
 def _stale(log: MotionLog) -> _Checked:
-    """Blank readings that stay the same to the last digit while the command passes by, or leave the joint out."""
+    """Set frozen readings to NaN; drop a joint frozen in over half its motions for a median share above one half."""
     blank = [np.zeros(motion.position.values.shape, dtype=bool) for motion in log.motions]
     faults, lost = [], set()
     for j, joint in enumerate(log.joints):
@@ -306,10 +306,10 @@ def _stale(log: MotionLog) -> _Checked:
 
 
 def _frozen_runs(motion: Motion, j: int) -> Iterator[slice]:
-    """Yield the rows in which a joint's reading is frozen.
+    """Yield the row ranges in which a joint's reading stays the same while its command moves past it.
 
-    The command, averaged over the longest lag, goes by on both sides, which no stop and no friction allows; or it goes
-    on and the reading jumps at the end.
+    The command's moving average over the longest lag passes it on both sides, which no stop and no friction allows; or
+    it moves on and the reading jumps at the end.
     """
     q, step = motion.position.values[:, j], usual_step(motion.position)
     width = max(1, round(settings.LONGEST_LAG / step))

@@ -15,7 +15,7 @@ _SMALL = 1e-12  # rad² below which nothing has moved
 
 
 def at(channel: Channel, times: Array) -> Array:
-    """Return a channel at other instants, (n, joints), by linear interpolation, held beyond its ends.
+    """Interpolate a channel linearly at other instants, (n, joints), constant beyond its ends.
 
     A joint's gaps are bridged; NaN where it has no sample at all.
     """
@@ -34,7 +34,7 @@ def usual_step(channel: Channel) -> float:
 
 @dataclass(frozen=True)
 class Moves:
-    """Moves within :data:`STRIDE` of one motion or a part of it, commanded and measured, (n, joints), on one clock."""
+    """Differences over :data:`STRIDE` s of commanded and measured position, (n, joints), on one even clock."""
 
     step: float
     time: Array  # (n,) s, of the middle
@@ -43,7 +43,7 @@ class Moves:
 
     @classmethod
     def of(cls, motion: Motion, step: float = 0.0) -> Moves:
-        """Take the moves of a motion, by default on the grid of its encoder; 0 for a joint that has none."""
+        """Take the moves of a motion on an even grid, by default at the encoder's median step; 0 without samples."""
         measured = motion.position
         step = step or usual_step(measured)
         half = max(1, round(STRIDE / step / 2.0))
@@ -53,24 +53,24 @@ class Moves:
         return cls(step, grid[half:-half], commanded, found)
 
     def parts(self, count: int) -> Iterator[Moves]:
-        """Yield as many parts of equal length."""
+        """Yield ``count`` consecutive parts of equal length."""
         for rows in np.array_split(np.arange(len(self.time)), count):
             yield replace(self, time=self.time[rows], commanded=self.commanded[rows], measured=self.measured[rows])
 
 
 def clusters(log: MotionLog) -> list[Moves]:
-    """Return the moves of each motion, of a part of each where there are few: what scatters independently."""
+    """Return the moves of each motion, cut into parts where motions are few: clusters taken as independent."""
     return [part for motion in log.motions for part in Moves.of(motion).parts(parts(log))]
 
 
 def parts(log: MotionLog) -> int:
-    """Return into how many parts each motion falls, so that there are enough that scatter."""
+    """Return the number of parts of each motion with which there are at least :data:`CLUSTERS` clusters."""
     return -(-CLUSTERS // len(log.motions))
 
 
 @dataclass(frozen=True)
 class Correlation:
-    """Cross-correlation of the moves, rad²: (L, joints, joints) by lag, measured and commanded joint."""
+    """Cross-correlation of the moves, not normalised, rad²: (L, joints, joints) by lag, measured, commanded joint."""
 
     lags: Array  # (L,) s
     sums: Array
@@ -79,7 +79,7 @@ class Correlation:
 
     @classmethod
     def of(cls, moves: Moves, longest: float = LONGEST_LAG) -> Correlation:
-        """Correlate by FFT within the longest lag either way."""
+        """Cross-correlate moves by FFT at lags up to ``longest`` s either way."""
         size = 1 << (2 * len(moves.time) - 1).bit_length()
         reach = min(round(longest / moves.step), len(moves.time) - 1)
         u, q = (np.fft.rfft(values, size, axis=0) for values in (moves.commanded, moves.measured))
@@ -91,17 +91,17 @@ class Correlation:
 
     @property
     def peaks(self) -> Array:
-        """(joints, joints) sum of the largest size, signed, of each measured and commanded joint."""
+        """(joints, joints) signed cross-correlation of largest size over lags, by measured and commanded joint."""
         best = np.abs(self.sums).argmax(axis=0)
         return np.asarray(np.take_along_axis(self.sums, best[None], axis=0)[0])
 
     @property
     def explained(self) -> Array:
-        """(joints, joints) rad²: part of the measured moves' square that each command explains."""
+        """(joints, joints) rad²: sum of squares of measured moves that each command explains at its best lag."""
         return self.peaks**2 / np.maximum(self.commanded, _SMALL)
 
     def best(self) -> tuple[float, float]:
-        """Return the lag, s, at which all measured moves are most like a command's, and the share that is then told.
+        """Return the lag, s, at which commands explain the largest share of all measured moves, and that share.
 
         Neither a sign nor an exchange of joints matters.
         """
