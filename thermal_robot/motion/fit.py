@@ -22,9 +22,9 @@ from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 class Part:
     """Normal equations of one joint, by motion: sums over its rows, whose derivatives are not kept.
 
-    ``residual`` (N,), rad, and its root mean square ``noise``; ``motion`` (N,). Of the white derivatives by the
-    parameters ``columns`` (P',): products with each other, ``matrix`` (M, P', P'), with the target r + Jθ, ``vector``
-    (M, P'), and the square of that, ``total`` (M,). ``values`` (P',): θ.
+    ``residual`` (N,), rad, and its root mean square ``noise``; ``motion`` (N,). Of the derivatives J over
+    the noise, by the parameters ``columns`` (P',): Gram matrices JᵀJ, ``matrix`` (M, P', P'), products with the target
+    r + Jθ over the noise, ``vector`` (M, P'), and its square, ``total`` (M,). ``values`` (P',): θ.
     """
 
     residual: Array
@@ -38,7 +38,7 @@ class Part:
 
     @classmethod
     def of(cls, rows: Rows, values: Array, count: int) -> Part:
-        """Sum the rows of a joint over each of ``count`` motions; ``values`` (P,) are those of all parameters."""
+        """Sum a joint's normal equations over each of ``count`` clusters; ``values`` (P,) are all parameters."""
         noise, own = max(np.sqrt(np.mean(rows.residual**2)), settings.LEAST_NOISE), values[rows.columns]
         target = (rows.residual + rows.derivative @ own) / noise
         ends = pairwise(np.searchsorted(rows.motion, np.arange(count + 1)))
@@ -49,24 +49,24 @@ class Part:
 
     @property
     def bread(self) -> Array:
-        """(M, P') squares of the white derivatives."""
+        """(M, P') diagonals of the information matrices: sums of squared derivatives over the noise, by motion."""
         return np.diagonal(self.matrix, axis1=1, axis2=2)
 
     @property
     def score(self) -> Array:
-        """(M, P') slope of the log likelihood."""
+        """(M, P') gradient of the log likelihood by the parameters, by motion."""
         return np.asarray(self.vector - self.matrix @ self.values)
 
     @property
     def moved(self) -> Array:
-        """(P',) root mean square by which each parameter moves the joint, rad."""
+        """(P',) rms contribution of each parameter to the joint's output, its size times the rms derivative, rad."""
         mean = self.bread.sum(axis=0) / len(self.residual)
         return np.asarray(self.noise * np.sqrt(mean) * np.abs(self.values))
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Linearisation of the model at a place in parameter space: ``values`` (P,) and the sums of each joint there."""
+    """Linearised model at the parameters ``values`` (P,), with each joint's normal equations there."""
 
     model: JointModel
     values: Array
@@ -74,7 +74,7 @@ class Point:
 
     @classmethod
     def at(cls, model: JointModel, values: Array, wanted: Mask | None = None) -> Point:
-        """Linearise the model at some values by the parameters ``wanted``."""
+        """Linearise the model at some values by the parameters of the mask ``wanted``, by default all."""
         count = model.clusters
         return cls(model, values, model.each(lambda joint: Part.of(model.rows(joint, values, wanted), values, count)))
 
@@ -85,7 +85,7 @@ class Point:
 
     @cached_property
     def products(self) -> tuple[Array, Array, Array]:
-        """Products of all parameters' white derivatives (J, M, P, P), with the target (J, M, P), and its (J, M)."""
+        """Return normal equations of all parameters (J, M, P, P), right sides (J, M, P), squared targets (J, M)."""
         shape, width = (len(self.rows), self.model.clusters), len(self.values)
         matrix, vector = np.zeros((*shape, width, width)), np.zeros((*shape, width))
         for j, one in enumerate(self.rows):
@@ -131,7 +131,7 @@ def fit(model: JointModel, values: Array, active: Mask, motions: Mask | None = N
 
 
 def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Array) -> Array:
-    """(S, P) values after steps of all dampings, by least squares with the parameters' bounds."""
+    """(S, P) values after one Levenberg-Marquardt step for each damping, by least squares with bounds at zero."""
     lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
     found = np.tile(values, (len(settings.DAMPINGS), 1))
     inside = matrix[np.ix_(own, own)]
@@ -144,9 +144,9 @@ def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Ar
 
 
 def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:
-    """(J, S) log posterior, times −2, of sets (S, P) of parameters: squares of readings in use over their noise.
+    """(J, S) −2 log posterior of S sets of parameters, by joint: squared residuals over noise, and the prior's squares.
 
-    And of each parameter over its prior size, with its joint; with the last where joints share it.
+    A parameter's prior counts in its joint, that of a shared parameter in the last joint.
     """
     found = np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
     np.add.at(found, [one.joint for one in model.parameters], ((sets / model.sizes) ** 2).T)
@@ -154,7 +154,7 @@ def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Ar
 
 
 def ratios(point: Point) -> Array:
-    """(P,) variance of each parameter's score, clustered by motion, over that of white rows; at least one.
+    """(P,) variance of each score clustered by motion over that of independent rows; at least 1 and the joint's median.
 
     The sandwich's meat over its bread (White, *Econometrica* 50, 1982; Liang and Zeger 1986). The scores are those
     that remain once the parameter itself is fitted.
@@ -173,7 +173,7 @@ def ratios(point: Point) -> Array:
 
 
 def deflated(point: Point, deflation: Array) -> Gram:
-    """Return normal equations, in units of prior sizes, with the information that motions bring.
+    """Return normal equations in units of prior sizes, deflated to the independent information of the motions.
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
     """

@@ -32,7 +32,7 @@ SHARED = -1
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unknown of a model: the ``number`` that it moves in a joint, or the weight of a load that all joints share.
+    """Parameter to be fitted: the model's ``number`` that it changes in a joint, or the weight of a load all share.
 
     ``of`` tells parameters apart that belong to one effect of all joints.
     """
@@ -50,7 +50,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Residual (N,) of one joint, rad, derivatives (N, P') by the parameters ``columns`` (P',), and motions (N,)."""
+    """Residual (N,) of a joint, rad, the model's derivatives (N, P') by parameters ``columns`` (P',), clusters (N,)."""
 
     residual: Array
     derivative: Array
@@ -59,7 +59,7 @@ class Rows:
 
 
 class JointModel(ABC):
-    """What all models of a log's joints share: parameters by name, and work on several joints at a time."""
+    """Base class of models of a log's joints: parameters by name, and functions of every joint run in threads."""
 
     parameters: tuple[Parameter, ...] = ()
     motions: list[NDArray[np.int64]]  # of each joint the motions (N,) of its readings
@@ -83,11 +83,11 @@ class JointModel(ABC):
 
     @cached_property
     def clusters(self) -> int:
-        """Number of motions, or of the pieces into which few are cut: what counts as independent."""
+        """Number of clusters taken as independent: motions, or the pieces into which few motions are cut."""
         return len(self.log.motions) * parts(self.log)
 
     def cluster_of(self, motion: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(N,) number of the cluster of readings whose motions (N,) are in order."""
+        """(N,) index of each reading's cluster, from the motions (N,), in order, of the readings."""
         counts = np.bincount(motion, minlength=len(self.log.motions))
         place = np.arange(len(motion)) - (np.cumsum(counts) - counts)[motion]
         pieces = parts(self.log)
@@ -95,7 +95,7 @@ class JointModel(ABC):
 
     @cached_property
     def keys(self) -> list[tuple[str, str]]:
-        """Effect of each parameter, and its joint or, where all joints share it, what it is of: no two are alike."""
+        """Unique key of each parameter: its effect, and its joint or, where all joints share it, its ``of``."""
         return [(one.effect, self.joint_of(one) or one.of) for one in self.parameters]
 
     def joint_of(self, parameter: Parameter) -> str:
@@ -103,57 +103,57 @@ class JointModel(ABC):
         return "" if parameter.joint == SHARED else self.log.joints[parameter.joint]
 
     def index(self, effect: str, joint: int = SHARED) -> int | None:
-        """Return the place of a parameter, ``None`` where the model has none of it."""
+        """Return the index of the first parameter of an effect in a joint, ``None`` where there is none."""
         return next((p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)), None)
 
     def own(self, joint: int, wanted: Mask | None = None) -> NDArray[np.int64]:
-        """Places of the parameters of a joint and of those that all share; of those ``wanted``."""
+        """Return indices of a joint's parameters and of those that all joints share, within the mask ``wanted``."""
         places = [p for p, one in enumerate(self.parameters) if one.joint in (joint, SHARED)]
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
     def payload(self, torque: Array) -> Parameter:
-        """Payload, expected as a share of what the weakest joint holds, by a kilogram's torques (n, J)."""
+        """Return the payload's parameter; prior: a share of the least mass that takes any joint to its torque limit."""
         most = np.abs(torque).max(axis=0)
         limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
         size = settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
         return Parameter("payload", SHARED, "mass", "kg", size, 1.0, False, "payload")
 
     def start(self) -> Array:
-        """(P,) values from which all effects are fitted: of a problem that is nearly linear none."""
+        """(P,) starting values of the fit of all effects; zero by default, as for a nearly linear problem."""
         return np.zeros(len(self.parameters))
 
     @abstractmethod
     def refreshed(self, values: Array) -> None:
-        """Take the loads where the joints go with the parameters (P,)."""
+        """Recompute the loads along the positions that the parameters (P,) give."""
 
     @abstractmethod
     def residuals(self, joint: int, values: Array) -> Array:
-        """(S, N) residual of a joint for S sets (S, P) of all parameters."""
+        """(S, N) measured minus model of a joint for S sets (S, P) of all parameters."""
 
     @abstractmethod
     def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
-        """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
+        """Return residual and model derivatives of a joint at the parameters (P,), by those of ``wanted``."""
 
     @abstractmethod
     def noise(self, joint: int) -> float:
-        """One sigma of the readings of a joint."""
+        """Return the standard deviation of the readings of a joint."""
 
     @abstractmethod
     def readings(self, joint: int) -> dict[str, Array]:
         """(N,) time, s, command and what was measured, and position, velocity and load there, of a joint, by name."""
 
     def motion_of(self, joint: int) -> NDArray[np.int64]:
-        """(N,) number of the cluster of each reading of a joint."""
+        """(N,) index of the cluster of each reading of a joint."""
         return self.cluster_of(self.motions[joint])
 
     def quantities(self, joint: int) -> dict[str, Array]:
-        """(N,) what the residual of a joint may follow, by name."""
+        """(N,) position, velocity, load and time by name, on which the residual of a joint may depend."""
         told = self.readings(joint)
         rest = {name: told[name] for name in ("velocity", "load", "time")}
         return {f"the position of {self.log.joints[joint]}": told["position"], **rest}
 
     def curves(self, joint: int, values: Array) -> pd.DataFrame:
-        """Table of what is drawn of a joint; ``nominal`` is simulated without any effect."""
+        """Table of a joint's command, measurement, load and simulations; ``nominal`` is without any effect."""
         import pandas as pd
 
         told = self.readings(joint)
@@ -163,9 +163,9 @@ class JointModel(ABC):
         return pd.DataFrame({"motion": self.motions[joint], **given, **more})
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
-        """Local sensitivity: rms by which each effect alone moves what is simulated of each joint, in the gap's unit.
+        """Local sensitivity: rms change of each joint's simulation as one effect is set to zero, in the gap's unit.
 
-        By effect and joint, of what all joints share in each; of the values (P,) what is zero is no part of the fit.
+        Keys are effect and joint; a shared effect has every joint. Parameters at zero in the values (P,) are left out.
         """
 
         def of_joint(joint: int) -> dict[tuple[str, str], float]:
@@ -181,7 +181,7 @@ class JointModel(ABC):
         return {key: size for one in self.each(of_joint) for key, size in one.items()}
 
     def each(self, function: Callable[[int], Any]) -> list[Any]:
-        """Return a function of every joint's number, several at a time."""
+        """Apply a function to every joint's index in parallel threads; return the results in order."""
         return list(self._pool.map(function, self.joints))
 
     def all_residuals(self, values: Array) -> list[Array]:
@@ -222,7 +222,7 @@ class ServoModel(JointModel):
         self.grid = np.concatenate([t + self.step * np.arange(n) for t, n in zip(self.first, counts, strict=True)])
 
     def _held(self, joint: int) -> Array:
-        """(n,) the command of a joint on the grid, held between its stamps."""
+        """(n,) command of a joint on the grid, by zero-order hold of its samples."""
         parts = []
         for k, motion in enumerate(self.log.motions):
             grid = self.grid[self.begins[k] : self.begins[k + 1]]
@@ -232,7 +232,7 @@ class ServoModel(JointModel):
 
     @cached_property
     def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
-        """Of each joint the stamps of all motions, the command's integral there and its slope, and their begins."""
+        """Of each joint: stamps of all motions, the command's cumulative integral and value, and motions' begins."""
         found = []
         for j in self.joints:
             each = [motion.command.of(j) for motion in self.log.motions]
@@ -244,7 +244,7 @@ class ServoModel(JointModel):
 
     @cached_property
     def _samples(self) -> list[tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]]:
-        """Of each joint the readings (N,), their place on the grid and the part of a step beyond it, and motions."""
+        """Of each joint: readings (N,), index of the grid point before, fraction of a step beyond it, and motion."""
         found = []
         for j in self.joints:
             parts = []
@@ -271,7 +271,7 @@ class ServoModel(JointModel):
         return tuple(found)
 
     def start(self) -> Array:
-        """(P,) values from which all effects are fitted: those of most, and stops and limits where the joint ends."""
+        """(P,) starting values: half a prior size, 0 if signed; stops, limit and contact from ends of the motion."""
         values = np.array([0.5 * one.size if one.positive else 0.0 for one in self.parameters])
         for joint in self.joints:
             command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
@@ -287,7 +287,7 @@ class ServoModel(JointModel):
         return values
 
     def _heights(self, q: Array) -> tuple[Array, Array]:
-        """Height of the tool (n,), m, against gravity, and its derivative (n, J) by each joint, others held at zero."""
+        """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
         robot, names = self.log.robot, self.log.joints
         own = [j for j, name in enumerate(names) if name in robot.joint_names]
         at = [robot.joint_names.index(names[j]) for j in own]
@@ -298,7 +298,7 @@ class ServoModel(JointModel):
         return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 14) numbers of the kernel and (S, 3) weights of the loads, for sets (S, P) of all parameters."""
+        """(S, 14) inputs of the simulation and (S, 3) weights of load, payload, contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
         weights = np.zeros((len(values), 3))
         weights[:, 0] = 1.0
@@ -324,7 +324,7 @@ class ServoModel(JointModel):
         return np.column_stack([x[name] for name in PARAMETERS]), weights
 
     def positions(self, joint: int, values: Array, free: bool = False) -> Array:
-        """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free`` of any contact."""
+        """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free``: without contact."""
         numbers, weights = self.numbers(joint, values)
         parts = self.loads.torque[:2, :, joint]
         contact, pressing = (0.0 if free else 1.0) * np.stack([self.contact[:, joint], self.pressing[:, joint]])
@@ -346,7 +346,7 @@ class ServoModel(JointModel):
         return left
 
     def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
-        """Residual and derivatives of a joint at the parameters (P,), by forward differences; of those ``wanted``."""
+        """Return residual and forward-difference derivatives of the simulation at the parameters (P,)."""
         own = self.own(joint, wanted)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
         sets = np.tile(values, (1 + len(own), 1))
@@ -356,12 +356,12 @@ class ServoModel(JointModel):
         return Rows(found[0].copy(), found[1:].T, own, self.motion_of(joint))
 
     def noise(self, joint: int) -> float:
-        """One sigma of a joint's encoder, rad: a count's share of its rounding, no less than what the log resolves."""
+        """Return a joint's encoder noise, rad: median spacing of distinct readings over √12, at least LEAST_NOISE."""
         steps = np.abs(np.diff(np.unique(np.round(self._samples[joint][0], 9))))
         return max(float(np.median(steps)) / np.sqrt(12.0) if len(steps) else 0.0, settings.LEAST_NOISE)
 
     def readings(self, joint: int) -> dict[str, Array]:
-        """(N,) by name: time, s, of each reading, command and measured position, and what is simulated just before."""
+        """(N,) by name: time, s, command and measurement of each reading; simulated state and load just before."""
         measured, at, beyond, motion = self._samples[joint]
         return {
             "time": self.grid[at] + beyond * self.step - self.first[motion],
@@ -373,7 +373,7 @@ class ServoModel(JointModel):
         }
 
     def refreshed(self, values: Array) -> None:
-        """Take the loads at the positions that are simulated, in place of those commanded; with motion where coupled.
+        """Recompute the loads along the simulated positions; where joints are coupled, with inertial torques.
 
         Joints wait for each other's accelerations: Jacobi's iteration, relaxed by 2/(J + 1), as the eigenvalues of a
         positive mass matrix that is scaled by its diagonal lie between 0 and J.
@@ -391,7 +391,7 @@ class ServoModel(JointModel):
         self._press(values)
 
     def _loads(self, about: Array) -> Loads:
-        """Return the loads along positions (n, J) on the grid; those of their motion where coupled."""
+        """Return the loads along positions (n, J) on the grid; with speeds and accelerations where coupled."""
         if not self.coupled:
             return self.dynamics.along(about)
         speed, rate = np.zeros_like(about), np.zeros_like(about)
@@ -402,7 +402,7 @@ class ServoModel(JointModel):
         return self.dynamics.along(about, speed, rate)
 
     def _press(self, values: Array) -> None:
-        """Let the tool rest on a plane: the joints' springs yield to the force that keeps it there, without friction.
+        """Compute the frictionless force that keeps the tool on a plane, to which the joints' springs yield.
 
         The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
         """

@@ -24,10 +24,10 @@ ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The effects that were chosen, and the model there.
+    """Chosen parameters, the model linearised at their fit, and the search by evidence there.
 
-    ``active`` (P,) parameters of those ``allowed`` (P,); ``point`` of the exact fit, ``best`` and ``search`` the
-    evidence there, ``deflation`` (P,) the ratios.
+    ``active`` (P,) masks those chosen of those ``allowed`` (P,); ``point`` is the model there, ``best`` the combination
+    of largest evidence in ``search``, ``deflation`` (P,) the ratios of clustered to independent variance.
     """
 
     active: Mask
@@ -38,25 +38,25 @@ class Choice:
     deflation: Array
 
     def probability(self, block: int) -> float:
-        """Posterior probability that a parameter is at work."""
+        """Posterior probability that a parameter is in the model, summed over the combinations searched."""
         found = zip(*self.search.probabilities(), strict=True)
         return total_probability([weight for one, weight in found if block in one.blocks])
 
     def without(self, block: int) -> Mask:
-        """(P,) parameters of the choice but one."""
+        """(P,) mask of the chosen parameters without one."""
         return np.asarray(self.active & (np.arange(len(self.active)) != block))
 
     def evidence(self, active: Mask) -> float:
-        """Log evidence of parameters (P,), apart from the memo: what is asked changes no probability."""
+        """Log evidence of the parameters of a mask (P,); leaves the search and its probabilities unchanged."""
         apart = replace(self.search, seen={})
         return apart.evaluate(np.flatnonzero(active).tolist(), self.best).log_evidence
 
     def odds(self, block: int) -> float:
-        """Log odds of a parameter of the choice against nothing in its place."""
+        """Log odds of the choice against the same without one of its parameters."""
         return self.best.log_evidence - self.evidence(self.without(block))
 
     def alternatives(self, block: int) -> list[int]:
-        """Parameters that could stand in the place of one: their evidence is near that of the choice."""
+        """Return parameters that could replace one: log evidence no more than ALIKE below the choice's."""
         rest, least = self.without(block), self.best.log_evidence - settings.ALIKE
         places = np.arange(len(rest))
         others = places[self.allowed & ~self.active & (np.array(self.search.gram.ranks) > 0)].tolist()
@@ -71,7 +71,7 @@ class Choice:
 
 
 def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Array:
-    """Maximum a posteriori values of all effects together, loads taken where the joints go, until both agree.
+    """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
 
     From ``start``, by default from a fit of plain servos; effects that are abrupt start where the joints end.
     """
@@ -89,7 +89,7 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
 
 
 def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Choice:
-    """Search the effects by evidence at the fit of all, then at the exact fit of the choice, and prune by one rule."""
+    """Search effects by evidence at the fit of all, refit, keep the round of least held-out loss, then prune it."""
     values = everything(model, allowed, start, progress)
     deflation: Array | None = None
     known: Mask | None = None
@@ -118,9 +118,9 @@ def _weighed(
     model: JointModel, values: Array, allowed: Mask, deflation: Array | None, start: Mask | None,
     gone: frozenset[int] | None = None,
 ) -> Choice:  # fmt: skip
-    """Search by evidence at some values.
+    """Search combinations of parameters by deflated evidence, linearised at some values (P,).
 
-    Where it is said which parameters are ``gone``, the choice is the start, and the search tells its rivals but these.
+    With ``gone``, parameters that are barred, the choice is ``start`` itself; the search only weighs its rivals.
     """
     point = Point.at(model, values)
     deflation = ratios(point) if deflation is None else deflation
@@ -133,13 +133,13 @@ def _weighed(
 
 
 def _fewer(choice: Choice, values: Array, kept: Mask) -> Choice:
-    """Return the choice of the parameters that are kept (P,), at values with them; those that go do not come back."""
+    """Return the choice of the mask ``kept`` (P,), linearised at values fitted with it; parameters removed stay out."""
     gone = choice.search.out | set(np.flatnonzero(choice.active & ~kept).tolist())
     return _weighed(choice.point.model, values, choice.allowed, choice.deflation, kept, gone)
 
 
 def held_out_loss(point: Point, active: Mask) -> Array:
-    """Leave-one-motion-out, linearised: squared residual (J, M) over the noise, of joints in motions held out."""
+    """Linearised leave-one-motion-out cross-validation: squared residual (J, M) over the noise variance."""
     matrix, vector, total = point.products
     own = np.flatnonzero(active)
     if not len(own):
@@ -152,9 +152,9 @@ def held_out_loss(point: Point, active: Mask) -> Array:
 
 
 def _pruned(choice: Choice) -> Choice:
-    """Backward elimination by odds below nine to one or harm in motions held out, the worst first.
+    """Backward elimination of parameters with odds below 9 or that raise the held-out loss, repeated after a refit.
 
-    What stays is fitted exactly, and judged again there.
+    Then the weakest are tested by likelihood ratio.
     """
     for _ in range(settings.SELECTIONS):
         kept = _kept(choice)
@@ -165,7 +165,7 @@ def _pruned(choice: Choice) -> Choice:
 
 
 def _needed(choice: Choice) -> Choice:
-    """Likelihood-ratio test of the weakest effect at the exact fit without it, counting what motions are worth.
+    """Backward elimination by likelihood ratio against a refit without the weakest parameter, rows deflated.
 
     No odds exceed that ratio; but a linear problem misses what other effects can do together in its place.
     """
@@ -181,7 +181,7 @@ def _needed(choice: Choice) -> Choice:
 
 
 def _kept(choice: Choice) -> Mask:
-    """Backward elimination at a fit: mask of the parameters with enough odds that do no harm on held-out rows."""
+    """Backward elimination at one fit: mask of visible parameters with odds of 9 or more that lower held-out loss."""
     active = choice.active & seen(choice.point)
     while active.any():
         here, whole, worst = choice.evidence(active), held_out_loss(choice.point, active).sum(), None
@@ -198,7 +198,7 @@ def _kept(choice: Choice) -> Mask:
 
 
 def seen(point: Point) -> Mask:
-    """(P,) whether a parameter moves a joint's output by twice its noise, root mean square, or by what is tolerated."""
+    """(P,) whether a parameter's rms contribution to any joint reaches both twice its noise and the tolerance."""
     found, model = np.zeros(len(point.values), dtype=bool), point.model
     for joint, one in zip(model.joints, point.rows, strict=True):
         least = model.log.visible_from(model.log.joints[joint], model.noise(joint))

@@ -110,7 +110,7 @@ def _simulate(  # type: ignore[no-untyped-def]
 
 @cache
 def _kernel() -> Any:
-    """Compile the loops when they are first asked for; :class:`EstimationError` where numba is not installed."""
+    """Return the simulation loops, compiled at the first call; raise :class:`EstimationError` without numba."""
     global _middle
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
@@ -123,7 +123,7 @@ def simulate(
     numbers: Array, weights: Array, grid: tuple[Any, ...], command: tuple[Any, ...], around: tuple[Array, ...],
     start: Array, step: float, substeps: int,
 ) -> Array:  # fmt: skip
-    """Time stepping of one joint in all motions, for S sets of numbers: (S, n) rad on the grid.
+    """Simulate one joint by time stepping in all motions, for S sets of numbers: (S, n) rad on the grid.
 
     ``numbers`` (S, 14) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
     kg·m²; ``grid`` begins of motions and their first instants; ``command`` stamps, integral with slope and begins;

@@ -67,7 +67,7 @@ class TorqueModel(JointModel):
 
     @cached_property
     def _columns(self) -> list[dict[str, Array]]:
-        """Of each joint the torque (N,) that one unit of each number brings, before the torque constant."""
+        """Regressors of each joint: torque (N,) per unit of each number, before the torque constant."""
         found = []
         for j in self.joints:
             rows, load, sign = self._used[j], self._loads.torque[:, :, j], self._sign[:, j]
@@ -102,7 +102,7 @@ class TorqueModel(JointModel):
         return 1.0 + float(values[self.index("torque_constant", joint)])
 
     def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
-        """Residual and derivatives of a joint at the parameters (P,); of those ``wanted``."""
+        """Return residual and model derivatives of a joint at the parameters (P,), by those of ``wanted``."""
         own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
         bare = self._measured[self._used[joint], joint] - left - values[self.index("offset", joint)]
         apart, columns = {"offset": np.ones(len(left)), "torque_constant": bare / factor}, self._columns[joint]
@@ -112,7 +112,7 @@ class TorqueModel(JointModel):
         return Rows(left, derivative, own, self.motion_of(joint))
 
     def refreshed(self, values: Array) -> None:
-        """Nothing: loads are those of the measured motion."""
+        """Do nothing: the loads are those of the measured motion."""
 
     def signs(self) -> tuple[Array, Array]:
         """Regression of the measured torques on the rigid-body model's: slope (J,) and its standard error.
@@ -128,7 +128,7 @@ class TorqueModel(JointModel):
         return slope(_sums(cluster, told**2), _sums(cluster, told * measured))
 
     def noise(self, joint: int) -> float:
-        """One sigma of a joint's smoothed torque, N·m."""
+        """Return the standard deviation of a joint's smoothed torque, N·m: median of motions, at least LEAST_NOISE."""
         return max(float(np.nanmedian(self._scatter[:, joint])), settings.LEAST_NOISE)
 
     def readings(self, joint: int) -> dict[str, Array]:
@@ -140,7 +140,7 @@ class TorqueModel(JointModel):
 
 
 def _sums(labels: NDArray[np.int64], values: Array) -> Array:
-    """(labels, J) sums of the rows (N, J) of each label."""
+    """(labels, J) column sums of the rows (N, J) that have each label."""
     return np.stack([np.bincount(labels, column) for column in values.T], axis=1)
 
 
@@ -169,7 +169,7 @@ def _sampled(position: Channel, torque: Channel) -> tuple[Array, ...]:
 
 
 def _prandtl(q: Array) -> Array:
-    """(N, J) state in −1…1 of elastoplastic elements that joints drag: their signs once they slid over their reach."""
+    """(N, J) output in −1…1 of a Prandtl (elastoplastic) element on each joint, at ±1 once it slides."""
     found, state = np.zeros_like(q), np.zeros(q.shape[1])
     for n, move in enumerate(2.0 / settings.PRANDTL * np.diff(q, axis=0), 1):
         found[n] = state = np.clip(state + move, -1.0, 1.0)
