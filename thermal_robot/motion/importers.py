@@ -45,7 +45,7 @@ _MAPPED = {**KINDS, "recording": {"joints": _TOPIC, "command": _TOPIC}}
 
 @dataclass(frozen=True)
 class Asked:
-    """What is said beside the files: robot, its reference, topics."""
+    """What an import is given beside the files: the robot, its MJCF, and topics of a bag."""
 
     robot: Robot
     mjcf: Path | None = None
@@ -76,7 +76,7 @@ def _frame(motion: str, time: Array, columns: Mapping[str, Array]) -> pd.DataFra
 
 
 def _named(quantity: str, joints: Sequence[str], values: Array, file: str) -> dict[str, Array]:
-    """Return columns of a quantity; refuse another number of them than joints."""
+    """Return the columns of an array (N, joints) by name ``quantity.joint``; refuse another number of columns."""
     if values.ndim != 2 or values.shape[1] != len(joints):
         problem, expected = "has another number of values than joints", f"{len(joints)} values a row: {listed(joints)}"
         raise CampaignError(file, f"{quantity} {problem}", found=str(values.shape), expected=expected)
@@ -84,7 +84,7 @@ def _named(quantity: str, joints: Sequence[str], values: Array, file: str) -> di
 
 
 def _lists(file: Path, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
-    """Return stamps as they stand and columns of lists of one of SAGE's tables."""
+    """Read one of SAGE's tables: stamps without a change of unit, and its columns of lists as arrays (N, joints)."""
     table = read_table(file)
     for name in ("timestamp", *names[:1]):
         if name not in table.columns:
@@ -255,7 +255,7 @@ def _rosbag(files: Sequence[Path], asked: Asked) -> Taken:
 
 
 def _commanded(found: Sequence[Any], joints: Sequence[str]) -> Iterator[tuple[float, Sequence[str], Any]]:
-    """Yield instant, joints and positions that were commanded; a trajectory counts until the next one begins."""
+    """Yield instant, s, joints and positions of each command; a trajectory's points end where the next one begins."""
     from thermal_robot.campaign.importers.rosbag import instant
 
     begins = [instant(s, m) if hasattr(m, "header") else 1e-9 * s for s, m, _ in found]
@@ -275,7 +275,7 @@ def _commanded(found: Sequence[Any], joints: Sequence[str]) -> Iterator[tuple[fl
 
 
 def _by_name(motion: str, quantity: str, rows: Sequence[tuple[float, Sequence[str], Any]]) -> pd.DataFrame:
-    """Return a table of samples; a joint that a message does not name has a gap."""
+    """Return a table with a row a message and a column a joint, NaN where a message does not name the joint."""
     import pandas as pd
 
     cells = [{f"{quantity}.{n}": float(v) for n, v in zip(names, values, strict=False)} for _, names, values in rows]

@@ -30,7 +30,7 @@ class Channel:
     values: Array
 
     def of(self, joint: int) -> tuple[Array, Array]:
-        """Return stamps and values of a joint, those that are no number left out unless all are."""
+        """Return the finite samples of a joint, stamps and values; all samples where none is finite."""
         column = self.values[:, joint]
         kept = np.isfinite(column) if np.isfinite(column).any() else np.ones(len(column), dtype=bool)
         return self.time[kept], column[kept]
@@ -61,7 +61,7 @@ class Motion:
     temperature: Channel | None = None
 
     def with_channels(self, names: Iterable[str], change: Callable[[Channel], Channel]) -> Motion:
-        """Return the motion with channels changed, by the names of their fields; those that are not there stay so."""
+        """Return the motion with the named channels mapped by a function; absent ones stay ``None``."""
         held = {name: getattr(self, name) for name in names}
         changed: dict[str, Any] = {name: change(channel) for name, channel in held.items() if channel is not None}
         return replace(self, **changed)
@@ -147,19 +147,19 @@ class MotionLog:
 
     @property
     def commanded(self) -> bool:
-        """Whether commands were recorded; where none were, they are the encoder's readings, and torques tell."""
+        """Whether commands were recorded; if not, each motion's command is its encoder's channel."""
         return any(motion.command is not motion.position for motion in self.motions)
 
     def servo(self, joint: str) -> Servo:
-        """Return what is known of a joint's servo."""
+        """Return what is stated of a joint's servo; one with ``None`` throughout where nothing is."""
         return self.servos.get(joint, Servo())
 
     def visible_from(self, joint: str, noise: float) -> float:
-        """Return by what a joint's output must move to be told: twice its noise, and what is tolerated of it."""
+        """Return the least move of a joint that counts as visible: twice its noise or its tolerance, the larger."""
         return max(VISIBLE * noise, self.tolerance.get(joint, 0.0))
 
     def with_joints(self, joints: Sequence[str]) -> MotionLog:
-        """Return the log of some of its joints."""
+        """Return the log restricted to some of its joints, in their order."""
         at = [self.joints.index(name) for name in joints]
 
         def only(motion: Motion) -> Motion:
@@ -169,7 +169,7 @@ class MotionLog:
         return replace(self, joints=tuple(joints)).with_motions(only)
 
     def with_motions(self, change: Callable[[Motion], Motion]) -> MotionLog:
-        """Return the log with every motion changed."""
+        """Return the log with every motion mapped by a function."""
         return replace(self, motions=tuple(map(change, self.motions)))
 
     def __repr__(self) -> str:
@@ -182,6 +182,6 @@ CHANNELS = ("command", "position", "velocity", "torque", "current", "volts", "te
 
 
 def joint_kinds(robot: Robot) -> dict[str, str]:
-    """Type of every joint of a robot's description, by name, on the chain or beside it."""
+    """Return the type of every joint of the robot's URDF by name, whether on the chain or not."""
     joints = etree.fromstring(robot.urdf.encode()).iter("{*}joint")
     return {joint.get("name", ""): joint.get("type", "fixed") for joint in joints}

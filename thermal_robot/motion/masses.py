@@ -34,20 +34,20 @@ def pseudo(mass: float, first: Array, inertia: Array) -> Array:
 
 
 def about(mass: float, centre: Array, inertia: Array) -> Array:
-    """(4, 4) the same of an inertia (3, 3) about the centre of mass."""
+    """(4, 4) pseudo-inertia of a mass, kg, its centre (3,), m, and the inertia (3, 3) about that centre, kg·m²."""
     place = homogeneous(np.eye(3), np.asarray(centre, dtype=float))
     return np.asarray(place @ pseudo(mass, np.zeros(3), inertia) @ place.T)
 
 
 def at_centre(whole: Array) -> tuple[float, Array, Array]:
-    """Mass, centre (3,) and inertia (3, 3) about it, of a pseudo-inertia."""
+    """Return mass, kg, centre (3,), m, and inertia about the centre (3, 3), kg·m², of a pseudo-inertia (4, 4)."""
     mass, first = float(whole[3, 3]), whole[:3, 3]
     second = whole[:3, :3] - np.outer(first, first) / mass
     return mass, first / mass, np.trace(second) * np.eye(3) - second
 
 
 def rigid(whole: Array) -> bool:
-    """Whether a pseudo-inertia is that of a rigid body: with a mass, and no second moment about its centre negative."""
+    """Whether a pseudo-inertia is a rigid body's: positive mass, positive definite second moments about its centre."""
     if whole[3, 3] <= 0.0:
         return False
     second = whole[:3, :3] - np.outer(whole[:3, 3], whole[:3, 3]) / whole[3, 3]
@@ -55,7 +55,7 @@ def rigid(whole: Array) -> bool:
 
 
 def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
-    """By the joint that carries it, pseudo-inertia (4, 4) of a link in the joint's frame, and what is added to it."""
+    """Return by joint its link's pseudo-inertia (4, 4) in the joint's frame, and the change of it that was fitted."""
     robot = found.log.robot
     told = {name: value for (effect, name), value in found.values.items() if effect == "masses"}
     if not told:
@@ -71,7 +71,7 @@ def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
 
 
 def _of(numbers: Array) -> Array:
-    """(4, 4) pseudo-inertia of ten numbers in Pinocchio's order."""
+    """(4, 4) pseudo-inertia of a link's ten inertial parameters about its frame's origin, in Pinocchio's order."""
     inertia = np.zeros((3, 3))
     for (i, j), value in zip(_UPPER, numbers[4:], strict=True):
         inertia[i, j] = inertia[j, i] = value
@@ -86,7 +86,7 @@ def of_body(model: Any, body: int) -> Array:
 
 
 def carried(model: Any, body: int) -> Array:
-    """(4, 4) the same with all bodies that are fixed to it."""
+    """(4, 4) pseudo-inertia of a body together with all bodies that are fixed to it, in the body's own axes."""
     whole = of_body(model, body)
     for other in range(body + 1, model.nbody):
         if model.body_parentid[other] == body and not model.body_jntnum[other]:
@@ -96,7 +96,7 @@ def carried(model: Any, body: int) -> Array:
 
 
 def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> str:
-    """Add to the body of a joint, in a ``mujoco.MjSpec``; return why not, or nothing."""
+    """Add a pseudo-inertia (4, 4) to the body of a joint in a ``mujoco.MjSpec``; return why not, or ""."""
     body = int(model.jnt_bodyid[model.joint(joint).id])
     place = homogeneous(np.eye(3), np.array(model.joint(joint).pos))
     nominal = place @ link @ place.T
@@ -115,7 +115,7 @@ def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> s
 
 
 def into_link(link: Any, added: Array) -> str:
-    """Add to the ``<inertial>`` of a URDF's link; return why not, or nothing."""
+    """Add a pseudo-inertia (4, 4) to the ``<inertial>`` of a URDF's link; return why not, or ""."""
     inertial = link.find("inertial")
     before = np.zeros((4, 4)) if inertial is None else _of_inertial(inertial)
     if not rigid(before + added):

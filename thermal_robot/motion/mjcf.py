@@ -31,7 +31,7 @@ def opened(file: Path) -> Any:
 
 
 def position_actuators(model: Any) -> dict[str, int]:
-    """Return the number of the first position actuator of each joint: one that pulls to its command, whatever its gain.
+    """Return the index of each joint's first position actuator: positive gain and negative position feedback.
 
     Its force is g₀ u + b₀ + b₁ q + b₂ q̇ with g₀ > 0 > b₁, see :mod:`thermal_robot.motion.write`.
     """
@@ -44,7 +44,7 @@ def position_actuators(model: Any) -> dict[str, int]:
 
 
 def servos_of_mjcf(file: Path) -> dict[str, Servo]:
-    """Return what position actuators and their joints are, by joint, as they act on it: all that a servo may state."""
+    """Return by joint the servo that its position actuator and joint define, in joint units (times the gear)."""
     model, found = opened(file), {}
     for name, k in position_actuators(model).items():
         joint, gear = model.joint(name).id, float(model.actuator_gear[k, 0])
@@ -64,7 +64,7 @@ def damping_of(model: Any, dof: int) -> float:
 
 
 def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
-    """Return index and scale of each joint in ``mjData``, by array and joint, and the step, s.
+    """Return each joint's index and scale to joint units in arrays of ``mjData``, by array, and the time step, s.
 
     Arrays are qpos, qvel, qfrc_actuator and, by position actuators, ctrl.
     """
@@ -100,7 +100,7 @@ def urdf_of_mjcf(file: Path) -> str:
 
 
 def _body(robot: Any, model: Any, body: int, anchors: dict[int, Array], links: dict[int, str], file: str) -> None:
-    """Add a body: a link for each of its joints, the last of which is the body's own."""
+    """Add a body to a URDF: a link for each of its joints, the last the body's own; without joints a fixed link."""
     parent, own = int(model.body_parentid[body]), model.body(body).name or f"body {body}"
     before = links[parent]
     pose = _pose(model.body_pos[body] - anchors[parent], model.body_quat[body])
@@ -145,7 +145,7 @@ def add_joint(robot: Any, name: str, kind: str, between: tuple[str, str], pose: 
 
 
 def _link(robot: Any, model: Any, body: int | None, name: str, anchor: Array) -> None:
-    """Add a link, with the mass of a body where it is one's own."""
+    """Add a link to a URDF, with a body's mass and inertia unless ``body`` is ``None`` or has no mass."""
     if body is None or not model.body_mass[body] > 0.0:
         etree.SubElement(robot, "link", name=name)
     else:

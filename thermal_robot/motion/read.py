@@ -70,7 +70,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
 
 @dataclass(frozen=True)
 class Declaration:
-    """What motion.toml says of its tables, or a call; lengths of the payload in m, the rest of the servo in SI."""
+    """Settings of a motion.toml, or of a call, by which tables are read; payload's centre in m, servos in SI."""
 
     name: str
     units: Units
@@ -83,7 +83,7 @@ class Declaration:
 
     @classmethod
     def stated(cls, name: str, sections: Mapping[str, Mapping[str, Any]], servos: Mapping[str, Servo]) -> Declaration:
-        """Return what sections of motion.toml say, and of servos what is known beside them."""
+        """Build the settings from sections of motion.toml; what these state of servos overrides ``servos``."""
         motion, payload = sections["motion"], sections.get("payload", {})
         units = Units(motion["angle_unit"], motion.get("length_unit", "m"))
         com = np.array(payload.get("com", (0.0, 0.0, 0.0))) * units.length_scale
@@ -96,7 +96,7 @@ class Declaration:
 
 
 def declares_motion(path: Path) -> bool:
-    """Tell whether a file, or that of a folder, is a motion.toml rather than a campaign.toml."""
+    """Tell whether a file, or the motion.toml of a folder without campaign.toml, has a section ``[motion]``."""
     file = path / FILE_NAME if is_folder(path) and not is_file(path / CAMPAIGN) else path
     return is_file(file) and re.search(rb"^\s*\[motion\]", file.read_bytes(), re.MULTILINE) is not None
 
@@ -156,7 +156,7 @@ def _declared(path: str | Path, folder: str | Path | None) -> tuple[Path, Path, 
 def robot_of(
     said: Mapping[str, Any], file: Path, folder: Path, held: Sequence[Source] = ()
 ) -> tuple[Robot, dict[str, Servo]]:
-    """Return the robot of the section ``[robot]``, and what its MJCF says of the servos."""
+    """Load the robot of the section ``[robot]``; return it and, from an MJCF, the servos by joint."""
     if ("urdf" in said) == ("mjcf" in said):
         found = "both" if "urdf" in said else "neither"
         raise CampaignError(str(file), "which robot it is", column="robot", found=found, expected="urdf or mjcf")
@@ -177,7 +177,7 @@ def robot_of(
 
 
 def _fullest(file: Path, reference: str | Path, ends: Mapping[str, Any], joints: set[str]) -> Robot:
-    """Load the chain, to one of the links at the ends of the tree, that holds most of the joints."""
+    """Load the chain to a leaf link that holds most of the joints; raise the error if no chain loads."""
     from thermal_robot.kinematics.model import leaf_links
     from thermal_robot.urdf_text import urdf_text
 
@@ -305,7 +305,7 @@ def build_motions(tables: Sequence[Table], declaration: Declaration, robot: Robo
 
 
 def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tuple[tuple[str, ...], list[str]]:
-    """Return the joints with command and position, and what is left out; refuse foreign ones and none."""
+    """Return joints with position and command (torque if none has one), and notes; refuse unknown joints and none."""
     notes = []
     named: dict[str, set[str]] = {}
     for source in held:
@@ -352,7 +352,7 @@ class _Clock:
 
     @classmethod
     def of(cls, table: Table, declaration: Declaration) -> _Clock:
-        """Read the clock of a table; refuse rows out of order."""
+        """Read the stamps and motion labels of a table; refuse stamps that decrease within a motion."""
         stated = declaration.channels.get("time", Stated())
         column = stated.column or declaration.labels.get("time", "time")
         if column not in table.columns:
@@ -371,7 +371,7 @@ class _Clock:
 def _in_order(
     table: Table, column: str, time: Array, motion: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return the rows whose stamps are new, and what is said of the others; refuse rows out of order."""
+    """Return a mask of rows whose stamp is not that of the row before in the motion, and notes; refuse decreases."""
     rows = np.argsort(motion, kind="stable")
     step, same = np.diff(time[rows]), np.diff(motion[rows]) == 0
     back = first_true(same & (step < 0.0))
@@ -402,7 +402,7 @@ def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion:
 
 
 def _require_labels(clocks: Sequence[_Clock]) -> None:
-    """Refuse a table without labels beside one with several."""
+    """Refuse a table without labels of motions where any table has several motions."""
     several = any(len(clock.order) > 1 for clock in clocks)
     for clock in clocks:
         if several and clock.order == ("",):
@@ -413,7 +413,7 @@ def _require_labels(clocks: Sequence[_Clock]) -> None:
 def _channel(
     clocks: Sequence[_Clock], held: Sequence[Source], declaration: Declaration, robot: Robot, joints: Sequence[str]
 ) -> dict[str, Channel]:
-    """Return the samples of a quantity by motion, clocks as recorded; rows in which no joint has any are left out."""
+    """Return a quantity's samples by label of the motion, stamps unshifted; rows without any value are left out."""
     kinds_of = joint_kinds(robot)
     parts: dict[str, list[tuple[Array, Array]]] = {}
     for k, clock in enumerate(clocks):
@@ -435,7 +435,7 @@ def _channel(
 
 
 def _merged(parts: Sequence[tuple[Array, Array]]) -> Channel:
-    """Return the samples of one or several tables in the order of their stamps."""
+    """Merge samples of one or several tables by stamp; of equal stamps the last value that is not NaN counts."""
     import pandas as pd
 
     merged = pd.concat([pd.DataFrame(values, index=stamps) for stamps, values in parts]).groupby(level=0).last()
@@ -449,7 +449,7 @@ def _frozen(time: Array, values: Array) -> Channel:
 
 
 def _motions(label: str, kind: str, parts: Mapping[str, Channel | None], notes: list[str]) -> Iterator[Motion]:
-    """Yield the uninterrupted parts of a motion, from the first stamp on; say what is too short."""
+    """Split a motion where readings pause for over LONGEST_GAP; yield parts with enough samples, stamps from zero."""
     position = parts["position"]
     assert position is not None
     breaks = np.flatnonzero(np.diff(position.time) > LONGEST_GAP)

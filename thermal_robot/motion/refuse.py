@@ -15,7 +15,7 @@ from thermal_robot.motion.settings import FOREIGN, LEAST_RATE, LONGEST_LAG, NO_L
 
 
 def refused(log: MotionLog, files: str) -> MotionLog:
-    """Return the log with notes on what is doubtful; refuse one that tells nothing, naming its files."""
+    """Raise an error if no servo can be identified from a log; else return it with notes on what is doubtful."""
     rate = 1.0 / float(np.median([usual_step(motion.position) for motion in log.motions]))
     if rate < LEAST_RATE:
         raise CampaignError(files, "is sampled too slowly", found=f"{rate:.3g} Hz", expected="at least 30 Hz")
@@ -40,7 +40,7 @@ def refused(log: MotionLog, files: str) -> MotionLog:
 
 
 def _foreign(motion: Motion) -> float:
-    """Share of the square of the measured moves that comes while no command has moved; 0 where nothing moves."""
+    """Share of the squared measured motion with no command moving within LONGEST_LAG; 0 if nothing moves."""
     moves = Moves.of(motion)
     moving = np.abs(moves.commanded).max(axis=1) > STILL_COMMAND
     reach = int(np.ceil(LONGEST_LAG / moves.step))
@@ -50,19 +50,19 @@ def _foreign(motion: Motion) -> float:
 
 
 def _copied(motion: Motion) -> bool:
-    """Whether the command is what the encoder read at that instant or before."""
+    """Whether the command equals the encoder's reading at its instants in all joints that move."""
     q, moved = at(motion.position, motion.command.time), np.ptp(motion.position.values, axis=0) > STILL_COMMAND
     same = np.isclose(q, motion.command.values, rtol=0.0, atol=1e-9) | np.isnan(motion.command.values)
     return bool(moved.any() and same[:, moved].all())
 
 
 def explains_torques(log: MotionLog) -> bool:
-    """Whether recorded torques are explained, and no servo: without a command, or where its feed-forward is unknown."""
+    """Whether torques are fitted and no servo: all motions have them, and commands are absent or fed forward."""
     return all(motion.torque is not None for motion in log.motions) and (not log.commanded or fed_forward(log))
 
 
 def fed_forward(log: MotionLog) -> bool:
-    """Whether every joint that moves, and whose servo is not stated, follows its command without a lag."""
+    """Whether each moving joint of unstated kp has a median lag over motions below :data:`NO_LAG` in size."""
     lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
     lags = lags[:, [log.servo(joint).kp is None for joint in log.joints]]
     moving = ~np.isnan(lags).all(axis=0)
@@ -70,7 +70,7 @@ def fed_forward(log: MotionLog) -> bool:
 
 
 def _lags(motion: Motion) -> Array:
-    """(joints,) s by which the position lags: regression of the gap on commanded position and velocity."""
+    """(joints,) lag, s: minus the slope on commanded velocity in a regression of the gap on position and velocity."""
     times = motion.position.time
     command, q = at(motion.command, times), motion.position.values
     speed = np.gradient(command, times, axis=0)

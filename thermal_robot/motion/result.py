@@ -28,7 +28,7 @@ def with_summary(diagnosis: MotionDiagnosis) -> MotionDiagnosis:
 
 @dataclass(frozen=True)
 class JointGap:
-    """Rms of one joint's gap, rad (m of a prismatic joint): as it was, fitted, and in motions held out; its noise."""
+    """Rms of one joint's gap, rad or m: without effects, with them fitted, in motions held out; encoder noise."""
 
     before: float
     after: float
@@ -105,12 +105,12 @@ class MotionDiagnosis(RenderedPage):
 
     @property
     def usable(self) -> bool:
-        """Whether any joint of the log tells anything."""
+        """Whether any joint of the log could be diagnosed."""
         return bool(self.joints)
 
     @property
     def few(self) -> bool:
-        """Whether there are fewer motions than count as independent, so that ± is weak."""
+        """Whether motions are fewer than :data:`CLUSTERS`, so that standard errors are unreliable."""
         return len(self.log.motions) < settings.CLUSTERS
 
     @property
@@ -137,13 +137,13 @@ class MotionDiagnosis(RenderedPage):
         return own or effect.replace("_", " ")
 
     def visible(self, effect: str) -> tuple[str, ...]:
-        """Joints that an effect moves by twice the encoder's noise, and by the tolerance that the log states."""
+        """Return joints that an effect moves, rms, by at least twice the noise and the tolerance of the log."""
         least = {name: self.log.visible_from(name, one.noise) for name, one in self.joints.items()}
         return tuple(name for name, size in least.items() if self.moves.get((effect, name), 0.0) >= size)
 
     @property
     def shown(self) -> tuple[Finding, ...]:
-        """Findings of the verdict that move any joint by what can be seen, the largest share first."""
+        """Findings of the verdict that visibly move any joint, the largest share first."""
         return tuple(one for one in map(self.finding, self.verdict) if self.visible(one.name))
 
     @property
@@ -178,12 +178,12 @@ class MotionDiagnosis(RenderedPage):
 
     @property
     def rms_before(self) -> float:
-        """Root mean square of the gap over all joints and readings, rad."""
+        """Root mean square of the joints' rms gaps, each joint weighing one, rad."""
         return rms([one.before for one in self.joints.values()])
 
     @property
     def rms_after(self) -> float:
-        """The same once the effects are at work."""
+        """Root mean square of the joints' rms gaps with the effects fitted, each joint weighing one, rad."""
         return rms([one.after for one in self.joints.values()])
 
     def finding(self, effect: str) -> Finding:
@@ -271,5 +271,5 @@ class MotionDiagnosis(RenderedPage):
 
 
 def rms(values: Array | Sequence[float]) -> float:
-    """Root mean square; zero of nothing."""
+    """Return the root mean square of values; 0 if there are none."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else 0.0

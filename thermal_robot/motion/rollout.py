@@ -21,7 +21,7 @@ from thermal_robot.motion.result import MotionDiagnosis, rms
 
 @dataclass(frozen=True)
 class Rollout:
-    """Rms of each joint's gap in motions that were not fitted, rad: nominal, by the model told, and by MuJoCo.
+    """Rms of each joint's gap in motions not fitted, rad: nominal, of the fitted servo model, and of MuJoCo.
 
     Attributes
     ----------
@@ -40,17 +40,17 @@ class Rollout:
 
     @property
     def shrinkage_told(self) -> float:
-        """Share of the gap's mean square that goes away by the fitted model."""
+        """Share of the gap's mean square, over all joints, that the fitted servo model removes."""
         return _shrinkage(self.nominal, self.told)
 
     @property
     def shrinkage(self) -> float:
-        """The same, by MuJoCo."""
+        """Share of the gap's mean square, over all joints, that MuJoCo's simulation removes."""
         return _shrinkage(self.nominal, self.simulated)
 
     @property
     def agrees(self) -> bool:
-        """Whether the two differ by no more than a tenth."""
+        """Whether MuJoCo's shrinkage differs from the fitted model's by at most a tenth of the latter."""
         return abs(self.shrinkage - self.shrinkage_told) <= settings.AGREE * abs(self.shrinkage_told)
 
 
@@ -94,7 +94,7 @@ def rollout(found: MotionDiagnosis, mjcf: str | Path, log: MotionLog) -> Rollout
 
 
 def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
-    """(P,) parameters of the diagnosis in a model of another log; ends of ranges are told from that log's commands."""
+    """(P,) parameters of a diagnosis in another log's model; stops and contact relative to that log's commands."""
     values, first = np.zeros(len(model.parameters)), ServoModel(found.log)
     for p, (effect, joint) in enumerate(model.keys):
         value, j = found.values.get((effect, joint), 0.0), model.parameters[p].joint
@@ -147,7 +147,7 @@ def _motion(mujoco: Any, model: Any, motion: Motion, at: Array, servos: Sequence
 
 
 def _rest(mujoco: Any, model: Any, data: Any, servos: Sequence[Any], command: Array) -> None:
-    """Fill the histories of delayed actuators with the command that they had while the arm was at rest."""
+    """Fill the control histories of delayed actuators with the first command, as if the arm had rested there."""
     for k, value in zip(servos, command, strict=True):
         if getattr(model, "nhistory", 0) and model.actuator_delay[k] > 0.0:
             mujoco.mj_initCtrlHistory(model, data, k, None, np.full(int(model.actuator_history[k, 0]), value))

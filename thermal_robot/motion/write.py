@@ -1,7 +1,7 @@
 """Parameters of a diagnosis of motions written into the user's simulator: MJCF by MuJoCo's MjSpec, and URDF.
 
-The servo model divides torques by the servo's stiffness K, the model of the torque channel does not; what a robot file
-holds is in N·m, and K is the stated one with its change, or one over the droop that was found. In MuJoCo a position
+The servo model divides torques by the servo's stiffness K, the model of the torque channel does not; a robot file has
+N·m, and K is the stated stiffness with its fitted change, or one over the fitted droop. In MuJoCo a position
 actuator's force is that of Hooke's law with offset and gain, and acts on its joint times its gear:
 
     f = g₀ u + b₀ + b₁ q + b₂ q̇ ,   g₀ = K (1 + g) ,  b₀ = K z ,  b₁ = −K ,  b₂ = −k_d .
@@ -62,7 +62,7 @@ class Written:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """What was found of one joint, SI.
+    """Values fitted to one joint's effects, with its servo as stated, SI.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Cause:
 
     @property
     def limit(self) -> float | None:
-        """Torque limit, N·m, with what was found of it."""
+        """Torque limit, N·m: stiffness over fitted plus stated inverse limit; the stated limit if none was fitted."""
         if self.stiffness is None or "torque_limit" not in self.values:
             return self.servo.limit
         stated = self.stiffness / self.servo.limit if self.servo.limit else 0.0
@@ -102,14 +102,14 @@ class Cause:
 
     @property
     def stops(self) -> tuple[float | None, float | None]:
-        """End stops that were found, rad."""
+        """Lower and upper end stop, rad; ``None`` where none was found."""
         low, high = (self.values.get(name) for name in ("low_stop", "high_stop"))
         return None if low is None else self.reach[0] + low, None if high is None else self.reach[1] - high
 
     def torque(self, name: str) -> float | None:
         """Return an effect as torque, N·m, N·m·s/rad or kg·m², with what the servo states of it; ``None`` if not found.
 
-        Or where nothing tells it.
+        ``None`` also where the stiffness is needed for it and unknown.
         """
         factor = 1.0 if self.torques else self.stiffness
         if factor is None or name not in self.values:
@@ -119,7 +119,7 @@ class Cause:
 
 
 def causes(found: MotionDiagnosis) -> tuple[Cause, ...]:
-    """Return what was found of each joint of the log, in their order."""
+    """Return the fitted values of each joint of the log, in its order."""
     log, told = found.log, []
     commands = np.concatenate([motion.command.values for motion in log.motions])
     for name, low, high in zip(log.joints, np.nanmin(commands, axis=0), np.nanmax(commands, axis=0), strict=True):
@@ -165,7 +165,7 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
 
 
 def stick(spec: Any, joint: Any) -> None:
-    """Let friction of a ``mujoco.MjsJoint`` hold it at rest, as Coulomb's does; MuJoCo's usual one creeps."""
+    """Stiffen the friction of a ``mujoco.MjsJoint`` so that it holds at rest, where MuJoCo's default creeps."""
     joint.solref_friction = [settings.STIFFEST * float(spec.option.timestep), 1.0]
     joint.solimp_friction = list(settings.STICKING)
 
@@ -235,7 +235,7 @@ def _into_servo(spec: Any, actuator: Any, cause: Cause, written: Written) -> Non
 
 
 def _into_masses(model: Any, spec: Any, found: MotionDiagnosis, written: Written) -> None:
-    """Add the payload that was found to the body, or to the body of the site, of the tool frame; masses to links."""
+    """Add fitted changes of mass to the links' bodies, and a payload as a body at the tool frame's body or site."""
     for joint, (link, added) in links(found).items():
         _tell_link(written, joint, added, into_body(model, spec, joint, link, added))
     tool, (mass, at) = found.log.robot.tool_frame, _payload(found, written)
@@ -260,7 +260,7 @@ def _tell_link(written: Written, joint: str, added: Array, why_not: str) -> None
 
 
 def _payload(found: MotionDiagnosis, written: Written) -> tuple[float, Array]:
-    """Payload to be added, kg, and its centre in the tool frame, m; what is no load at the tool is told as kept."""
+    """Return the payload to add, kg, 0 if negative, and its centre in the tool frame, m; note what is not written."""
     mass = found.values.get(("payload", ""), 0.0)
     whole = dict.fromkeys(effect for effect, _ in found.values if effect == "contact")
     written.kept += [f"{effect}: {_CANNOT[effect]}" for effect in whole]
@@ -316,7 +316,7 @@ def _attribute(
 
 
 def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
-    """Add the payload that was found as a link behind the tool frame; masses to their links."""
+    """Add fitted changes of mass to the links, and a payload as a link fixed to the tool frame."""
     children = {joint.get("name"): joint.find("child").get("link") for joint in root.iterfind("joint")}
     own = {link.get("name"): link for link in root.iterfind("link")}
     for joint, (_, added) in links(found).items():
