@@ -112,7 +112,7 @@ class JointModel(ABC):
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
     def payload(self, torque: Array) -> Parameter:
-        """Return the payload's parameter; prior: a share of the least mass that takes any joint to its torque limit."""
+        """Return the payload's parameter: prior a share of the least mass that takes a joint to its torque limit."""
         most = np.abs(torque).max(axis=0)
         limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
         size = settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))

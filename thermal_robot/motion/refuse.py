@@ -62,7 +62,7 @@ def explains_torques(log: MotionLog) -> bool:
 
 
 def fed_forward(log: MotionLog) -> bool:
-    """Whether each moving joint of unstated kp has a median lag over motions below :data:`NO_LAG` in size."""
+    """Whether joints of unstated kp move, and each that does has a median lag below :data:`NO_LAG` in size."""
     lags = np.array([_lags(motion) for motion in log.motions])  # (motions, joints), NaN where a joint rests
     lags = lags[:, [log.servo(joint).kp is None for joint in log.joints]]
     moving = ~np.isnan(lags).all(axis=0)

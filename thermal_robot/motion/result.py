@@ -110,7 +110,7 @@ class MotionDiagnosis(RenderedPage):
 
     @property
     def few(self) -> bool:
-        """Whether motions are fewer than :data:`CLUSTERS`, so that standard errors are unreliable."""
+        """Whether there are fewer motions than count as independent (8), so that standard errors are unreliable."""
         return len(self.log.motions) < settings.CLUSTERS
 
     @property
@@ -178,12 +178,12 @@ class MotionDiagnosis(RenderedPage):
 
     @property
     def rms_before(self) -> float:
-        """Root mean square of the joints' rms gaps, each joint weighing one, rad."""
+        """Root mean square of the joints' rms gaps, each joint weighing one, in ``unit``."""
         return rms([one.before for one in self.joints.values()])
 
     @property
     def rms_after(self) -> float:
-        """Root mean square of the joints' rms gaps with the effects fitted, each joint weighing one, rad."""
+        """Root mean square of the joints' rms gaps with the effects fitted, each weighing one, in ``unit``."""
         return rms([one.after for one in self.joints.values()])
 
     def finding(self, effect: str) -> Finding:

@@ -65,7 +65,7 @@ class OnPlane(Along):
         return np.zeros(len(seen.position)) if own is None else np.asarray(seen.own(own))
 
     def start(self, seen: Seen, here: NDArray[np.bool_], name: str) -> Artefact:
-        """Return the plane fitted to predicted positions by total least squares, or by regression of heights read."""
+        """Return the plane through predicted positions by total least squares, or by regression of heights on them."""
         places, heights = seen.where[here], self._heights(seen)[here]
         middle, above = places.mean(axis=0), heights - heights.mean()
         normal = np.linalg.svd(places - middle)[2][-1]
