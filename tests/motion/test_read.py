@@ -119,6 +119,11 @@ def _copied(state, command):
     return state, command.assign(**own)
 
 
+def _copied_with_gaps(state, command):
+    gaps = {f"q.{joint}": state[f"q.{joint}"].mask(state.index == 7 + k) for k, joint in enumerate(JOINTS)}
+    return _copied(state.assign(**gaps), command)
+
+
 def _slow(state, command):
     return state[state.index % 3 == 0], command
 
@@ -141,6 +146,7 @@ def _without_labels(state, command):
         (_no_command, 1, "no command is recorded"),
         (_by_hand, 2, "external force"),
         (_copied, 1, "external force"),
+        (_copied_with_gaps, 1, "encoder.s own reading"),
         (_slow, 1, "sampled too slowly; found 16.6 Hz"),
         (_fed_forward, 1, "feed-forward unknown"),
         (_without_labels, 2, "has no labels of motions"),

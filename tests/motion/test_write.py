@@ -10,14 +10,16 @@ import pytest
 
 from thermal_robot.blind.motions.fault import NOTHING, Fault
 from thermal_robot.blind.motions.world import draw_world
-from thermal_robot.diagnosis.values import HeldOut, Unexplained
+from thermal_robot.diagnosis.values import Estimate, HeldOut, Unexplained
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion.diagnose import diagnose_motion
+from thermal_robot.motion.effects import physical
+from thermal_robot.motion.log import Servo
 from thermal_robot.motion.mjcf import servos_of_mjcf
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.result import MotionDiagnosis, rms
 from thermal_robot.motion.rollout import Rollout, rollout, simulated
-from thermal_robot.motion.write import causes, motion_mjcf, motion_urdf
+from thermal_robot.motion.write import Cause, causes, motion_mjcf, motion_urdf
 
 pytest.importorskip("mujoco", reason="an MJCF is written by MuJoCo")
 JOINT = 1
@@ -77,6 +79,15 @@ def test_mujoco_with_what_was_written_does_what_the_faulty_arm_did(name, size, v
     moved = float(np.abs(faulty.position - sound.position).max())
     assert moved > 1e-3
     assert float(np.abs(own - faulty.position).max()) < 0.03 * moved + 1e-5
+
+
+@pytest.mark.parametrize(("kp", "stiffness", "fitted"), [(10.0, 10.0, 10.0 / 2.0 - 10.0 / 3.0), (None, 8.0, 8.0 / 2.0)])
+def test_a_torque_limit_is_told_and_written_as_what_the_servo_does(kp, stiffness, fitted):
+    """A servo of stated stiffness adds the inverse of its stated limit, 3 N·m, to what is fitted: it ends at 2 N·m."""
+    servo, values = Servo(kp, limit=3.0), {"torque_limit": fitted} | ({} if kp else {"droop": 1.0 / stiffness})
+    assert Cause("j", servo, values, (-1.0, 1.0)).limit == pytest.approx(2.0)
+    told = physical("torque_limit", Estimate("j", fitted, 0.01 * fitted, "1/rad", True), servo, np.zeros(1))
+    assert told.value == pytest.approx(2.0 if kp else 2.0 / stiffness)
 
 
 @pytest.mark.parametrize(("name", "size"), [("gain", 0.03), ("zero", 0.02)])

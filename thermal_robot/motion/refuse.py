@@ -51,7 +51,8 @@ def _foreign(motion: Motion) -> float:
 
 def _copied(motion: Motion) -> bool:
     """Whether the command equals the encoder's reading at its instants in all joints that move."""
-    q, moved = at(motion.position, motion.command.time), np.ptp(motion.position.values, axis=0) > STILL_COMMAND
+    q, measured = at(motion.position, motion.command.time), motion.position.values
+    moved = np.nanmax(measured, axis=0) - np.nanmin(measured, axis=0) > STILL_COMMAND
     same = np.isclose(q, motion.command.values, rtol=0.0, atol=1e-9) | np.isnan(motion.command.values)
     return bool(moved.any() and same[:, moved].all())
 

@@ -94,10 +94,10 @@ class Cause:
 
     @property
     def limit(self) -> float | None:
-        """Torque limit, N·m: stiffness over fitted plus stated inverse limit; the stated limit if none was fitted."""
+        """Torque limit, N·m: stiffness over fitted plus, with kp, stated inverse limit; else the stated one."""
         if self.stiffness is None or "torque_limit" not in self.values:
             return self.servo.limit
-        stated = self.stiffness / self.servo.limit if self.servo.limit else 0.0
+        stated = self.stiffness / self.servo.limit if self.servo.kp and self.servo.limit else 0.0
         return self.stiffness / (self.values["torque_limit"] + stated)
 
     @property
