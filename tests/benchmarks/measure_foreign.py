@@ -9,11 +9,10 @@ Newton steps on that reality's places. Readings are made here: a norm, a plane's
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import numpy as np
-from measure_kinds import ARMS, EFFECTS, KINDS, LED, NOISE, TOOL, right
+from measure_kinds import LED, NOISE, TOOL, run
 
 import thermal_robot as tr
 from thermal_robot.blind.reality.fault import FAULTS
@@ -117,29 +116,5 @@ def campaign(robot, kind, name, ratio, rows, rng):
     return whole.take(np.flatnonzero(reached))
 
 
-def main():
-    """Print each case, and how many of each kind are right."""
-    seed, *kinds = sys.argv[1:]
-    rng = np.random.default_rng(int(seed))
-    for kind in kinds or KINDS:
-        told = {True: [], False: []}
-        for source, tool in ARMS:
-            robot = tr.load_robot(source, tool)
-            for name in (None, None, *(e for e in EFFECTS if kind not in LED or e != "backlash")):
-                rows, ratio = int(rng.integers(60, 121)), rng.uniform(3.0, 10.0)
-                try:
-                    made = campaign(robot, kind, name, ratio, rows, rng)
-                    diagnosis = tr.diagnose(made)
-                except tr.ThermalRobotError as error:
-                    print(kind, source, name, "not made:", error)
-                    continue
-                told[name is None].append(right(diagnosis, name))
-                said = ", ".join(diagnosis.verdict) or "nothing"
-                print(kind, source, name, f"{ratio:.1f} times, {made.samples} of {rows} rows:", said, flush=True)
-        print(
-            f"{kind}: one effect {sum(told[False])} of {len(told[False])}, none {sum(told[True])} of {len(told[True])}"
-        )
-
-
 if __name__ == "__main__":
-    main()
+    run(campaign)

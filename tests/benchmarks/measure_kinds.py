@@ -65,8 +65,15 @@ def right(diagnosis, name):
     return said == ({name} if name else set()) or (name in group and len(said) == 1)
 
 
-def main():
-    """Print each case, and how many of each kind are right."""
+def made(robot, kind, name, ratio, rows, rng):
+    """Return the campaign of a robot with one effect, ``ratio`` times the noise per axis, or with none."""
+    given = dict(rows=rows, measures=kind, tool=TOOL, tool_known=False, seed=int(rng.integers(10**6)))
+    effects = drawn(robot, name, ratio, given, rng) if name else {}
+    return tr.simulate(robot, effects, noise=NOISE, **given)
+
+
+def run(made):
+    """Print each case that ``made`` makes, and how many of each kind are right."""
     seed, *kinds = sys.argv[1:]
     rng = np.random.default_rng(int(seed))
     for kind in kinds or KINDS:
@@ -75,19 +82,19 @@ def main():
             robot = tr.load_robot(source, tool)
             for name in (None, None, *(e for e in EFFECTS if kind not in LED or e != "backlash")):
                 rows, ratio = int(rng.integers(60, 121)), rng.uniform(3.0, 10.0)
-                given = dict(rows=rows, measures=kind, tool=TOOL, tool_known=False, seed=int(rng.integers(10**6)))
                 try:
-                    effects = drawn(robot, name, ratio, given, rng) if name else {}
-                    diagnosis = tr.diagnose(tr.simulate(robot, effects, noise=NOISE, **given))
-                except tr.CampaignError as error:  # out of reach
-                    print(kind, source, name, error)
+                    campaign = made(robot, kind, name, ratio, rows, rng)
+                    diagnosis = tr.diagnose(campaign)
+                except tr.ThermalRobotError as error:  # out of reach
+                    print(kind, source, name, "not made:", error)
                     continue
                 told[name is None].append(right(diagnosis, name))
-                print(kind, source, name, f"{ratio:.1f} times, {rows} rows:", ", ".join(diagnosis.verdict) or "nothing")
+                said = ", ".join(diagnosis.verdict) or "nothing"
+                print(kind, source, name, f"{ratio:.1f} times, {campaign.samples} of {rows} rows:", said, flush=True)
         print(
             f"{kind}: one effect {sum(told[False])} of {len(told[False])}, none {sum(told[True])} of {len(told[True])}"
         )
 
 
 if __name__ == "__main__":
-    main()
+    run(made)
