@@ -12,46 +12,27 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import mujoco_or_error
-from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
+from thermal_robot.kinematics import homogeneous, quaternion_to_rotation
 from thermal_robot.kinematics.loads import Dynamics
 from thermal_robot.kinematics.urdf import xyz_rpy
 from thermal_robot.motion import settings
 from thermal_robot.motion.result import MotionDiagnosis
 from thermal_robot.motion.torque import INERTIAL
 
-_UPPER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Rows and columns of an inertia in Pinocchio's order."""
-
-
-def pseudo(mass: float, first: Array, inertia: Array) -> Array:
-    """(4, 4) pseudo-inertia of a mass, kg, a first moment (3,), kg·m, and an inertia (3, 3) about the origin, kg·m²."""
-    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    return np.block([[second, first[:, None]], [first[None], np.array([[mass]])]])
-
 
 def about(mass: float, centre: Array, inertia: Array) -> Array:
-    """(4, 4) pseudo-inertia of a mass, kg, its centre (3,), m, and the inertia (3, 3) about that centre, kg·m²."""
-    place = homogeneous(np.eye(3), np.asarray(centre, dtype=float))
-    return np.asarray(place @ pseudo(mass, np.zeros(3), inertia) @ place.T)
-
-
-def at_centre(whole: Array) -> tuple[float, Array, Array]:
-    """Return mass, kg, centre (3,), m, and inertia about the centre (3, 3), kg·m², of a pseudo-inertia (4, 4)."""
-    mass, first = float(whole[3, 3]), whole[:3, 3]
-    second = whole[:3, :3] - np.outer(first, first) / mass
-    return mass, first / mass, np.trace(second) * np.eye(3) - second
+    """(4, 4) pseudo-inertia of a mass, kg, with its centre (3,), m, and inertia about it (3, 3), kg·m²."""
+    return np.asarray(pin.PseudoInertia.FromInertia(pin.Inertia(mass, np.asarray(centre), inertia)).toMatrix())
 
 
 def rigid(whole: Array) -> bool:
-    """Whether a pseudo-inertia is a rigid body's: positive mass, positive definite second moments about its centre."""
-    if whole[3, 3] <= 0.0:
-        return False
-    second = whole[:3, :3] - np.outer(whole[:3, 3], whole[:3, 3]) / whole[3, 3]
-    return bool(np.linalg.eigvalsh(second)[0] > 0.0)
+    """Whether a pseudo-inertia (4, 4) is a rigid body's: positive definite."""
+    return bool(np.linalg.eigvalsh(whole)[0] > 0.0)
 
 
 def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
@@ -66,16 +47,10 @@ def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
     for name, numbers in bodies.items():
         more = np.array([told.get(what.format(name), 0.0) for what in INERTIAL])
         if more.any():
-            added[name] = _of(numbers), _of(more[0] * numbers + np.concatenate([[0.0], more[1:]]))
+            change = more[0] * numbers + np.concatenate([[0.0], more[1:]])
+            of = pin.PseudoInertia.FromDynamicParameters
+            added[name] = of(numbers).toMatrix(), of(change).toMatrix()
     return added
-
-
-def _of(numbers: Array) -> Array:
-    """(4, 4) pseudo-inertia of a link's ten inertial parameters about its frame's origin, in Pinocchio's order."""
-    inertia = np.zeros((3, 3))
-    for (i, j), value in zip(_UPPER, numbers[4:], strict=True):
-        inertia[i, j] = inertia[j, i] = value
-    return pseudo(float(numbers[0]), np.asarray(numbers[1:4]), inertia)
 
 
 def of_body(model: Any, body: int) -> Array:
@@ -105,12 +80,13 @@ def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> s
     whole = of_body(model, body) + place @ added @ place.T
     if not rigid(whole):
         return "no rigid body has the numbers that torques tell of it alone"
-    mass, centre, inertia = at_centre(whole)
-    size, axes = np.linalg.eigh(inertia)
+    body_inertia = pin.PseudoInertia.FromMatrix(whole).toInertia()
+    size, axes = np.linalg.eigh(body_inertia.inertia)
     quaternion = np.zeros(4)
     mujoco_or_error().mju_mat2Quat(quaternion, (axes * [1.0, 1.0, np.linalg.det(axes)]).ravel())
     own = spec.bodies[body]
-    own.explicitinertial, own.mass, own.ipos, own.iquat, own.inertia = True, mass, centre, quaternion, size
+    own.explicitinertial, own.iquat, own.inertia = True, quaternion, size
+    own.mass, own.ipos = body_inertia.mass, body_inertia.lever
     return ""
 
 
@@ -124,11 +100,11 @@ def into_link(link: Any, added: Array) -> str:
         inertial = etree.SubElement(link, "inertial")
     for child in list(inertial):
         inertial.remove(child)
-    mass, centre, inertia = at_centre(before + added)
-    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), centre))
+    whole = pin.PseudoInertia.FromMatrix(before + added).toInertia()
+    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), whole.lever))
     etree.SubElement(inertial, "origin", xyz=xyz, rpy=rpy)
-    etree.SubElement(inertial, "mass", value=repr(mass))
-    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i, j in _UPPER}
+    etree.SubElement(inertial, "mass", value=repr(float(whole.mass)))
+    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(whole.inertia[i, j])) for i in range(3) for j in range(i, 3)}
     etree.SubElement(inertial, "inertia", names)
     return ""
 
@@ -141,8 +117,7 @@ def _of_inertial(inertial: Any) -> Array:
         return {} if child is None else child.attrib
 
     origin, numbers = told("origin"), told("inertia")
-    roll, pitch, yaw = np.diag([float(x) for x in origin.get("rpy", "0 0 0").split()])
-    turn = exp3(yaw) @ exp3(pitch) @ exp3(roll)
+    turn = pin.rpy.rpyToMatrix(*(float(x) for x in origin.get("rpy", "0 0 0").split()))
     own = np.array([[float(numbers.get("i" + "".join(sorted(a + b)), 0.0)) for b in "xyz"] for a in "xyz"])
     centre = np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
     return about(float(told("mass").get("value", 0.0)), centre, turn @ own @ turn.T)
