@@ -118,8 +118,8 @@ def physical(effect: str, estimate: Estimate, servo: Servo, commanded: Array) ->
         return replace(estimate, value=1e3 * value, std=1e3 * std, unit="g")
     if effect == "torque_limit" and value > 0.0:
         name, unit, factor = ("torque", "N·m", servo.kp) if servo.kp else ("error from which it saturates", "rad", 1.0)
-        whole = value + (servo.kp / servo.limit if servo.kp and servo.limit else 0.0)  # beyond the stated limit
-        return replace(estimate, name=name + place, value=factor / whole, std=factor * std / whole**2, unit=unit)
+        limit = servo.saturation(factor, value)
+        return replace(estimate, name=name + place, value=limit, std=std * limit**2 / factor, unit=unit)
     if effect in ("low_stop", "high_stop") and len(commanded):
         at = commanded.min() + value if effect == "low_stop" else commanded.max() - value
         return replace(estimate, name=f"stops at{place}", value=float(at))

@@ -98,6 +98,10 @@ class Servo:
     armature: float | None = None
     delay: float | None = None
 
+    def saturation(self, stiffness: float, inverse: float) -> float:
+        """Return the torque limit, N·m, of a fitted inverse limit, 1/rad, which adds to the stated one where kp is."""
+        return stiffness / (inverse + (stiffness / self.limit if self.kp and self.limit else 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class MotionLog:

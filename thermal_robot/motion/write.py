@@ -97,8 +97,7 @@ class Cause:
         """Torque limit, N·m: stiffness over fitted plus, with kp, stated inverse limit; else the stated one."""
         if self.stiffness is None or "torque_limit" not in self.values:
             return self.servo.limit
-        stated = self.stiffness / self.servo.limit if self.servo.kp and self.servo.limit else 0.0
-        return self.stiffness / (self.values["torque_limit"] + stated)
+        return self.servo.saturation(self.stiffness, self.values["torque_limit"])
 
     @property
     def stops(self) -> tuple[float | None, float | None]:
