@@ -120,3 +120,19 @@ def _between(way: Array, at: Array, values: Array) -> Array:
     width = at[right] - at[right - 1]
     part = np.clip((way - at[right - 1]) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)[:, None]
     return np.asarray((1.0 - part) * values[..., right - 1, :] + part * values[..., right, :])
+
+
+def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:
+    """(4, 4) pseudo-inertia of a mass, kg, with its centre (3,), m, and inertia about it (3, 3), kg·m²."""
+    return np.asarray(pin.PseudoInertia.FromInertia(pin.Inertia(mass, np.asarray(centre), inertia)).toMatrix())
+
+
+def pseudo_inertia_of(numbers: Array) -> Array:
+    """(4, 4) pseudo-inertia of ten inertial parameters (10,) about the frame's origin, in Pinocchio's order."""
+    return np.asarray(pin.PseudoInertia.FromDynamicParameters(numbers).toMatrix())
+
+
+def at_centre(whole: Array) -> tuple[float, Array, Array]:
+    """Return mass, kg, centre (3,), m, and inertia about it (3, 3), kg·m², of a pseudo-inertia (4, 4)."""
+    found = pin.PseudoInertia.FromMatrix(whole).toInertia()
+    return float(found.mass), np.asarray(found.lever), np.asarray(found.inertia)

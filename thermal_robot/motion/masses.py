@@ -12,22 +12,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import mujoco_or_error
-from thermal_robot.kinematics import homogeneous, quaternion_to_rotation
-from thermal_robot.kinematics.loads import Dynamics
+from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
+from thermal_robot.kinematics.loads import Dynamics, at_centre, pseudo_inertia, pseudo_inertia_of
 from thermal_robot.kinematics.urdf import xyz_rpy
 from thermal_robot.motion import settings
 from thermal_robot.motion.result import MotionDiagnosis
 from thermal_robot.motion.torque import INERTIAL
-
-
-def about(mass: float, centre: Array, inertia: Array) -> Array:
-    """(4, 4) pseudo-inertia of a mass, kg, with its centre (3,), m, and inertia about it (3, 3), kg·m²."""
-    return np.asarray(pin.PseudoInertia.FromInertia(pin.Inertia(mass, np.asarray(centre), inertia)).toMatrix())
 
 
 def rigid(whole: Array) -> bool:
@@ -48,8 +42,7 @@ def links(found: MotionDiagnosis) -> dict[str, tuple[Array, Array]]:
         more = np.array([told.get(what.format(name), 0.0) for what in INERTIAL])
         if more.any():
             change = more[0] * numbers + np.concatenate([[0.0], more[1:]])
-            of = pin.PseudoInertia.FromDynamicParameters
-            added[name] = of(numbers).toMatrix(), of(change).toMatrix()
+            added[name] = pseudo_inertia_of(numbers), pseudo_inertia_of(change)
     return added
 
 
@@ -57,7 +50,7 @@ def of_body(model: Any, body: int) -> Array:
     """(4, 4) pseudo-inertia of a body of a ``mujoco.MjModel`` in its own axes, without those that it carries."""
     turn = quaternion_to_rotation(model.body_iquat[body])
     inertia = turn @ np.diag(model.body_inertia[body]) @ turn.T
-    return about(float(model.body_mass[body]), model.body_ipos[body], inertia)
+    return pseudo_inertia(float(model.body_mass[body]), model.body_ipos[body], inertia)
 
 
 def carried(model: Any, body: int) -> Array:
@@ -80,13 +73,13 @@ def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> s
     whole = of_body(model, body) + place @ added @ place.T
     if not rigid(whole):
         return "no rigid body has the numbers that torques tell of it alone"
-    body_inertia = pin.PseudoInertia.FromMatrix(whole).toInertia()
-    size, axes = np.linalg.eigh(body_inertia.inertia)
+    mass, centre, inertia = at_centre(whole)
+    size, axes = np.linalg.eigh(inertia)
     quaternion = np.zeros(4)
     mujoco_or_error().mju_mat2Quat(quaternion, (axes * [1.0, 1.0, np.linalg.det(axes)]).ravel())
     own = spec.bodies[body]
     own.explicitinertial, own.iquat, own.inertia = True, quaternion, size
-    own.mass, own.ipos = body_inertia.mass, body_inertia.lever
+    own.mass, own.ipos = mass, centre
     return ""
 
 
@@ -100,11 +93,11 @@ def into_link(link: Any, added: Array) -> str:
         inertial = etree.SubElement(link, "inertial")
     for child in list(inertial):
         inertial.remove(child)
-    whole = pin.PseudoInertia.FromMatrix(before + added).toInertia()
-    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), whole.lever))
+    mass, centre, inertia = at_centre(before + added)
+    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), centre))
     etree.SubElement(inertial, "origin", xyz=xyz, rpy=rpy)
-    etree.SubElement(inertial, "mass", value=repr(float(whole.mass)))
-    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(whole.inertia[i, j])) for i in range(3) for j in range(i, 3)}
+    etree.SubElement(inertial, "mass", value=repr(mass))
+    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i in range(3) for j in range(i, 3)}
     etree.SubElement(inertial, "inertia", names)
     return ""
 
@@ -117,7 +110,8 @@ def _of_inertial(inertial: Any) -> Array:
         return {} if child is None else child.attrib
 
     origin, numbers = told("origin"), told("inertia")
-    turn = pin.rpy.rpyToMatrix(*(float(x) for x in origin.get("rpy", "0 0 0").split()))
+    roll, pitch, yaw = np.diag([float(x) for x in origin.get("rpy", "0 0 0").split()])
+    turn = exp3(yaw) @ exp3(pitch) @ exp3(roll)
     own = np.array([[float(numbers.get("i" + "".join(sorted(a + b)), 0.0)) for b in "xyz"] for a in "xyz"])
     centre = np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
-    return about(float(told("mass").get("value", 0.0)), centre, turn @ own @ turn.T)
+    return pseudo_inertia(float(told("mass").get("value", 0.0)), centre, turn @ own @ turn.T)
