@@ -17,9 +17,11 @@ from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.robot import Robot
 
 _CLOSE = 1e-11  # m and rad: a pose is reached
+_SETTLED = 1e-7  # rad or m; the way home that is left where the free directions have settled
 _STEPS = 60
+_PULL = 0.5  # share of the way home that a step takes in directions that the task leaves free
 _LONGEST_STEP = 0.4  # rad or m, so that a branch of the inverse kinematics is not left
-_DAMPING = 1e-12  # keeps the turn about the peg, which nothing asks for, out of the step
+_DAMPING = 1e-12  # m², rad²; beside the square of what is missing: keeps what nothing asks for out of the step
 _NEIGHBOURS = 9
 _SAME_BRANCH = (0.25, 0.5, 1.0)
 # rad or m that a joint may move between neighbours: small first, so that a way leads round a singularity if it can.
@@ -130,7 +132,12 @@ def reach(
     distance = np.linalg.norm(targets - here.tool_position[0] - here.tool_rotation[0] @ tip, axis=1)
     near = cKDTree(targets).query(targets, k=min(_NEIGHBOURS, len(targets)))[1].reshape(len(targets), -1)
     q, places = np.full((len(targets), robot.n), np.nan), np.argsort(distance)
-    found, done = _solve(robot, targets[places], np.tile(start, (len(places), 1)), along, held, tip)
+
+    def solved(places: NDArray[np.int64], from_q: Array) -> tuple[Array, NDArray[np.bool_]]:
+        found, done = converged(robot, targets[places], from_q, along, held, tip)
+        return found, done & np.all((found >= robot.lower) & (found <= robot.upper), axis=1)
+
+    found, done = solved(places, np.tile(start, (len(places), 1)))
     q[places[done][:1]] = found[done][:1]
     for limit in _SAME_BRANCH:
         newest = np.flatnonzero(~np.isnan(q[:, 0]))
@@ -138,7 +145,7 @@ def reach(
             fresh = np.isin(near, newest)
             places = np.flatnonzero(np.isnan(q[:, 0]) & np.any(fresh, axis=1))
             from_q = q[near[places, np.argmax(fresh[places], axis=1)]]
-            found, done = _solve(robot, targets[places], from_q, along, held, tip)
+            found, done = solved(places, from_q)
             done &= np.max(np.abs(found - from_q), axis=1) < limit
             newest = places[done]
             q[newest] = found[done]
@@ -214,35 +221,41 @@ def assembly_map(
     return AssemblyMap(positions, directions, covariance, moved, float(clearance), float(capability), *numbers)
 
 
-def _solve(
-    robot: Robot, targets: Array, from_q: Array, approach: Array, axis: Array, point: Array
+def converged(
+    robot: Robot, targets: Array, start: Array, approach: Array, axis: Array, tip: Array, home: Array | None = None
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Inverse kinematics by Levenberg-Marquardt, all places at once; damping proportional to the squared residual.
+    """Inverse kinematics of a peg by Levenberg-Marquardt, all places at once; damping is the squared residual's half.
 
-    Configurations (M, n), and a mask (M,) of those that converged to 1e-11 within the joint limits.
+    Brings the tip (3,), m, from configurations (N, n) to places (N, 3), m, the tool ``axis`` along ``approach``, unit
+    vectors; what that leaves free moves towards ``home`` (n,), if given. Returns configurations (N, n), which may be
+    beyond limits, and a mask (N,) of those that converged to 1e-11.
     """
-    q = from_q.copy()
-    closed = np.zeros(len(q), dtype=bool)
-    for _ in range(_STEPS):
-        open_ = np.flatnonzero(~closed)
+    q, found = start.copy(), np.zeros(len(start), dtype=bool)
+    for number in range(_STEPS):
+        open_ = np.flatnonzero(~found)
         if not len(open_):
             break
         frames = chain_frames(robot, q[open_])
         held = frames.tool_rotation @ axis
         missing = np.empty((len(open_), 6))
-        missing[:, :3] = targets[open_] - frames.tool_position - frames.tool_rotation @ point
-        missing[:, 3:] = np.cross(held, approach)  # vanishes at a half turn too
-        closed[open_] = (np.max(np.abs(missing), axis=1) < _CLOSE) & (held @ approach > 0.0)
-        jacobian = frame_jacobians(robot, q[open_], frames=frames, point=point)
+        missing[:, :3] = targets[open_] - frames.tool_position - frames.tool_rotation @ tip
+        missing[:, 3:] = np.cross(held, approach)  # vanishes at a half turn, too
+        jacobian = np.ascontiguousarray(frame_jacobians(robot, q[open_], frames=frames, point=tip))
         jacobian[:, 3:] -= held[:, :, None] * np.einsum("ni,nij->nj", held, jacobian[:, 3:])[:, None]
         damping = 0.5 * np.sum(missing**2, axis=1) + _DAMPING
         square = jacobian @ np.swapaxes(jacobian, 1, 2) + damping[:, None, None] * np.eye(6)
-        step = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(square, missing[..., None]))[..., 0]
+        away = np.zeros((len(open_), robot.n)) if home is None else _PULL * (home - q[open_])
+        both = np.stack([missing, np.einsum("nij,nj->ni", jacobian, away)], axis=2)
+        task, along = np.moveaxis(np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(square, both), 2, 0)
+        free = away - along
+        late = number > _STEPS // 2  # what has not settled by then goes on without being drawn
+        settled = late | (np.max(np.abs(free), axis=1) < _SETTLED)
+        step = task if late else task + free
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.max(np.abs(step), axis=1), _LONGEST_STEP))[:, None]
-        step[closed[open_]] = 0.0
+        found[open_] = (np.max(np.abs(missing), axis=1) < _CLOSE) & (held @ approach > 0.0) & settled
+        step[found[open_]] = 0.0
         q[open_] += step
-    inside = np.all((q >= robot.lower) & (q <= robot.upper), axis=1)
-    return q, closed & inside
+    return q, found
 
 
 def _vector(values: ArrayLike, what: str, *, unit: bool = False) -> Array:

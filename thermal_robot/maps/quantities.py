@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.thermal import elongation
-from thermal_robot.assembly.workspace import assembly_map
+from thermal_robot.assembly.workspace import assembly_map, converged
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import chain_frames, elongation_jacobian, frame_jacobians
+from thermal_robot.kinematics import elongation_jacobian
 from thermal_robot.maps.question import Joints, Spec, within
 from thermal_robot.robot import Robot
 
@@ -37,18 +37,6 @@ MOST = 32
 """Postures that are kept of a place: sixteen is the most of six joints in general; redundant arms may have more."""
 NEIGHBOURS = 9
 """From which a place is continued: those beside it in a plane, corners too."""
-STEPS = 60
-"""Of the search for one configuration."""
-PULL = 0.5
-"""Share of the way home that a step takes in directions that the task leaves free."""
-LONGEST = 0.4
-"""rad or m; of a step, so that a posture is not left."""
-CLOSE = 1e-11
-"""m and rad; a pose is reached."""
-SETTLED = 1e-7
-"""rad or m; the way home that is left where the free directions have settled."""
-DAMPING = 1e-12
-"""m² and rad²; beside the square of what is missing: keeps what nothing asks for out of the step."""
 ALIKE = 1e-4
 """rad or m; two configurations of a place that differ by less are one."""
 MOST_LINKS = 12
@@ -83,33 +71,8 @@ class Task:
 
         Returns configurations (N, n) and a mask (N,) of those that converged and are within the joint limits.
         """
-        q, found, robot = start.copy(), np.zeros(len(start), dtype=bool), self.robot
-        eye = np.eye(6)
-        for step_number in range(STEPS):
-            open_ = np.flatnonzero(~found)
-            if not len(open_):
-                break
-            frames = chain_frames(robot, q[open_])
-            held = frames.tool_rotation @ self.axis
-            missing = np.empty((len(open_), 6))
-            missing[:, :3] = targets[open_] - frames.tool_position - frames.tool_rotation @ self.tip
-            missing[:, 3:] = np.cross(held, self.approach)  # vanishes at a half turn, too
-            jacobian = np.ascontiguousarray(frame_jacobians(robot, q[open_], frames=frames, point=self.tip))
-            jacobian[:, 3:] -= held[:, :, None] * np.einsum("ni,nij->nj", held, jacobian[:, 3:])[:, None]
-            damping = 0.5 * np.sum(missing**2, axis=1) + DAMPING
-            square = jacobian @ np.swapaxes(jacobian, 1, 2) + damping[:, None, None] * eye
-            away = PULL * (self.home - q[open_])
-            both = np.stack([missing, np.einsum("nij,nj->ni", jacobian, away)], axis=2)
-            task, along = np.moveaxis(np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(square, both), 2, 0)
-            free = away - along
-            reached = (np.max(np.abs(missing), axis=1) < CLOSE) & (held @ self.approach > 0.0)
-            late = step_number > STEPS // 2  # what has not settled by then goes on without being drawn
-            settled = late | (np.max(np.abs(free), axis=1) < SETTLED)
-            step = task if late else task + free
-            step *= np.minimum(1.0, LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
-            found[open_] = reached & settled
-            step[found[open_]] = 0.0
-            q[open_] += step
+        robot = self.robot
+        q, found = converged(robot, targets, start, self.approach, self.axis, self.tip, self.home)
         q = self.nearest_turn(q)
         return q, found & np.all((q >= robot.lower) & (q <= robot.upper), axis=1)
 
