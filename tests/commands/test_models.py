@@ -13,7 +13,7 @@ from readers import by_mujoco, held, model_of
 
 from thermal_robot import CorrectedModel, calibrate, read_campaign, simulate
 from thermal_robot.campaign import write_campaign
-from thermal_robot.commands.robot_files import OUTPUTS
+from thermal_robot.commands.models import OUTPUTS
 from thermal_robot.correction import calibrated
 from thermal_robot.effects import JointOffset
 from thermal_robot.effects.law import Discovered
