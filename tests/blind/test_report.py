@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from blind_records import effect, record, said, trial, trial_of_several
 from matplotlib.patches import Rectangle
+from report.looking import overlapping, texts
 from report.test_page import headings
 
 from thermal_robot.blind.cases import Kind
@@ -126,11 +127,11 @@ def test_text_and_table_say_the_same(plain, empty):
 
 def test_blocks_without_cases_are_left_out(plain, empty):
     heads = [block.splitlines()[0] for block in text(plain).split("\n\n")]
-    assert heads[0] == "Blind trial: 12 cases, 6 answered wrongly; 1 diagnoses failed and count as wrong."
+    assert heads[0] == "Blind trial: 12 cases, 6 answered wrongly; 1 diagnosis failed and counts as wrong."
     assert [h for h in heads if h.startswith("REAL")] == ["REAL CAMPAIGNS"]
     alone = score([record("null", said(), id="n1")])
     assert [re.split(r",|  |\n", b)[0] for b in text(alone).split("\n\n")] == [
-        "Blind trial: 1 cases", "HOW OFTEN", "BY ROBOT", "NAMED FIRST: one effect", "FIGURES",
+        "Blind trial: 1 case", "HOW OFTEN", "BY ROBOT", "NAMED FIRST: one effect", "FIGURES",
     ]  # fmt: skip
     assert text(empty) == "Blind trial: 0 cases, 0 answered wrongly."
 
@@ -227,6 +228,11 @@ def test_the_heat_map_holds_the_counts(plain):
     assert [k for k, p in enumerate(patches) if p.get_linewidth() == 1.0] == [0, 7, 15, 22]  # the right answers
     assert [p.get_linewidth() for p in confusion_figure(plain, "removed").axes[0].patches] == [0.5, 1.0]
     assert len(confusion_figure(plain, "nowhere").axes[0].patches) == 0
+
+
+def test_the_head_of_a_heat_map_s_numbers_covers_nothing(several):
+    for name in several["confusion"]:
+        assert [pair for pair in overlapping(texts(confusion_figure(several, name))) if "cases" in pair] == []
 
 
 def test_the_reliability_diagram_holds_the_bins_and_their_intervals(calibrated):

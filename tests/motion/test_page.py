@@ -32,6 +32,7 @@ def test_the_page_needs_nothing_beside_itself(page):
 def test_the_page_says_what_the_text_says(page):
     d = found(flagged=True, rivals=(("lag", ("delay",)),))
     words = unescape(re.sub(r"<[^>]+>", " ", page))
+    words = re.sub(r"\s+", " ", words)
     for said in (d.summary, d.advice, "time constant, joint_2", "60.0 ± 3.0 ms", "first-order filter"):
         assert said in words
 

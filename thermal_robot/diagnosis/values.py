@@ -93,6 +93,7 @@ class Finding:
     shrinkage, shrinkage_ci95
         Its share of the gap's mean square on held-out rows, noise included, and the 95 % interval. For an effect of the
         fit it is the Shapley value, and these sum to the overall shrinkage; for another the gain from adding it.
+        Of a log of motion it is the gain from leaving the effect in, all others refitted; these do not sum to a whole.
         ``None`` where it is not testable.
     needs
         Columns or frames that would make it testable.

@@ -146,7 +146,7 @@ def sentences(d: MotionDiagnosis) -> Iterator[str]:
         return
     yield f"The effects leave {units.quantity(left.rms, d.unit)} rms with a pattern that holds in motions held out."
     yield from (f"{words.capitalised(reason).rstrip('.')}." for reason in left.reasons)
-    if left.depends_on:
+    if left.depends_on[1:]:
         yield f"It follows {words.listed([one.covariate for one in left.depends_on])}."
 
 

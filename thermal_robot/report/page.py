@@ -32,9 +32,15 @@ if TYPE_CHECKING:
 Plain = Mapping[str, Any]
 
 
+def _bound(value: Any) -> Any:
+    """Keep numbers with their units by :func:`words.bound`, in text; what is markup already stays."""
+    return words.bound(value) if type(value) is str else value
+
+
 @cache
 def _environment() -> Environment:
-    made = Environment(loader=PackageLoader(__package__), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    loader = PackageLoader(__package__)
+    made = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_bound)
     made.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     made.filters["svg"] = svg
     made.globals.update(campaigns=text_campaigns, plots=plots, tables=tables, units=units, words=words)
@@ -349,16 +355,10 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     generated, files
         As for :func:`html`.
     """
-    shown = {"wear": wear, "headline": _firm(wear.summary)}
+    shown = {"wear": wear, "headline": re.sub(r"(?<=\d)-(?=\d)", "\u2011", wear.summary)}  # dates do not break
     return render("wear.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
 
 
 def wear_fragment(wear: Wear) -> str:
     """HTML of a robot over time for a notebook: one ``<div>`` with its own style."""
     return render("wear.html", {"wear": wear, "headline": wear.summary})
-
-
-def _firm(sentence: str) -> str:
-    """Bind values to their deviations and units, and the parts of dates, by non-breaking characters."""
-    whole = re.sub(r" ± ", f"{words.NO_BREAK}±{words.NO_BREAK}", words.bound(sentence))
-    return re.sub(r"(?<=\d)-(?=\d)", "-\u2060", whole)

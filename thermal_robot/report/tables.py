@@ -56,7 +56,7 @@ def motion_numbers(diagnosis: MotionDiagnosis) -> list[Number]:
 
 def _shrinkage(of: str, held: HeldOut, unit: str) -> Number:
     pair = units.together((held.rms_before, held.rms_after), unit)
-    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %".replace(" %", "\N{NO-BREAK SPACE}%")
+    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %"
     return "held", f"Shrinkage on {of} held out", units.percent(held.shrinkage), [bounds, " → ".join(pair)]
 
 
@@ -127,9 +127,10 @@ def extremes(diagnosis: Diagnosis) -> Table:
     for name, distance in (("before", rows.held_out_before), ("after", rows.held_out_after)):
         sizes[f"rows held out, {name}"] = _sizes(distance[np.isfinite(distance)])
     best = units.scale("m", max((size for line in sizes.values() for size in line), default=0.0))
+    told = ("rms", "95 % below", "largest", "rms along x", "along y", "along z")
     return {
         "label": "The gap before and after: rms, 95 % quantile, largest, along each axis",
-        "heads": (f"gap in {best.unit}", "rms", "95 % below", "largest", "rms along x", "along y", "along z"),
+        "heads": ("", *(f"{size} ({best.unit})" for size in told)),
         "rows": [
             [name, *(units.number(size * best.factor) for size in line), *[""] * (6 - len(line))]
             for name, line in sizes.items()
@@ -154,14 +155,13 @@ def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
     cells = best.factor * np.column_stack([before, after, rows.remainder[chosen, :3]])
     sizes = ("gap", "remainder", *(f"remainder {axis}" for axis in "xyz"))
     told = [
-        [str(row), *map(units.number, values)]
+        [f"row {row}", *map(units.number, values)]
         for row, values in zip(rows.rows[chosen].tolist(), cells.tolist(), strict=True)
     ]
     table = {
         "label": "Rows that were set aside",
-        "heads": ("row in the file", *(f"{size} ({best.unit})" for size in sizes)),
+        "heads": ("in the file", *(f"{size} ({best.unit})" for size in sizes)),
         "rows": told[:_MOST_OUTLIERS],
-        "words": 0,
     }
     return table, max(len(told) - _MOST_OUTLIERS, 0)
 

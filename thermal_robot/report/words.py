@@ -310,7 +310,8 @@ _SOURCES = {
 
 
 NO_BREAK = "\u00a0"
-_TOGETHER = re.compile(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)")
+_UNIT = r"[%°±]|([mµn]?m|[mµ]?rad|[mµ]?s|kg|K|N)\b"
+_TOGETHER = re.compile(rf"(?<=\d) (?={_UNIT})|(?<=\bp) (?=[<=])|(?<=[<>=±²]) (?=\d)")
 
 
 def displayed_status(finding: Finding) -> str:

@@ -77,7 +77,8 @@ def confusion_figure(score: Plain, which: str = "single") -> Figure:
                 colour = PAPER if number / total > _DARK else INK
                 axes.text(column, line, str(number), ha="center", va="center", fontsize=SMALL, color=colour)
         axes.text(len(columns) - 0.2, line, str(total), va="center", fontsize=SMALL, color=MUTED)
-    axes.text(len(columns) - 0.2, -0.9, "cases", va="center", fontsize=SMALL, color=MUTED)
+    above = axes.get_xaxis_transform()
+    axes.text(len(columns) - 0.2, 1.0, "cases", va="bottom", fontsize=SMALL, color=MUTED, transform=above)
     axes.set_xlim(-0.5, max(len(columns), _FEWEST) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xticks(range(len(columns)), [plain(text.effect(c)) for c in columns])

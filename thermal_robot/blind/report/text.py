@@ -107,9 +107,16 @@ def interval(rate: Plain) -> str:
     return f"{units.interval(rate['interval'])} %" if rate["interval"] else ""
 
 
+def cases(number: int) -> str:
+    """Format a number of cases."""
+    return f"{number} case{'s' * (number != 1)}"
+
+
 def lost(score: Plain) -> str:
     """Return the number of failed diagnoses in words; empty without any."""
-    return f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
+    one = score["failed"] == 1
+    said = "diagnosis failed and counts" if one else "diagnoses failed and count"
+    return f"; {score['failed']} {said} as wrong" if score["failed"] else ""
 
 
 def left(of: Plain) -> str:
@@ -157,7 +164,7 @@ def facts(score: Plain) -> tuple[tuple[str, str], ...]:
         said.append(("calibration error where in doubt", between))
     if gap["pairs"]:
         apart = f"apart by {units.percent(gap['median_absolute_difference'])} of the gap in the median"
-        said.append(("shrinkage claimed against reached", f"{apart}, {len(gap['pairs'])} cases"))
+        said.append(("shrinkage claimed against reached", f"{apart}, {cases(len(gap['pairs']))}"))
     rates = (
         ("laws printed at 90 % and more", score["laws"], "right"),
         ("corrected model worse than none", score["worse"], "on fresh samples"),
@@ -239,7 +246,7 @@ def text(score: Plain) -> str:
     At most 100 columns wide unless a name is longer, without a newline at the end.
     """
     blocks = [
-        [f"Blind trial: {score['cases']} cases, {len(score['misses'])} answered wrongly{lost(score)}."],
+        [f"Blind trial: {cases(score['cases'])}, {len(score['misses'])} answered wrongly{lost(score)}."],
         [f"{'HOW OFTEN':<64}{'share':>8}   95 % interval", *_kinds(score["kinds"])],
         *([f"{of.upper()}, {more}", *_groups(score[name], asked)] for name, of, more, asked in GROUPED),
         *([f"NAMED FIRST: {_TABLES.get(k, k)}", *_confusion(table)] for k, table in score["confusion"].items()),
@@ -255,7 +262,7 @@ def text(score: Plain) -> str:
 def _kinds(kinds: list[Plain]) -> Iterator[str]:
     for of in kinds:
         failed = f", {of['failed']} failed" if of["failed"] else ""
-        yield f"  {kind(of['kind'])}, {of['cases']} cases{failed}"
+        yield f"  {kind(of['kind'])}, {cases(of['cases'])}{failed}"
         for name, rate in of["rates"].items():
             mark = ">" if name == of["headline"] else " "
             asked = question(name, of["kind"])
@@ -333,8 +340,8 @@ def _both(detection: Plain) -> Iterator[str]:
         yield f"    {step(detection['ratio'][k]):17}" + "".join(f"{cell:>9}" for cell in cells)
 
 
-def _real(cases: list[Plain]) -> Iterator[str]:
-    for case in cases:
+def _real(asked: list[Plain]) -> Iterator[str]:
+    for case in asked:
         yield from _hanging(f"  {'right' if case['right'] else 'WRONG'}  {case['id']}  ", f"{case['asked']}")
         yield from _hanging(" " * 11 + "→ ", case["answer"])
 
