@@ -1,6 +1,7 @@
-"""Public rows of arms that nobody measured: a ball in two sockets."""
+"""Public rows: arms that nobody measured, by a ball in two sockets; a tracker's rows read as distances."""
 
 import os
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import thermal_robot as tr
 from thermal_robot.campaign.importers.plan import planned
 from thermal_robot.campaign.importers.run import import_files
 
-DATA = Path(os.environ.get("THERMAL_ROBOT_DATA", "nowhere")) / "mukca"
+PUBLIC = Path(os.environ.get("THERMAL_ROBOT_DATA", "nowhere"))
+DATA = PUBLIC / "mukca"
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not DATA.is_dir(), reason="THERMAL_ROBOT_DATA names no folder with mukca"),
@@ -60,3 +62,16 @@ def test_a_panda_is_calibrated_and_says_what_it_cannot_see(diagnosed):
     assert "'panda_joint1'" in told
     assert "scale of the robot is not observable" in told
     assert "base are not observable" in told
+
+
+def test_distances_of_a_ur5_tell_most_of_what_its_tracker_does():
+    tracked = tr.read_campaign(PUBLIC / "ur5_jacobi")
+    corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]) / np.sqrt(3.0)
+    anchor = np.arange(tracked.samples) % len(corners)
+    drawn = np.linalg.norm(tracked.position - tracked.position.mean(axis=0) - corners[anchor], axis=1)
+    labels = {"kind": np.full(tracked.samples, "distance"), "anchor": anchor.astype(str)}
+    read = {"position": None, "readings": {"distance": drawn}, "labels": labels}
+    found = tr.diagnose(replace(tracked, base_known=True, **read))
+    assert found.gap.held_out.rms_before == pytest.approx(0.37e-3, rel=0.02)
+    assert found.gap.held_out.rms_after == pytest.approx(0.034e-3, rel=0.03)
+    assert {"geometric", "transmission_error", "joint_ripple", "drift"} <= set(found.verdict)
