@@ -1,11 +1,13 @@
 """The words that text and page share, and the text: it names what a result says, in order, and nothing else."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from compared import diagnosed, moved
 from report.cases import HARD, JOINTS, case
+from report.comparisons import comparison as compared
 from report.fleets import EMPTY, SUMMARY
 
 import thermal_robot as tr
@@ -226,7 +228,10 @@ def test_places_are_told_largest_first_and_small_ones_counted():
     assert said_of(locations=none)[0] == [f"{four} and 1 more, less than 0.1 %"]
 
 
-@pytest.mark.parametrize("said", ["412 µm", "96.0 %", "1.04 mrad", "p = 0.01", "p < 1e-12", "> 99.9 %", "2 mm", "3 m"])
+@pytest.mark.parametrize(
+    "said",
+    ["412 µm", "96.0 %", "1.04 ± 0.02 mrad", "24 s", "χ² 5.4", "p = 0.01", "p < 1e-12", "> 99.9 %", "2 mm", "3 m"],
+)
 def test_a_number_stays_with_its_unit(said):
     assert bound(f"it is {said}, so") == f"it is {said.replace(' ', NO_BREAK)}, so"
     assert bound("5 more of them, 3 mice") == "5 more of them, 3 mice"
@@ -427,6 +432,7 @@ def test_the_text_of_a_comparison_tells_all_parts():
     headings = ("CHANGED", "EFFECTS", "PARAMETERS", "PREDICTIONS", "NOT COMPARED")
     for part in (*headings, "zero offset, joint_3", "before and after"):
         assert part in said
+    assert not re.search(r"\d\n *(%|µm|mrad)", comparison_text(compared(8)))
     quiet = comparison_text({**plain, "changes": [], "not_told": []})
     assert "  nothing\n" in quiet
     assert "NOT COMPARED" not in quiet
@@ -438,11 +444,11 @@ def test_the_tables_of_a_fleet_say_what_its_summary_holds():
     frequent, gathered, shared, differs, apart, cases = (table[1:] for table in tables.values())
     places = "joint_0 2, joint_1 2, joint_2 2, joint_3 2, …"
     assert frequent == [("joint offset", "12 of 28, in 2 or another", places)]  # drift was never found
-    assert gathered == [("joint offset", "hall 2", "9 of 10", "3 of 18", "p = 2e-5")]
+    assert gathered == [("joint offset", "hall 2", "9 of 10", "3 of 18", "0.002 %")]
     mean, spread = "12.00 ± 0.40 µm/(m·K)", "1.10 ± 0.30 µm/(m·K)"
-    assert shared == [("thermal elongation", "strain of fore_arm", mean, spread, "28", "p < 1e-12")]
+    assert shared == [("thermal elongation", "strain of fore_arm", mean, spread, "28", "below 0.001 %")]
     assert differs == [
-        ("joint offset", "zero offset, joint_2", "hall 2", "0.4100 ± 0.0050 mrad", "10", "p = 1e-8"),
+        ("joint offset", "zero offset, joint_2", "hall 2", "0.4100 ± 0.0050 mrad", "10", "below 0.001 %"),
         ("", "", "hall 1", "−2.0 ± 4.0 µrad", "18", ""),
     ]
     assert apart == [("arm_07", "backlash", "lost motion, joint_4", "0.500 ± 0.010 mrad", "1.00 µrad", "> 99.9 %")]

@@ -216,10 +216,10 @@ def calibration_text(calibration: Calibration) -> str:
 
 
 def _lines(found: Calibration) -> Iterator[str]:
-    yield fill(
+    yield wrap(
         f"{found.robot}, {found.tool_frame}: {found.samples} samples of {found.measures}, {len(found.outliers)} set "
         f"aside. Fitted as asked, not chosen: {words.in_words([effect.title for effect in found.effects])}.",
-        WIDTH,
+        "",
     )
     sizes = [("gap, rms", found.rms_before, found.rms_after, "m")]
     if found.turned_before is not None and found.turned_after is not None:
@@ -228,15 +228,15 @@ def _lines(found: Calibration) -> Iterator[str]:
         yield f"{name:<16}{' → '.join(units.together([before, after], unit))} on the rows that were fitted"
     yield f"noise, per axis {units.quantity(found.noise, 'm')}"
     if found.unexplained:
-        yield fill(
+        yield wrap(
             "What is left is not noise: something else is at work, and deviations are widened by what it may do. "
             "diagnose() says what it may be.",
-            WIDTH,
+            "",
         )
     for effect in found.effects:
         yield from ("", *_calibrated(effect))
     for warning in found.warnings:
-        yield fill(f"Note: {warning}", WIDTH)
+        yield wrap(f"Note: {warning}", "")
 
 
 def _calibrated(effect: Calibrated) -> Iterator[str]:
@@ -249,8 +249,7 @@ def _calibrated(effect: Calibrated) -> Iterator[str]:
     hidden = [p.name for p in effect.parameters if not p.identified]
     for label, names in (("not determined", hidden), ("not seen apart from the others or the frames", effect.unseen)):
         if names:
-            said = f"{label}: {words.in_words(names, between='; ')}"
-            yield fill(said, WIDTH, initial_indent="  ", subsequent_indent="  ")
+            yield wrap(f"{label}: {words.in_words(names, between='; ')}")
 
 
 _SHOWN = 6

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from textwrap import fill
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import units
-from thermal_robot.report.words import WIDTH, about_in_line, capitalised, listed
+from thermal_robot.report.plain_text import wrap
+from thermal_robot.report.words import about_in_line, capitalised, listed
 from thermal_robot.tables import aligned
 
 if TYPE_CHECKING:
@@ -79,8 +80,8 @@ def _in_short(change: Plain) -> str:
 
 
 def _chance(p_value: float | None) -> str:
-    """Format a p-value in per cent."""
-    if p_value is None:
+    """Format a p-value in per cent; what is unknown is a dash."""
+    if p_value is None or not isfinite(p_value):
         return units.MISSING
     if p_value < 1e-5:
         return "below 0.001 %"
@@ -175,13 +176,13 @@ def comparison_text(comparison: Plain) -> str:
 
 
 def _comparison_lines(comparison: Plain) -> Iterator[str]:
-    yield fill(comparison_headline(comparison), WIDTH)
+    yield wrap(comparison_headline(comparison), "")
     yield ""
     for said in campaigns_in_words(comparison):
-        yield fill(said, WIDTH, subsequent_indent="  ")
+        yield wrap(said, "", 2)
     yield from ("", "CHANGED")
     for line in changes(comparison) or ["nothing"]:
-        yield fill(line, WIDTH, initial_indent="  ", subsequent_indent="    ")
+        yield wrap(line, "  ", 2)
     told = comparison_tables(comparison)
     yield from ("", "EFFECTS", *_table(told["effects"]))
     if told["parameters"][1:]:
@@ -192,7 +193,7 @@ def _comparison_lines(comparison: Plain) -> Iterator[str]:
     yield from ("", "PREDICTIONS where both measured, frames aligned", *_table(verdict_last))
     if comparison["not_told"]:
         yield from ("", "NOT COMPARED, as frames or other parameters take it up")
-        yield fill(", ".join(comparison["not_told"]), WIDTH, initial_indent="  ", subsequent_indent="  ")
+        yield wrap(", ".join(comparison["not_told"]))
 
 
 def _table(rows: Sequence[Line], most: int | None = None, elsewhere: str = "") -> Iterator[str]:
@@ -228,7 +229,7 @@ def _gathered(summary: Plain) -> Iterator[Line]:
     yield ("effect", "group", "found there", "elsewhere", "by chance")
     for g in summary["gathered"]:
         there, elsewhere = f"{g['found']} of {g['robots']}", f"{g['found_elsewhere']} of {g['robots_elsewhere']}"
-        yield _named(g["effect"]), f"{g['label']} {g['group']}", there, elsewhere, units.p_value(g["p_value"])
+        yield _named(g["effect"]), f"{g['label']} {g['group']}", there, elsewhere, _chance(g["p_value"])
 
 
 def _shared(summary: Plain) -> Iterator[Line]:
@@ -236,7 +237,7 @@ def _shared(summary: Plain) -> Iterator[Line]:
     for s in summary["shared"]:
         if not s["label"]:
             mean, spread = (units.measured(s[k], s[f"{k}_std"], s["unit"]) for k in ("mean", "spread"))
-            yield _named(s["effect"]), s["parameter"], mean, spread, str(s["robots"]), units.p_value(s["p_mean"])
+            yield _named(s["effect"]), s["parameter"], mean, spread, str(s["robots"]), _chance(s["p_mean"])
 
 
 def _differs(summary: Plain) -> Iterator[Line]:
@@ -245,7 +246,7 @@ def _differs(summary: Plain) -> Iterator[Line]:
         for k, g in enumerate(s["groups"]):
             first = (_named(s["effect"]), s["parameter"]) if not k else ("", "")
             mean = units.measured(g["mean"], g["mean_std"], s["unit"])
-            yield *first, f"{s['label']} {g['group']}", mean, str(g["robots"]), "" if k else units.p_value(s["p_label"])
+            yield *first, f"{s['label']} {g['group']}", mean, str(g["robots"]), "" if k else _chance(s["p_label"])
 
 
 def _apart(summary: Plain) -> Iterator[Line]:
