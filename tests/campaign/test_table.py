@@ -203,7 +203,13 @@ REFUSED = [
     (PLAIN + "1" * 10_000_000, None, ..., None, "cannot be read as CSV"),
     ("," * 1_000_000, None, None, None, "is empty"),
     (PLAIN + "\n" * 200_000, None, ..., None, "100000 lines in succession are blank"),
-    ("\n".join(f"{line}{',1' * 5000}" for line in PLAIN.split()), 1, None, "5009", "too many columns; found 5009"),
+    (
+        "\n".join(f"{line}{',1' * 5000}" for line in PLAIN.split()),
+        1,
+        None,
+        "5009",
+        "at most 1000, a row for each measurement",
+    ),
     (b"\0" * 100_000, None, None, None, "has a header but no rows"),
 ]
 

@@ -12,6 +12,7 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.registration import moved, register
+from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import Frames, observe
 
 
@@ -216,3 +217,15 @@ def test_a_hand_brings_joints_from_whatever_side(ur10, kind, moves):
     assert campaign.moves == moves
     assert bool(library()["backlash"].missing(observe(campaign))) == (moves == "unknown")
     assert tr.campaign_from_table(ur10, table, moves="direct").derived
+
+
+def test_whether_table_and_robot_match_is_judged_by_the_arms_reach_and_not_by_the_sockets(ur10):
+    """In one stand the tool stays within centimetres: play of millimetres is no other motion, other postures are."""
+    made = sockets(ur10, rows=20, noise=2e-3)
+    one = made.take(np.flatnonzero(made.labels["stand"] == made.labels["stand"][0]))
+    assert np.linalg.norm(np.ptp(tool_poses(ur10, one.q)[:, :3, 3], axis=0)) < 0.15
+    found = tr.diagnose(one)
+    assert found.misfit is None
+    assert found.gap.rms_after > 2e-3
+    q = np.random.default_rng(0).uniform(-1.5, 1.5, one.q.shape)
+    assert tr.diagnose(replace(one, q=q)).misfit is not None

@@ -317,8 +317,13 @@ class Campaign:
 
     @cached_property
     def reach(self) -> float:
-        """Diagonal of the bounding box of measured positions, or without any of nominal tool positions, m."""
-        led = self.position if self.position is not None else tool_poses(self.robot, self.q)[:, :3, 3]
+        """Diagonal of the bounding box of measured positions, or without any of nominal tool positions and root, m.
+
+        In sockets of one stand the tool hardly moves, however the arm does.
+        """
+        if self.position is not None:
+            return float(np.linalg.norm(np.ptp(self.position, axis=0)))
+        led = np.vstack([tool_poses(self.robot, self.q)[:, :3, 3], np.zeros(3)])
         return float(np.linalg.norm(np.ptp(led, axis=0)))
 
     @cached_property

@@ -334,11 +334,12 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:
     """Raise a CampaignError if a table lacks a wanted column; it names the most similar columns."""
-    spare = [column for column in table.columns if column not in wanted]
+    there = [*table.columns, *table.unread]
+    spare = [column for column in there if column not in wanted]
     for name in wanted:
         if name not in table.columns:
             close = nearest(name, spare, cutoff=_PERHAPS_MEANT)
-            found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
+            found = f"the nearest names {listed(close)}" if close else f"the columns {listed(there)}"
             problem = f"there is no such column; {why}{table.headless}"
             raise table.error(problem, name, found=found, expected=listed(wanted))
 

@@ -55,6 +55,7 @@ class Table:
     header: int | None = None  # row number of the header, ``None`` for a data frame
     decimal_comma: bool = False  # numbers are written 1,5
     warnings: tuple[str, ...] = ()  # what was odd about the file
+    unread: tuple[str, ...] = ()  # further columns of the file, which an import left out, for messages
 
     @property
     def headless(self) -> str:
@@ -484,7 +485,7 @@ def _require_size(file: str, rows: int, columns: int) -> None:
 
 def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
     if len(header) > MOST_COLUMNS:
-        expected = f"at most {MOST_COLUMNS}: leave out those that do not bear on the measurements"
+        expected = f"at most {MOST_COLUMNS}, a row for each measurement: leave out others, or transpose the table"
         raise CampaignError(file, "too many columns", row=number, found=str(len(header)), expected=expected)
     if "" in header:
         found = f"column {header.index('') + 1} without one"

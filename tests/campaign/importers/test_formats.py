@@ -339,6 +339,8 @@ REFUSED = [
     ("points", {"p.txt": pointed(), "c.csv": commanded()}, '[table]\nkey = "name"\n' + RAD_MM,
      "p.txt, column 'name': there is no such column; found 4 columns without names"),
     ("points", ONE_ROW, RAD_MM, "found 1 and 3 rows"),
+    ("points", {"p.txt": pointed(), "c.csv": commanded().replace("turn", "armL1")}, RAD_MM,
+     "column 'turn': there is no such column; … 'armL1'"),
     ("points", {"p.txt": "P1 1 2 3\nP2 1 2\n", "c.csv": commanded()}, RAD_MM, "p.txt: is no list of points"),
     ("points", {"p.txt": pointed()}, RAD_MM, "found 1, expected POINTS COMMANDS.csv"),
     ("points", {"p.txt": pointed(), "c.csv": commanded()}, "", "no angle_unit is stated"),

@@ -390,7 +390,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     spare = [name for name in table.columns if name not in taken]
     if spare:
         notes.append(f"columns left out: {listed(spare)}")
-    ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings)
+    ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings, unread=tuple(spare))
     campaign = build_campaign(ready, settings, robot, name=name)
     # what follows from the order of the rows is not recorded: it will follow again
     kept = {name: values for name, values in campaign.covariates.items() if name not in campaign.derived}
