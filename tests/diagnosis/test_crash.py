@@ -8,6 +8,7 @@ import pytest
 
 from thermal_robot import after_crash, load_robot, simulate
 from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.crash import Crash, Moved
 
 TOOL = np.eye(4)
 TOOL[:3, 3] = 0.1, -0.03, 0.08
@@ -63,3 +64,12 @@ def test_another_unit_is_the_tables_fault():
     found = after_crash(replace(campaign, position=1e3 * np.asarray(campaign.position)))
     assert found.verdict == "misfit"
     assert found.moved == ()
+
+
+def test_where_the_rows_do_not_tell_the_joint_none_is_to_be_mastered():
+    moved = Moved("joint", "joint_3", 0.44, (3e-3,), (7e-4,), ("rad",))
+    said = str(Crash("after", 40, "zero", 0.45, (moved,)))
+    assert "which of them the rows do not tell" in said
+    assert "forty further poses" in said
+    assert "master" not in said
+    assert "master that joint" in str(Crash("after", 40, "zero", 0.95, (replace(moved, probability=0.97),)))

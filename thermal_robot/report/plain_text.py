@@ -295,7 +295,7 @@ def _of_crash(crash: Crash) -> Iterator[str]:
             f"Not told: the zero of {words.listed(crash.hidden)}, which the unknown base or tool takes up, or which "
             "the target does not see. Declare the frame known, or put the target off the last axis."
         )
-    yield wrap(_ADVICE[crash.verdict])
+    yield wrap(_ADVICE[crash.verdict if crash.named or crash.verdict == "nothing" else "untold"])
 
 
 _ADVICE = {
@@ -304,6 +304,7 @@ _ADVICE = {
     "link": "Next: compare the drawing of the arm with the URDF (variant, flange, riser). If it is the right one, the "
     "link is bent: diagnose --model, then correct --urdf.",
     "both": "Next: master the joint again, then measure again: what is left is the URDF or a link.",
+    "untold": "Next: measure forty further poses, with the target farther off the last axis: these do not tell.",
     "nothing": "Next: diagnose, for other causes: lost motion, a gear, a brake.",
 }
 
