@@ -171,7 +171,7 @@ def test_a_long_answer_hangs_under_its_head(plain):
 def test_several_campaigns_are_told_by_what_changes(plain, several, page):
     told = text(several)
     assert re.search(
-        r"two campaigns, one parameter changed, 1 cases\n  > what changed is told, and nothing else +1 of 1", told
+        r"two campaigns, one parameter changed, 1 case\n  > what changed is told, and nothing else +1 of 1", told
     )
     assert re.search(r"backlash jumps +1/1 +100\.0 % +1/1 +100\.0 % +1/1 +100\.0 % +1/1 +100\.0 %", told)
     assert re.search(r"joint_offset changes +1/1 +100\.0 % +1/1 +100\.0 % +– +–", told)
