@@ -21,6 +21,7 @@ from thermal_robot.campaign import write_campaign
 from thermal_robot.datasets import demo_directory
 from thermal_robot.effects import RANDOM, library
 from thermal_robot.report import schema
+from thermal_robot.report.words import NO_BREAK
 
 FEW = ("--only", "thermal_elongation", "drift")
 
@@ -82,7 +83,7 @@ def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(run, folder, d
     assert "thermal_elongation" in out or "thermal elongation" in out
     html = diagnosed.report.read_text(encoding="utf-8")
     assert html.lstrip().lower().startswith("<!doctype html>")
-    assert found["verdict"]["summary"].split(" (")[0] in html
+    assert found["verdict"]["summary"].split(" (")[0] in html.replace(NO_BREAK, " ")
     listed = dict(re.findall(r"<li>(\S+) <code>(\w+)</code></li>", html))
     assert {"campaign.toml", "robot.urdf"} <= set(listed)
     for name, checksum in listed.items():
