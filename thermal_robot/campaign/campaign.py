@@ -27,7 +27,7 @@ from thermal_robot.campaign.units import Units, scale_of
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import Kind, MisfitError, boolean, listed
+from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,6 +55,7 @@ _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("extra", "derived", "turned", "warnings"), _TEXTS),
     **dict.fromkeys(("base_known", "tool_known"), boolean),
     **{key: own.kind for key, own in FIELDS.items() if key in _STATED},
+    "noise_of_kinds": mapping(number(above=0.0, expected="a ratio above 0")),
 }
 """What each part may be that is no array."""
 _WIDE = {"q": 0, **{key: len(group) for key, group in names.POSES.items()}}
@@ -107,6 +108,8 @@ class Campaign:
     noise_of_rows
         (N,) one sigma of a point in each row, m, whose root mean square is ``noise_position`` if that is not given;
         ``None`` where one sigma holds for all rows.
+    noise_of_kinds
+        By kind of measurement, one sigma of its rows over that of all, where a fit estimated it; else empty.
     targets
         Several targets of each pose, whose common frame ``position`` and ``orientation`` are; ``None`` for one.
     payload_com
@@ -171,6 +174,7 @@ class Campaign:
     noise_position: float | None = None
     noise_orientation: float | None = None
     noise_of_rows: Array | None = None
+    noise_of_kinds: Mapping[str, float] = field(default_factory=dict)
     targets: Targets | None = None
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
     moves: str = "direct"
@@ -330,7 +334,10 @@ class Campaign:
     def relative_noise(self) -> Array | None:
         """Standard deviations (N, m) of the m figures of each row over those of all rows; ``None`` where all are 1."""
         turned = "pose" in self.kinds or "controller" in self.kinds
-        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, turned)
+        sigmas, whole = self.noise_of_rows, self.noise_position
+        if self.noise_of_kinds:
+            sigmas, whole = np.array([self.noise_of_kinds.get(kind, 1.0) for kind in self.labels["kind"]]), 1.0
+        return relative_sigmas(sigmas, whole, self.targets, turned)
 
     @property
     def clock(self) -> Array | None:

@@ -560,7 +560,7 @@ def more_rows(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ..
     if old.targets is not None or rows.targets is not None:
         expected = "rows of one target; diagnose all rows together"
         raise CampaignError(rows.name, "several targets of each pose, whose places all rows tell", expected=expected)
-    rows = read_alike(rows, old.robot, old.turned)
+    rows = replace(read_alike(rows, old.robot, old.turned), noise_of_kinds=old.noise_of_kinds)
     for column in needs:
         if column not in rows.covariates:
             raise CampaignError(rows.name, "lacks what the chosen effects read", column=column, expected="this column")

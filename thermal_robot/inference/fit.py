@@ -34,6 +34,7 @@ from thermal_robot.inference.grouping import near_repeats
 from thermal_robot.inference.problem import Linear, Products, frame_step, gram, parameter_values
 from thermal_robot.inference.registration import found_frames, frames_known, moved, refined_frames, register
 from thermal_robot.inference.search import Search
+from thermal_robot.inference.variance_components import reweighted
 from thermal_robot.inference.weights import Noise, first_whitening, reweigh
 from thermal_robot.observables import components
 from thermal_robot.observations import Frames, Observations, observe
@@ -89,11 +90,26 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     """
     progress("unknown frames")
     require_enough(campaign)
-    nominal = observe(campaign, register(campaign))
-    needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
-    variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
-    selection = select_exactly(nominal, variants, progress)
-    return _fitted(campaign, selection, needs, variants)
+
+    def selected(campaign: Campaign) -> Fit:
+        nominal = observe(campaign, register(campaign))
+        needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
+        variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
+        return _fitted(campaign, select_exactly(nominal, variants, progress), needs, variants)
+
+    return _reweighted(campaign, selected, progress)
+
+
+def _reweighted(campaign: Campaign, solve: Callable[[Campaign], Fit], progress: Callable[[str], None]) -> Fit:
+    """Repeat a fit until the noise of each kind of measurement, where none is stated, is what the fit leaves."""
+    for _ in range(settings.REVISIONS):
+        found = solve(campaign)
+        weighed = reweighted(campaign, found.explanation)
+        if weighed is campaign:
+            break
+        progress("noise of each kind")
+        campaign = weighed
+    return found
 
 
 def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
@@ -174,6 +190,11 @@ def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[
     """
     progress("unknown frames")
     require_enough(campaign)
+    return _reweighted(campaign, lambda own: _named(own, effects, progress), progress)
+
+
+def _named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None]) -> Fit:
+    """Fit the unknown frames and all of these effects at the noise that a campaign has of each kind."""
     frames = Frames.declared(campaign) if frames_known(campaign) else found_frames(campaign)
     start, variants = observe(campaign, frames), {}
     for effect in effects:
@@ -191,7 +212,7 @@ def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[
         explanation = _explained(start, chosen, [])
     explanation, observations, held = _exact(start, explanation, progress)
     kept = campaign.take(~explanation.outliers) if explanation.outliers.any() else campaign
-    nominal = start if frames_known(campaign) else observe(campaign, refined_frames(kept, frames, robust=False))
+    nominal = start if frames_known(campaign) else observe(campaign, refined_frames(kept, start.frames, robust=False))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
     families = tuple(effect.name for effect, _ in held)
     return Fit(campaign, nominal, before, observations, explanation, tuple(held), families, {}, variants)

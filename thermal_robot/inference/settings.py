@@ -21,6 +21,9 @@ GIVEN_NOISE_DOF = 20.0
 """Prior degrees of freedom of a stated noise: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
 """Factor on a noise, stated or from repeats: a remainder above it is no longer that noise (two sigma of those 15 %)."""
+SAME_NOISE = 1.1
+"""Factor between two estimates of a kind's noise below which they are the same: weights that are off by a fifth cost a
+hundredth of the accuracy."""
 MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
 SMOOTH_PRIOR = 0.5
