@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import softmax
 
+from thermal_robot.campaign import Campaign
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.attribution import locate
@@ -35,7 +36,7 @@ from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
-from thermal_robot.observables import components, figures_of_a_row, kinds_of, of_model
+from thermal_robot.observables import components, kinds_of, of_model, seen_components
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
 
@@ -206,7 +207,7 @@ def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
     whole = Gap(
         rms_before=rms(before[:, :3]),
         rms_after=rms(after[:, :3]),
-        noise_floor=float(np.sqrt(figures_of_a_row(fit.campaign)[0]) * left.floor),
+        noise_floor=left.floor * _spread_of_rows(fit.campaign),
         noise_source=left.source,
         held_out=shrinkage.overall,
         orientation_before=rms(before[:, 3:]) if turned else None,
@@ -215,10 +216,17 @@ def _gap(fit: Fit, left: ResidualAnalysis, shrinkage: Shrinkage) -> Gap:
         hardest=hardest(schemes, shrinkage.overall),
         worse=harmed(schemes),
     )
-    return replace(whole, kinds=tuple(_by_kind(fit, left.floor, whole)))
+    return replace(whole, kinds=tuple(_by_kind(fit, left, whole)))
 
 
-def _by_kind(fit: Fit, sigma: float, whole: Gap) -> Iterator[KindGap]:
+def _spread_of_rows(campaign: Campaign) -> float:
+    """Rms distance that noise of one unit per axis leaves, over rows by what each sees and by its relative noise."""
+    seen, relative = seen_components(campaign), campaign.relative_noise
+    places = 3.0 if seen is None else seen[:, 0]
+    return float(np.sqrt(np.mean(places * (1.0 if relative is None else relative[:, 0] ** 2))))
+
+
+def _by_kind(fit: Fit, left: ResidualAnalysis, whole: Gap) -> Iterator[KindGap]:
     """Yield the gaps of each kind of measurement in its unit; nothing where there is one alone, read in metres."""
     campaign, looked = fit.campaign, fit.corrected.sight
     if len(looked.parts) == 1 and looked.parts[0][0].unit == "m":
@@ -229,8 +237,10 @@ def _by_kind(fit: Fit, sigma: float, whole: Gap) -> Iterator[KindGap]:
         if not used.any():
             continue
         before, after = (rms((scale * seen.own(o.gap[:, :3]))[used]) for o in (fit.nominal, fit.corrected))
-        floor = sigma * rms((np.sqrt(own.places) * scale * seen.own(relative)[:, None])[used])
-        if not whole.noise_known and whole.rms_after > 0.0:  # that of a kind is then told by its own remainder
+        sigma = np.full(len(used), left.kinds[own.kind]) if own.kind in left.kinds else left.floor * seen.own(relative)
+        floor = rms((np.sqrt(own.places) * scale * sigma[:, None])[used])
+        untold = not whole.noise_known and own.kind not in campaign.noise_of_kinds
+        if untold and whole.rms_after > 0.0:  # that of a kind is then told by its own remainder
             floor = after * whole.noise_floor / whole.rms_after
         yield KindGap(own.kind, own.unit, int(used.sum()), before, after, floor)
 

@@ -5,8 +5,8 @@ A test is a p-value with the sentence that it fails with.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import consecutive_outliers, in_order
+from thermal_robot.inference.registration import rows_of_artefacts
 from thermal_robot.inference.screening import Score, Target, harmonics, smooth_columns
 from thermal_robot.inference.weights import distance_limit
 from thermal_robot.observables import figures_of_a_row
@@ -79,24 +80,54 @@ def residual(fit: Fit) -> Residual:
 
 @dataclass(frozen=True)
 class Repeats:
-    """Pure error from near-repeats: number of pairs, mean square over the estimated noise², sigma of position, m."""
+    """Pure error from near-repeats: number of pairs and of their figures, and mean square over the estimated noise².
+
+    ``position`` is one sigma of position, m; ``kinds`` that of each kind of measurement with enough pairs of its own.
+    """
 
     pairs: int
+    figures: float
     scale2: float
     position: float
+    kinds: Mapping[str, float]
 
 
 def repeats(fit: Fit, left: Residual) -> Repeats | None:
-    """Pure error from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs."""
-    distance, neighbour = nearest(fit.campaign.q[left.rows], 1)
-    close = np.flatnonzero(distance[:, 0] < settings.NEAR)
-    pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
+    """Pure error from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs.
+
+    Both rows of a pair are of one kind of measurement, and of one artefact: only these see the same of an error.
+    """
+    found, of_kind = [np.empty((0, 2), dtype=np.int64)], list[str]()
+    for observable, rows in rows_of_artefacts(fit.campaign):
+        some = np.flatnonzero(np.isin(left.rows, rows))
+        if len(some) > 1:
+            found.append(some[_pairs(fit.campaign.q[left.rows[some]])])
+            of_kind += [observable.kind] * len(found[-1])
+    pairs, e = np.concatenate(found), fit.explanation
     if len(pairs) < settings.FEWEST_PAIRS:
         return None
     # the residuals of both: their commands may differ by a little, and their conditions by much
     half = (left.white[pairs[:, 0]] - left.white[pairs[:, 1]]) ** 2 / 2.0
-    place = half[:, :3] * fit.explanation.whitening.noise[0] ** 2
-    return Repeats(len(pairs), float(half.mean()), float(np.sqrt(place.mean())))
+    every = (
+        np.full((len(left.rows), half.shape[1] // 3), 3) if e.whitening.seen is None else e.whitening.seen[left.rows]
+    )
+    seen = every[pairs[:, 0]]
+    sigma = np.broadcast_to(e.whitening.sigma(left.rows), left.white.shape)[pairs[:, 0], :3]
+    kinds = {}
+    for kind in dict.fromkeys(of_kind):
+        mine = np.array(of_kind) == kind
+        if mine.sum() >= settings.FEWEST_PAIRS:
+            kinds[kind] = float(np.sqrt((half[mine, :3] * sigma[mine] ** 2).sum() / seen[mine, 0].sum()))
+    place = float(half[:, :3].sum() / seen[:, 0].sum()) * e.whitening.noise[0] ** 2
+    figures = float(seen.sum())
+    return Repeats(len(pairs), figures, float(half.sum()) / figures, float(np.sqrt(place)), kinds)
+
+
+def _pairs(q: Array) -> NDArray[np.int64]:
+    """Pairs (P, 2) of commands (N, n), each with its nearest within ``settings.NEAR``, as row numbers."""
+    distance, neighbour = nearest(q, 1)
+    close = np.flatnonzero(distance[:, 0] < settings.NEAR)
+    return np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
 
 
 def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
@@ -115,12 +146,13 @@ class ResidualAnalysis:
     """Residual analysis: whether the residual is noise, where it enters and what it follows.
 
     ``floor``: one sigma per axis of instrument and repeatability together, m, by its ``source``: ``stated``,
-    ``repeats``, ``scatter`` or ``remainder``.
+    ``repeats``, ``scatter`` or ``remainder``; ``kinds``: that of a kind of measurement whose own repeats tell it.
     """
 
     unexplained: Unexplained
     floor: float
     source: str
+    kinds: Mapping[str, float] = field(default_factory=dict)
 
 
 def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> ResidualAnalysis:
@@ -137,6 +169,7 @@ def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None)
     of_repeats = again.position if again else None
     known = {"stated": fit.campaign.noise_position, "repeats": of_repeats, "remainder": rms / float(np.sqrt(places))}
     source, floor = next((name, sigma) for name, sigma in known.items() if sigma is not None)
+    kinds = again.kinds if again and source == "repeats" else {}
     progress("remainder: size and neighbours")
     rest = [_too_large(fit, left), _lack_of_fit(left, again), _autocorrelation(fit, left)]
     progress("remainder: places and quantities")
@@ -146,7 +179,7 @@ def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None)
     p_value = min(1.0, count * min(test.p for test in (*rest, *aside)))
     told, of_aside = (tuple(t.reason for t in tests if count * t.p < settings.LEVEL) for tests in (rest, aside))
     if not (told or of_aside) or rms <= settings.ROUNDING:
-        return ResidualAnalysis(Unexplained(False, 0.0, p_value), floor, source)
+        return ResidualAnalysis(Unexplained(False, 0.0, p_value), floor, source, kinds)
     likeness = min(max(test.share for test in rest), 1.0)
     # what neighbours or a law have in common is no noise, however small beside the stated one
     beyond2 = max(rms**2 - places * floor**2, likeness * rms**2)
@@ -158,7 +191,7 @@ def analyse_residual(fit: Fit, progress: Callable[[str], None] = lambda _: None)
     # what the rest follows is said only where the rest is no noise
     followed = (locations, depends) if told else ((), ())
     left_over = Unexplained(True, float(np.sqrt(beyond2)), p_value, (*told, *of_aside), *followed)
-    return ResidualAnalysis(left_over, floor, source)
+    return ResidualAnalysis(left_over, floor, source, kinds)
 
 
 def _too_large(fit: Fit, left: Residual) -> Outcome:
@@ -184,7 +217,7 @@ def _lack_of_fit(left: Residual, again: Repeats | None) -> Outcome:
     ratio2 = float((left.white**2).sum()) / left.target.freedom / max(again.scale2, settings.TINY)
     if ratio2 < settings.NOISE_SLACK**2:
         return Outcome()
-    p = float(fdtrc(left.target.freedom, again.pairs * left.white.shape[1], ratio2))
+    p = float(fdtrc(left.target.freedom, again.figures, ratio2))
     times = f"{np.sqrt(ratio2):.2g} times"
     return Outcome(p, f"what remains is {times} what {again.pairs} pairs of repeated commands differ by")
 

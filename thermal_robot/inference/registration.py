@@ -22,7 +22,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
-from thermal_robot.observables import instrument_rows, kinds_of, tool_width
+from thermal_robot.observables import Observable, instrument_rows, kinds_of, tool_width
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
 
@@ -240,19 +240,20 @@ def _turned(campaign: Campaign, frames: Frames) -> Frames:
 
 def _some(campaign: Campaign) -> NDArray[np.int64]:
     """Rows to start with, evenly from those of each kind and artefact, and of each enough to place it."""
-    groups = _alike(campaign)
+    groups = rows_of_artefacts(campaign)
     each = settings.START_ROWS // len(groups)
-    evenly = (rows[np.linspace(0, len(rows) - 1, min(len(rows), max(each, few))).astype(int)] for few, rows in groups)
+    counts = [min(len(rows), max(each, own.fewest)) for own, rows in groups]
+    evenly = (rows[np.linspace(0, len(rows) - 1, n).astype(int)] for n, (_, rows) in zip(counts, groups, strict=True))
     return np.sort(np.concatenate([*evenly]))
 
 
-def _alike(campaign: Campaign) -> list[tuple[int, NDArray[np.int64]]]:
-    """For each kind and artefact: the fewest rows that place it, and its rows."""
-    found = list[tuple[int, NDArray[np.int64]]]()
+def rows_of_artefacts(campaign: Campaign) -> list[tuple[Observable, NDArray[np.int64]]]:
+    """Return kind and row numbers of each kind of measurement and artefact; all rows at once where there is one."""
+    found = list[tuple[Observable, NDArray[np.int64]]]()
     for own, rows in kinds_of(campaign):
         rows = np.arange(campaign.samples) if rows is None else rows
         number = campaign.numbered[own.label][1][rows] if own.label else np.zeros(len(rows))
-        found += [(own.fewest, rows[number == k]) for k in np.unique(number)]
+        found += [(own, rows[number == k]) for k in np.unique(number)]
     return found
 
 
@@ -287,7 +288,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
     Rows have Cauchy weights where ``robust``, equal weights otherwise.
     """
     relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
-    groups = [rows for _, rows in _alike(campaign)]
+    groups = [rows for _, rows in rows_of_artefacts(campaign)]
     for _ in range(settings.START_ROUNDS):
         observations = observe(campaign, frames)
         (columns, names), gap = frame_columns(observations), observations.gap
