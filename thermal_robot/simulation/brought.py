@@ -55,21 +55,23 @@ def closed(
     tuple
         The commands, and (N,) the rows in which the robot reaches what they say.
     """
-    begun, starts = plan.q, STARTS if near is not None else 1
-    for number in range(ROUNDS * starts):
-        seen = corrected_observations(plan, frames, effects)
-        left = seen.gap / (seen.sight.size.relative if seen.sight.size else 1.0)
-        left = np.nan_to_num(left if away is None else left - away, nan=1.0)
-        reached = np.abs(left).max(axis=1) < CLOSED
-        if reached.all() or number == ROUNDS * starts - 1:
-            break
-        slopes = seen.joint_sensitivity[:, : left.shape[1]]
-        step = np.linalg.pinv(slopes, rcond=LEAST) @ left[:, :, None]
-        low, high = plan.robot.lower, plan.robot.upper
-        plan = replace(plan, q=np.clip(plan.q + np.clip(step[:, :, 0], -SWAY, SWAY), low, high))
-        if near is not None and number % ROUNDS == ROUNDS - 1:  # what is not reached is begun nearer
+    begun, reached = plan.q, np.zeros(plan.samples, dtype=bool)
+    for start in range(STARTS if near is not None else 1):
+        if start and near is not None:  # what is not reached is begun nearer
             begun = 0.5 * (begun + near)
             plan = replace(plan, q=np.where(reached[:, None], plan.q, begun))
+        for number in range(ROUNDS + 1):
+            seen = corrected_observations(plan, frames, effects)
+            left = seen.gap / (seen.sight.size.relative if seen.sight.size else 1.0)
+            left = np.nan_to_num(left if away is None else left - away, nan=1.0)
+            reached = np.abs(left).max(axis=1) < CLOSED
+            if reached.all():
+                return plan, reached
+            if number < ROUNDS:  # each step is looked at, the last one, too
+                slopes = seen.joint_sensitivity[:, : left.shape[1]]
+                step = np.linalg.pinv(slopes, rcond=LEAST) @ left[:, :, None]
+                low, high = plan.robot.lower, plan.robot.upper
+                plan = replace(plan, q=np.clip(plan.q + np.clip(step[:, :, 0], -SWAY, SWAY), low, high))
     return plan, reached
 
 
