@@ -480,6 +480,24 @@ def test_a_ball_is_led_to_what_is_there(kind):
     assert set(first["labels"]) < set(samples.to_table().columns)
 
 
+def test_a_plane_is_touched_where_it_is_known_to_be():
+    """A table of half a metre: postures lay up to the arm's reach beyond its edge, on a plane without end."""
+    robot = tr.load_robot("example-robot-data:ur10", "tool0")
+    effects, ball = {"joint_offset": {robot.joint_names[1]: 3e-3}}, np.array([0.05, 0.02, 0.1])
+    wide = tr.simulate(robot, effects, rows=400, measures="plane", noise=2e-5, tool=ball, tool_known=True, seed=5)
+    places = observe(wide).position
+    middle = np.array([np.median(places[wide.labels["plane"] == own], axis=0) for own in wide.labels["plane"]])
+    campaign = wide.take(np.flatnonzero(np.linalg.norm(places - middle, axis=1) < 0.45))
+    found = tr.diagnose(campaign)
+    offered = candidates(found.fit)
+    assert offered.samples > 40
+    there, here = observe(offered, found.model.frames).position, found.fit.corrected.position
+    for own in np.unique(campaign.labels["plane"]):
+        known, asked = here[campaign.labels["plane"] == own], there[offered.labels["plane"] == own]
+        low, high = known.min(axis=0) - 0.01, known.max(axis=0) + 0.01
+        assert ((asked > low) & (asked < high)).all()
+
+
 def test_a_sample_that_goes_nowhere_has_no_label():
     campaign = tr.simulate(
         "builtin:rv_m2", {"joint_offset": {"joint_2": 2e-3}}, tool_frame="tool0", rows=40, noise=2e-5

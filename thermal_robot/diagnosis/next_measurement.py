@@ -37,7 +37,9 @@ from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, products
 from thermal_robot.inference.settings import FEW_LEVELS, IN_ITS_PLACE
-from thermal_robot.observations import Observations, observe
+from thermal_robot.observables.plane import OnPlane
+from thermal_robot.observables.socket import Socket, Stand
+from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.robot import joint_range
 from thermal_robot.simulation.brought import closed
 
@@ -191,7 +193,8 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
     alike for all links. Payloads are those of the campaign, or none and ``loads``, kg, where these are given. Joints
     are approached from either side. Times follow the campaign, for as long as it lasted. Other columns are copied from
     a random row; torques and encoder readings from the row with the nearest pose. Where rows touch something, the robot
-    as fitted is led from these joint positions to what the random row touched; what it does not reach is left out.
+    as fitted is led from these joint positions to what the random row touched, on a plane between places where it was
+    touched; what it does not reach is left out.
     """
     from scipy.spatial import cKDTree
 
@@ -232,7 +235,7 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
         missing={},
         rows=np.arange(2, pool + 2),
     )
-    return _led(fit, offered)
+    return _led(fit, offered, rng)
 
 
 def _kind_of_rows(campaign: Campaign) -> NDArray[np.str_]:
@@ -240,16 +243,41 @@ def _kind_of_rows(campaign: Campaign) -> NDArray[np.str_]:
     return np.asarray(campaign.labels.get(KIND, np.full(campaign.samples, campaign.measures)))
 
 
-def _led(fit: Fit, offered: Campaign) -> Campaign:
+def _led(fit: Fit, offered: Campaign, rng: np.random.Generator) -> Campaign:
     """Candidates with the joint positions (N, n) in which the robot as fitted touches what they name."""
     touched = np.flatnonzero(np.isin(_kind_of_rows(offered), TOUCHED))
     if not len(touched):
         return offered
-    led, reached = closed(offered.take(touched), fit.corrected.frames, fit.effects)
+    led, reached = closed(*_aimed(fit, offered.take(touched), rng), fit.effects)
     q, kept = offered.q.copy(), np.ones(offered.samples, dtype=bool)
     q[touched], kept[touched] = led.q, reached
     found = replace(offered, q=q).take(np.flatnonzero(kept))
     return replace(found, rows=np.arange(2, found.samples + 2))
+
+
+def _aimed(fit: Fit, rows: Campaign, rng: np.random.Generator) -> tuple[Campaign, Frames]:
+    """Return rows with a point on each plane to aim at, as a socket there, and the frames with these points.
+
+    A point lies between two where the plane was touched: a table, or the face of a block, ends somewhere.
+    """
+    frames, onto = fit.corrected.frames, _kind_of_rows(rows) == OnPlane.kind
+    if not onto.any():
+        return rows, frames
+    places = fit.corrected.position @ frames.base[:3, :3].T + frames.base[:3, 3]
+    before = ~fit.explanation.outliers & (_kind_of_rows(fit.campaign) == OnPlane.kind)
+    points, heights = np.zeros((rows.samples, 3)), rows.readings.get("height", np.zeros(rows.samples))
+    for name in np.unique(rows.labels[OnPlane.label][onto]):
+        plane, mine = frames.artefacts[f"{OnPlane.label} {name}"], onto & (rows.labels[OnPlane.label] == name)
+        known = np.flatnonzero(before & (fit.campaign.labels[OnPlane.label] == name))
+        one, other = places[rng.choice(known, (2, int(mine.sum())))]
+        between = one + rng.uniform(size=(len(one), 1)) * (other - one)
+        points[mine] = between - np.outer(between @ plane.normal - plane.offset - heights[mine], plane.normal)
+    # no stand of the campaign has an empty name
+    number, blank = np.arange(rows.samples).astype(str), np.full(rows.samples, "")
+    aim = {KIND: np.full(rows.samples, Socket.kind), Socket.label: blank, "socket": number}
+    labels = {**rows.labels, **{name: np.where(onto, own, rows.labels.get(name, blank)) for name, own in aim.items()}}
+    stand = Stand(tuple(number[onto].tolist()), points[onto])
+    return replace(rows, labels=labels), replace(frames, artefacts={**frames.artefacts, f"{Socket.label} ": stand})
 
 
 def _labels(offered: Campaign, row: int) -> dict[str, str]:
