@@ -230,6 +230,8 @@ def test_whether_table_and_robot_match_is_judged_by_the_arms_reach_and_not_by_th
     assert found.gap.rms_after > 2e-3
     q = np.random.default_rng(0).uniform(-1.5, 1.5, one.q.shape)
     assert tr.diagnose(replace(one, q=q)).misfit is not None
+
+
 def test_each_newton_step_of_a_loop_is_looked_at(ur10, monkeypatch):
     """A quadratic step from 1e-6 rad ends at rounding: one is enough, and no row is begun anew."""
     campaign = sockets(ur10, rows=1)
