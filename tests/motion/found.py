@@ -53,8 +53,8 @@ def simulated(stated=False, scale=1.0, seed=4):
     first = ServoModel(log_of([(t, c, c) for t, c in plan], servos))
     values = true_values(first, scale)
     ends = np.split(np.arange(len(first.grid)), first.begins[1:-1])
-    paths = [first.positions(j, values[None])[0] for j in first.joints]
-    measured = [COUNT * np.round(np.stack([path[rows] for path in paths], axis=1) / COUNT) for rows in ends]
+    path = first.path(values)
+    measured = [COUNT * np.round(path[rows] / COUNT) for rows in ends]
     return log_of([(t, c, q[: len(t)]) for (t, c), q in zip(plan, measured, strict=True)], servos)
 
 
@@ -93,7 +93,7 @@ def found(stated=False, flagged=False, rivals=(), scale=1.0, seed=4):
     log = simulated(stated, scale, seed)
     model = ServoModel(log)
     values = true_values(model, scale)
-    curves = {name: model.curves(j, values) for j, name in enumerate(JOINTS)}
+    curves = model.curves(values)
     if not stated:  # the joint that follows its command at once
         curves = {name: one.assign(nominal=one["command"]) for name, one in curves.items()}
     gaps = {}

@@ -13,11 +13,12 @@ pytest.importorskip("mujoco", reason="worlds are simulated by MuJoCo")
 from thermal_robot.blind.motions.fault import Fault
 from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.motion.diagnose import diagnose_motion
-from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios
+from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import held_out_loss, select
+from thermal_robot.motion.select import select, without
+from thermal_robot.motion.weigh import Scales
 
 
 def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT):
@@ -29,7 +30,7 @@ def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), 
         values[model.index(effect, joint)] = value
     for _ in range(3):
         model.refreshed(values)
-    place = [model.positions(j, values[None])[0] for j in model.joints]
+    place = model.path(values).T
     parts = []
     for m, motion in enumerate(log.motions):
         grid = model.grid[model.begins[m] : model.begins[m + 1]]
@@ -73,17 +74,17 @@ def test_cells_that_are_empty_are_no_command_and_no_reading(known):
     )
     model = ServoModel(replace(log, motions=motions))
     model.refreshed(values)
-    assert all(np.isfinite(model.positions(j, values[None])).all() for j in model.joints)
-    assert len(model.residuals(0, values[None])[0]) == len(whole.residuals(0, values[None])[0]) - len(position)
+    assert np.isfinite(model.path(values)).all()
+    assert len(model.all_residuals(values)[0]) == len(whole.all_residuals(values)[0]) - len(position)
     held = model.commanded[model.begins[0] : model.begins[1], 1]
     assert set(np.unique(held)) <= set(first.command.values[:, 1])
 
 
 def test_derivatives_are_those_of_a_step_a_tenth_as_long(known, monkeypatch):
     _, model, values = known
-    coarse = model.rows(1, values)
+    coarse = model.rows((1,), values)[0]
     monkeypatch.setattr("thermal_robot.motion.settings.DIFFERENCE", 0.005)
-    fine = model.rows(1, values)
+    fine = model.rows((1,), values)[0]
     for k, p in enumerate(fine.columns):
         if model.parameters[p].effect in ("zero", "lag", "delay", "droop", "gain"):
             far = np.linalg.norm(coarse.derivative[:, k] - fine.derivative[:, k])
@@ -94,7 +95,7 @@ def test_the_fit_returns_to_the_true_values(known):
     _, model, values = known
     found = fit(model, np.where(values > 0.0, 1.5 * values, 0.0), values != 0.0)
     np.testing.assert_allclose(found[values != 0.0], values[values != 0.0], rtol=0.03)
-    left = [np.sqrt(np.mean(model.residuals(j, found[None]) ** 2)) for j in model.joints]
+    left = [np.sqrt(np.mean(one**2)) for one in model.all_residuals(found)]
     assert max(left) < 2.0 * COUNT / np.sqrt(12.0)
 
 
@@ -104,8 +105,9 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     ratio = ratios(point)
     assert (ratio >= 1.0).all()
     assert ratio.max() > 1.5  # rounded readings of a slow joint err together
-    gram = deflated(point, ratio)
-    white = deflated(point, np.ones(len(ratio)))
+    readings = worth(point, ratio)
+    gram = deflated(point, ratio, readings)
+    white = deflated(point, np.ones(len(ratio)), readings)
     np.testing.assert_allclose(np.diag(gram.matrix) * ratio, np.diag(white.matrix), rtol=1e-9)
     found = np.linalg.lstsq(white.matrix, white.vector, rcond=1e-13)[0]
     near = 1e-3 * np.abs(gram.vector).max()
@@ -130,7 +132,7 @@ def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(
     for name in ("white", "together"):
         parts = []
         for joint in model.joints:
-            rows = model.rows(joint, values)
+            rows = model.rows((joint,), values)[0]
             each = draw.normal(size=model.clusters)[rows.motion]
             left = each if name == "together" else draw.normal(size=len(rows.residual))
             parts.append(Part.of(replace(rows, residual=left), values, model.clusters))
@@ -142,28 +144,111 @@ def test_repeated_motions_bring_no_more_evidence_than_their_number_by_the_ratio(
 
 def test_what_is_needed_lowers_the_loss_of_motions_held_out(known):
     _, model, values = known
-    point = Point.at(model, values)
-    whole = held_out_loss(point, values != 0.0).sum()
-    for effect, joint in TRUE:
-        less = values != 0.0
-        less[model.index(effect, joint)] = False
-        assert held_out_loss(point, less).sum() > 1.1 * whole, (effect, joint)
+    scales = Scales.of(Point.at(model, values))
+    whole = scales.fitted(values != 0.0, values)
+    for one in scales.others(whole, [(without(whole.active, b), values) for b in whole.own]):
+        assert one.left_out.sum() > 1.1 * whole.left_out.sum()
+        assert one.log_evidence < whole.log_evidence - 3.0
 
 
+def test_sets_near_one_weigh_as_if_they_stood_alone(known):
+    """A joint whose parameters are no others is not fitted again, and one that is asked twice is fitted once."""
+    _, model, values = known
+    scales = Scales.of(Point.at(model, values))
+    whole = scales.fitted(values != 0.0, values)
+    lag, coulomb = model.index("lag", 1), model.index("coulomb", 0)
+    sets = [without(whole.active, lag), without(without(whole.active, lag), coulomb)]
+    near = scales.others(whole, [(one, values) for one in sets])
+    for active, one in zip(sets, near, strict=True):
+        alone = scales.fitted(active, values)
+        np.testing.assert_array_equal(one.active, active)
+        np.testing.assert_allclose(one.point.values, alone.point.values, rtol=0.02, atol=1e-5)
+        assert one.log_evidence == pytest.approx(alone.log_evidence, abs=0.5)
+    again = scales.others(whole, [(sets[0], values)])[0]
+    assert again.point.rows[1] is near[0].point.rows[1]
+    assert again.point.rows[0] is whole.point.rows[0]
+
+
+def test_two_motions_that_differ_tell_their_mean_no_better_than_they_differ():
+    """Of two, one degree of freedom: the ± of their mean is beyond the difference, and that of four alike far below."""
+    lags = (0.05, 0.062)
+    logs = [driven({("lag", 0): lag, ("coulomb", 0): 0.006}, 4, joints=("joint_1",))[0] for lag in lags]
+    found = {}
+    for name, motions in (("apart", (logs[0].motions[0], logs[1].motions[1])), ("alike", logs[0].motions)):
+        model = ServoModel(replace(logs[0], motions=motions))
+        active = np.array([one.effect in ("lag", "coulomb") for one in model.parameters])
+        scales = Scales.of(Point.at(model, np.where(active, model.start(), 0.0)))
+        found[name] = scales.fitted(active, model.start()).deviations[model.index("lag", 0)]
+    assert lags[1] - lags[0] < found["apart"] < 10.0 * (lags[1] - lags[0])
+    assert found["alike"] < 0.2 * (lags[1] - lags[0])
+
+
+def smooth(world):
+    """A world without commands that jump, at which servos saturate."""
+    commands = np.stack([one for one, kind in zip(world.commands, world.kinds, strict=True) if kind != "steps"])
+    return replace(world, commands=commands, kinds=tuple(kind for kind in world.kinds if kind != "steps"))
+
+
+def test_an_arm_that_moves_fast_is_simulated_as_mujoco_does_by_runge_kutta():
+    """Inertial, Coriolis and gravity torques couple the joints; what remains is the encoder's count."""
+    world = draw_world(np.random.default_rng(11), 4, 5)
+    world = smooth(replace(world, step=2e-4, explicit=True))
+    model = ServoModel(world.log(world.simulated(Fault("nothing"))))
+    none = np.zeros(len(model.parameters))
+    model.refreshed(none)
+    moved = np.ptp(model.measured, axis=0).max()
+    left = max(float(np.sqrt(np.mean(one**2))) for one in model.all_residuals(none))
+    assert left < world.count < 1e-3 * moved
+
+
+@pytest.mark.parametrize("step", [1e-3, 2e-3])
+def test_time_steps_of_semi_implicit_euler_are_told_by_the_error_they_make(step):
+    world = smooth(replace(draw_world(np.random.default_rng(12), 3, 5), step=step, explicit=False))
+    model = ServoModel(world.log(world.simulated(Fault("nothing"))))
+    own = np.array([one.effect == "step" for one in model.parameters])
+    model.refreshed(np.where(own, step, 0.0))
+    found = fit(model, np.zeros(len(own)), own)
+    assert found[own][0] == pytest.approx(step, rel=0.1)
+    none = np.zeros(len(own))
+    before, after = (sum((one**2).mean() for one in model.all_residuals(x)) for x in (none, found))
+    rounding = 3 * world.count**2 / 12.0
+    assert after - rounding < 0.1 * (before - rounding)
+
+
+def short(name, joint=0, size=0.0, seed=5):
+    """A short log of a world of three joints with a fault."""
+    world = draw_world(np.random.default_rng(seed), 3, 9)
+    world = replace(world, commands=world.commands[:, :300])
+    return world.log(world.simulated(Fault(name, joint, size)))
+
+
+@pytest.mark.slow
 def test_what_is_asked_of_a_choice_changes_no_probability():
     """Of a short log, in which a dead zone does what friction does, and nobody asked for it."""
-    world = draw_world(np.random.default_rng(5), 3, 9)
-    world = replace(world, commands=world.commands[:, :300])
-    model = ServoModel(world.log(world.simulated(Fault("coulomb", 0, 0.05))))
+    model = ServoModel(short("coulomb", size=0.05))
     names = np.array([one.effect for one in model.parameters])
     choice = select(model, names != "dead_zone", lambda _: None)
     told = [choice.probability(p) for p in range(len(names))]
     own = np.flatnonzero(choice.active).tolist()
     rivals = {names[k] for p in own for k in choice.alternatives(p)}
     assert "coulomb" in names[own]
-    assert all(choice.odds(p) > 0.0 for p in own)
+    for p in own:
+        assert choice.own.log_evidence > choice.fewer(p).log_evidence + np.log(9.0)
     assert [choice.probability(p) for p in range(len(names))] == told
     assert "dead_zone" not in rivals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "joint", "size"), [("nothing", -1, 0.0), ("delay", -1, 0.04), ("zero", 1, 0.02),
+                                                     ("coulomb", 0, 0.05)])  # fmt: skip
+def test_what_is_told_is_as_probable_as_anything_that_was_weighed(name, joint, size):
+    """Rivals of a fit that were weighed on a line through it had all the probability, and what was told none."""
+    found = diagnose_motion(short(name, joint, size))
+    assert found.probability > 0.05
+    for one in found.effects:
+        if one.status == "confounded":
+            assert one.probability < 0.9
+            assert one.confounded_with
 
 
 @pytest.mark.slow

@@ -15,22 +15,20 @@ STEP = 0.02
 def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, **numbers):
     """Position after a step of the command (or a table of stamps and values), and its instants."""
     times, values = (np.array([0.0]), np.array([command])) if np.isscalar(command) else map(np.asarray, command)
-    times = np.append(times, times[-1] + 2 * seconds)
-    values = np.append(values, values[-1]).astype(float)
-    integral = np.column_stack([np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))]), values])
+    values = values.astype(float)
     n = round(seconds / STEP) + 1
     row = np.zeros(len(PARAMETERS))
     row[PARAMETERS.index("low")], row[PARAMETERS.index("high")] = -np.inf, np.inf
     for name, value in numbers.items():
         row[PARAMETERS.index(name)] = value
-    flat = np.ones((1, n))
-    around = load * flat, slope * flat[0], 0.0 * flat[0], 0.0 * flat
+    loads, none, slopes = np.zeros((3, n, 1)), np.zeros((2, n, 1, 1)), np.zeros((2, n, 1, 1))
+    loads[0], slopes[0] = load, slope
+    around = loads, none, slopes, none, np.zeros((n, 1)), np.zeros((n, 1))
     grid = np.array([0, n]), np.zeros(1)
-    ends = np.array([0, len(times)])
-    found = simulate(
-        row[None], np.ones((1, 1)), grid, (times, integral, ends), around, np.array([start]), STEP, substeps
-    )
-    return found[0], STEP * np.arange(n)
+    ends = np.array([[0, len(times)]])
+    command = times, values, ends
+    found = simulate(row[None, None], np.zeros((1, 2)), grid, command, around, np.array([[start]]), STEP, substeps)
+    return found[0, :, 0], STEP * np.arange(n)
 
 
 def test_lag_follows_its_exponential():
@@ -121,6 +119,6 @@ def test_breakaway_is_above_sliding_friction():
 
 def test_without_numba_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(servo, "find_spec", lambda name: None)
-    servo._kernel.cache_clear()
+    servo._kernels.cache_clear()
     with pytest.raises(EstimationError, match=r"thermal-robot\[fast\]"):
         moved(lag=0.05)

@@ -233,7 +233,7 @@ def test_what_the_mjcf_holds_is_in_the_nominal_model_and_stays_when_more_is_writ
         left = {}
         for told, model in (("stated", ServoModel(log)), ("not", ServoModel(replace(log, servos=world.arm.servos)))):
             model.refreshed(np.zeros(len(model.parameters)))
-            left[told] = rms(model.residuals(JOINT, np.zeros((1, len(model.parameters))))[0])
+            left[told] = rms(model.all_residuals(np.zeros(len(model.parameters)))[JOINT])
         assert left["stated"] < 0.3 * left["not"], name
     more = found_of(replace(log, servos=servos), {"armature": 0.01 / servos[log.joints[JOINT]].kp})
     assert causes(more)[JOINT].torque("armature") == pytest.approx(0.02)
@@ -244,5 +244,5 @@ def test_a_delay_that_is_stated_is_no_effect():
     log = world.log(world.simulated(Fault("delay", -1, 0.03)))
     stated = {joint: replace(servo, delay=0.03) for joint, servo in log.servos.items()}
     late, known = (ServoModel(replace(log, servos=servos)) for servos in (log.servos, stated))
-    one, other = (rms(model.residuals(JOINT, np.zeros((1, len(model.parameters))))[0]) for model in (late, known))
+    one, other = (rms(model.all_residuals(np.zeros(len(model.parameters)))[JOINT]) for model in (late, known))
     assert other < 0.1 * one

@@ -17,20 +17,16 @@ from thermal_robot.kinematics.model import held_at
 
 @dataclass(frozen=True, eq=False)
 class Loads:
-    """Joint torques and own inertias (2, n, J) of J joints along n configurations, N·m and kg·m², and slopes, N·m/rad.
+    """Bias torques (2, n, J), N·m, mass matrices, and derivatives of the torques by position and by velocity.
 
-    The first of the two is of the model, the second of 1 kg of payload; ``slope`` (n, J): derivative of the model's
-    static torque by the joint's own position.
+    The first of the two is of the model, the second of 1 kg of payload. ``inertia``, kg·m², ``slope``, N·m/rad, and
+    ``drag``, N·m·s/rad, are (2, n, J, J), or (2, n, J) where they hold the matrices' diagonals alone.
     """
 
     torque: Array
     inertia: Array
     slope: Array
-
-    def towards(self, other: Loads, share: float) -> Loads:
-        """Interpolate linearly: the loads a ``share`` of the way from these to the others."""
-        pairs = ((self.torque, other.torque), (self.inertia, other.inertia), (self.slope, other.slope))
-        return Loads(*(one + share * (two - one) for one, two in pairs))
+    drag: Array
 
 
 class Dynamics:
@@ -52,9 +48,9 @@ class Dynamics:
         com = frame.placement.act(payload)
         bodies = {model.names[j]: model.inertias[j] for j in range(1, model.njoints) if model.inertias[j].mass > 0.0}
         self.bodies: dict[str, Array] = {name: one.toDynamicParameters() for name, one in bodies.items()}
-        models = [model, model.copy()]
-        models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
-        self._pools = [pin.ModelPool(one, threads()) for one in models]
+        self.models = [model, model.copy()]
+        self.models[1].inertias[frame.parentJoint] += pin.Inertia(1.0, com, np.zeros((3, 3)))
+        self._pools = [pin.ModelPool(one, threads()) for one in self.models]
 
     def configurations(self, q: Array) -> Array:
         """(nq, n) Pinocchio's configurations of the joints' positions (n, J)."""
@@ -63,34 +59,40 @@ class Dynamics:
             whole[at : at + width] = value if width == 1 else (np.cos(value), np.sin(value))
         return np.asfortranarray(whole)
 
-    def along(self, q: Array, v: Array | None = None, a: Array | None = None, whole: bool = False) -> Loads:
-        """Return the loads along configurations (n, J), at rest unless velocities and accelerations are given.
+    def along(self, q: Array, v: Array) -> Loads:
+        """Return what loads the joints at configurations and velocities (n, J) without acceleration."""
+        shape = 2, len(q), len(self.at)
+        found = Loads(np.empty(shape), *(np.empty((*shape, shape[-1])) for _ in range(3)))
+        own, still = np.ix_(self.at, self.at), np.zeros(self.model.nv)
+        every, speed = self.configurations(q), np.zeros((self.model.nv, len(q)), order="F")
+        speed[self.at] = v.T
+        for k, model in enumerate(self.models):
+            data = model.createData()
+            for n in range(len(q)):
+                slope, drag, mass = pin.computeRNEADerivatives(model, data, every[:, n], speed[:, n], still)
+                found.torque[k, n], found.inertia[k, n] = data.tau[self.at], mass[own]
+                found.slope[k, n], found.drag[k, n] = slope[own], drag[own]
+        found.inertia[:] = np.triu(found.inertia) + np.triu(found.inertia, 1).swapaxes(2, 3)  # the upper half is set
+        for one in (found.torque, found.inertia, found.slope, found.drag):
+            one[1] -= one[0]
+        return found
 
-        At rest they are computed a small turn apart, and linear between. A joint's own acceleration is not in them, as
-        it is the servo's business, unless they are ``whole``.
+    def at_rest(self, q: Array) -> Loads:
+        """Return what loads the joints at rest along configurations (n, J), of matrices the diagonals.
+
+        They are computed a small turn apart, and linear between.
         """
-        if v is None and len(q) > 1:
-            way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
-            apart = np.flatnonzero(np.diff(np.floor(way / settings.LOAD_STEP), prepend=-1.0, append=np.inf)[:-1])
-            apart = np.union1d(np.union1d(apart, np.maximum(apart - 1, 0)), [len(q) - 1])
-            if len(apart) < len(q) // 2:
-                few, at = self.along(q[apart]), way[apart]
-                return Loads(*(_between(way, at, one) for one in (few.torque, few.inertia, few.slope)))
-        rest, joints = np.zeros_like(q), range(q.shape[1])
-        v, a = rest if v is None else v, rest if a is None else a
-        units = [np.broadcast_to(np.arange(len(joints)) == j, q.shape).astype(float) for j in joints]
-        each = [self._torques(k, q, v, a) for k in range(len(self._pools))]
-        torque = np.stack([each[0], *(one - each[0] for one in each[1:])])
-        if whole:
-            return Loads(torque, np.zeros_like(torque), rest)
-        inertia, still = np.zeros_like(torque), [self._torques(k, q, rest, rest) for k in (0, 1)]
-        for j in joints:
-            one, more = (self._torques(k, q, rest, units[j])[:, j] - still[k][:, j] for k in (0, 1))
-            inertia[0, :, j], inertia[1, :, j] = one, more - one
-        torque[:2] -= inertia[:2] * a
-        step = settings.ANGLE_STEP
-        moved = [self._torques(0, q + step * units[j], rest, rest)[:, j] - still[0][:, j] for j in joints]
-        return Loads(torque, inertia, np.stack(moved, axis=1) / step)
+        way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
+        apart = np.flatnonzero(np.diff(np.floor(way / settings.LOAD_STEP), prepend=-1.0, append=np.inf)[:-1])
+        apart = np.union1d(np.union1d(apart, np.maximum(apart - 1, 0)), [len(q) - 1])
+        few = self.along(q[apart], np.zeros((len(apart), q.shape[1])))
+        own = (np.diagonal(one, axis1=2, axis2=3) for one in (few.inertia, few.slope, few.drag))
+        return Loads(*(_between(way, way[apart], one) for one in (few.torque, *own)))
+
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """(2, n, J) torques, N·m, of the model and of 1 kg of payload, at positions, velocities and accelerations."""
+        first, second = (self._torques(k, q, v, a) for k in (0, 1))
+        return np.stack([first, second - first])
 
     def _torques(self, k: int, q: Array, v: Array, a: Array) -> Array:
         """(n, J) torques of the k-th model by the recursive Newton-Euler algorithm."""

@@ -22,7 +22,7 @@ from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
-from thermal_robot.motion.select import Choice, held_out_loss, select
+from thermal_robot.motion.select import Choice, select
 from thermal_robot.motion.torque import TorqueModel
 
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
@@ -68,7 +68,7 @@ def diagnose_motion(
     log = sound.log.with_joints(sound.joints)
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
-    allowed = np.array([one.effect in kept for one in model.parameters])
+    allowed = np.array([one.effect in kept or one.effect not in ALL for one in model.parameters])
     choice = select(model, allowed, progress)
     refused = _gate(choice)
     if refused:
@@ -132,27 +132,24 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
     findings, shares = _findings(choice, before, weights)
     unexplained = _unexplained(choice)
-    told = not unexplained.flagged or shrinkage >= settings.MOST
-    verdict = tuple(one.name for one in findings if told and one.status in ("found", "confounded"))
-    weights_of = zip(*choice.search.probabilities(), strict=True)
-    names = [({model.parameters[b].effect for b in one.blocks}, weight) for one, weight in weights_of]
-    best = {model.parameters[b].effect for b in choice.best.blocks}
-    probability = total_probability([weight for effects, weight in names if effects == best])
+    most = not unexplained.flagged or shrinkage >= settings.MOST
+    verdict = tuple(one.name for one in findings if most and one.status in ("found", "confounded"))
+    alike = [w for one, w in choice.weights if not (one.effects ^ choice.own.effects) & set(ALL)]
+    probability = total_probability(alike)
     values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
-    curves = {name: model.curves(j, point.values) for j, name in enumerate(log.joints)}
+    curves = model.curves(point.values)
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, probability, unexplained, values, curves,
-        warnings=log.notes, shares=shares, unit=model.unit, moves=model.moves(point.values),
+        warnings=(*log.notes, *_simulator(choice)), shares=shares, unit=model.unit, moves=model.moves(point.values),
     )  # fmt: skip
 
 
 def _findings(choice: Choice, before: list[Array], weights: Array) -> tuple[tuple[Finding, ...], dict[str, float]]:
     """Return a finding for every effect, largest held-out share first, and the share of the squared gap by joint."""
-    point, model, deviations = choice.point, choice.point.model, choice.deviations()
+    point, model, deviations = choice.point, choice.point.model, choice.own.deviations
     whole = sum(float(w * (one**2).sum()) for one, w in zip(before, weights, strict=True))
-    scale = np.array([point.noise[j] ** 2 * weights[j] for j in model.joints]) / max(whole, 1e-300)
-    base = held_out_loss(point, choice.active)
-    share = {b: (held_out_loss(point, choice.without(b)) - base).sum(axis=1) * scale for b in choice.best.blocks}
+    scale = weights / max(whole, 1e-300)
+    share = {b: (choice.fewer(b).left_out - choice.own.left_out) * scale for b in choice.own.own.tolist()}
     found = [_finding(choice, name, share, deviations) for name in ALL]
     found.sort(key=lambda one: (-(one.shrinkage or 0.0), one.status not in ("found", "confounded")))
     joints = {
@@ -173,7 +170,7 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     probability = max(choice.probability(p) for p in own)
     if not active:
         return Finding(name, "not_found", probability, 0.0, title=title)
-    rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} - {name}
+    rivals = {model.parameters[k].effect for p in active for k in choice.alternatives(p)} & set(ALL) - {name}
     places, estimates = dict[str, float](), []
     for p, one, joint in ((p, model.parameters[p], model.joint_of(model.parameters[p])) for p in active):
         called = f"{one.label}, {joint}" if joint else one.label
@@ -187,6 +184,15 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
         confounded_with=tuple(sorted(rivals)) if status == "confounded" else (),
         locations=tuple(Location("joint", *one) for one in sorted(places.items(), key=lambda one: -one[1])),
     )  # fmt: skip
+
+
+def _simulator(choice: Choice) -> list[str]:
+    """Return a sentence about the integrator of the simulator that the log seems to come from, if any."""
+    at = choice.point.model.index("step")
+    if at is None or not choice.active[at]:
+        return []
+    told = 1e3 * choice.point.values[at], 1e3 * choice.own.deviations[at]
+    return ["the log looks simulated by semi-implicit Euler in steps of {:.2g} ± {:.1g} ms".format(*told)]
 
 
 def _unexplained(choice: Choice) -> Unexplained:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from thermal_robot.inference.evidence import Gram
 from thermal_robot.motion import settings
 from thermal_robot.motion.following import slope
 from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
+
+Groups = Sequence[Sequence[int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +75,17 @@ class Point:
     rows: list[Part]
 
     @classmethod
-    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None) -> Point:
-        """Linearise the model at some values by the parameters of the mask ``wanted``, by default all."""
+    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None, groups: Groups | None = None) -> Point:
+        """Linearise the model at some values by the parameters of the mask ``wanted``, by default all.
+
+        With ``groups`` it has the rows of these joints alone.
+        """
         count = model.clusters
-        return cls(model, values, model.each(lambda joint: Part.of(model.rows(joint, values, wanted), values, count)))
+
+        def parts(group: Sequence[int]) -> list[Part]:
+            return [Part.of(one, values, count) for one in model.rows(group, values, wanted)]
+
+        return cls(model, values, model.by_joint(parts, groups))
 
     @property
     def noise(self) -> Array:
@@ -93,64 +102,101 @@ class Point:
         return matrix, vector, np.array([one.total for one in self.rows])
 
 
-def fit(model: JointModel, values: Array, active: Mask, motions: Mask | None = None) -> Array:
+def fit(
+    model: JointModel, values: Array, active: Mask, motions: Mask | None = None, groups: Groups | None = None
+) -> Array:
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
     The prior counts as much as one independent reading. ``motions`` (M,) are the clusters that are fitted, by default
-    all.
+    all. Of some ``groups`` of joints only their own parameters move.
     """
+    some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
     values = np.where(active, values, 0.0)
     joint_of = np.array([one.joint for one in model.parameters])
+    positive = np.array([one.positive for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
-    used = [motions[model.motion_of(joint)] for joint in model.joints]
-    common = active & (joint_of == SHARED)
-    quiet = 0
+    common = active & (joint_of == SHARED) & (not some)
+    inside = active & np.isin(joint_of, [j for group in groups for j in group])
+    quiet, alone = 0, len(groups) == 1
     for number in range(settings.ROUNDS):
         # joints go their own ways first; what they share moves in every second round
-        shared = bool(common.any()) and number % 2 == 1
-        now = active if shared else active & ~common
+        shared = alone or (bool(common.any()) and number % 2 == 1)
+        now = inside | common if shared else inside
         own = np.flatnonzero(now)
         if not len(own):
             continue
-        point = Point.at(model, values, now)
+        point = Point.at(model, values, now, groups)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        sets = np.vstack([values, _ahead(model, values, own, matrix, vector)])
-        costs = _costs(model, sets, used, point.noise)
-        before, least = costs[:, 0].sum(), costs.min(axis=1).sum()
-        if shared:
-            whole = costs.sum(axis=0)
-            values, least = sets[np.argmin(whole)], whole.min()
-        else:
-            values = values.copy()
-            for j, cost in enumerate(costs):
-                values[joint_of == j] = sets[np.argmin(cost)][joint_of == j]
-        quiet = quiet + 1 if before - least < settings.SETTLED * before else 0
-        if quiet > common.any():
+        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0
+        # as one where a shared parameter moves, else each group by itself
+        sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
+        parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
+        cost = _Cost(model, groups, point, motions)
+        least = before = parts @ cost.of(values)
+        found, better = values.copy(), np.zeros(len(sets), dtype=bool)
+        for damping in settings.DAMPINGS:
+            ahead = values.copy()
+            ahead[own], promised = _ahead(problem, values[own], positive[own], damping)
+            if damping == 0.0 and promised < settings.SETTLED * before.sum():
+                break
+            costs = parts @ cost.of(ahead)
+            for k in np.flatnonzero(~better & (costs < least)):
+                found[sets[k]], better[k] = ahead[sets[k]], True
+            least = np.where(better, np.minimum(least, costs), least)
+            if better.all():
+                break
+        values = found
+        quiet = quiet + 1 if (before - least).sum() < settings.SETTLED * before.sum() else 0
+        if quiet > (common.any() and not alone):
             break
     return values
 
 
-def _ahead(model: JointModel, values: Array, own: Any, matrix: Array, vector: Array) -> Array:
-    """(S, P) values after one Levenberg-Marquardt step for each damping, by least squares with bounds at zero."""
-    lower = np.where([model.parameters[p].positive for p in own], 0.0, -np.inf)
-    found = np.tile(values, (len(settings.DAMPINGS), 1))
-    inside = matrix[np.ix_(own, own)]
-    for one, damping in zip(found, settings.DAMPINGS, strict=True):
-        whole = inside + np.diag(damping * np.diag(inside) + model.sizes[own] ** -2.0)
-        root = np.linalg.cholesky(whole)
-        pull = np.linalg.solve(root, vector[own] + damping * np.diag(inside) * values[own])
-        one[own] = lsq_linear(root.T, pull, bounds=(lower, np.inf), method="bvls").x
-    return found
+def _ahead(problem: tuple[Array, Array, Array], here: Array, positive: Mask, damping: float) -> tuple[Array, float]:
+    """Return values (K,) after a Levenberg-Marquardt step, bounded at zero, and by how much −2 log posterior falls.
 
-
-def _costs(model: JointModel, sets: Array, used: list[Mask], noise: Array) -> Array:
-    """(J, S) −2 log posterior of S sets of parameters, by joint: squared residuals over noise, and the prior's squares.
-
-    A parameter's prior counts in its joint, that of a shared parameter in the last joint.
+    ``problem``: information (K, K), right side (K,) and the priors' precisions (K,).
     """
-    found = np.stack(model.each(lambda j: (model.residuals(j, sets)[:, used[j]] ** 2).sum(axis=1) / noise[j] ** 2))
-    np.add.at(found, [one.joint for one in model.parameters], ((sets / model.sizes) ** 2).T)
-    return found
+    inside, along, prior = problem
+    whole = inside + np.diag(damping * np.diag(inside) + prior)
+    root = np.linalg.cholesky(whole)
+    pull = np.linalg.solve(root, along + damping * np.diag(inside) * here)
+    found = np.asarray(lsq_linear(root.T, pull, bounds=(np.where(positive, 0.0, -np.inf), np.inf), method="bvls").x)
+    cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
+    return found, float(cost[0] - cost[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Cost:
+    """−2 log posterior by group of joints: squares over the noise at a point, of some motions, and the prior's squares.
+
+    A parameter's prior counts in its joint's group, that of a shared parameter in the last one.
+    """
+
+    model: JointModel
+    groups: Groups
+    point: Point
+    motions: Mask
+
+    def of(self, values: Array) -> Array:
+        """(G,) costs at values (P,)."""
+        order = sorted(j for group in self.groups for j in group)
+        noise, model = dict(zip(order, self.point.noise, strict=True)), self.model
+
+        def of_group(group: Sequence[int]) -> float:
+            if values is self.point.values:
+                left = [self.point.rows[order.index(j)].residual for j in group]
+            else:
+                left = [one[0] for one in model.residuals(group, values[None])]
+            used = (one[self.motions[model.motion_of(j)]] for j, one in zip(group, left, strict=True))
+            return float(sum((one**2).sum() / noise[j] ** 2 for j, one in zip(group, used, strict=True)))
+
+        found = np.array(model.each(of_group, self.groups))
+        place = {j: k for k, group in enumerate(self.groups) for j in group} | {SHARED: len(found) - 1}
+        for value, one in zip(values, model.parameters, strict=True):
+            if one.joint in place:
+                found[place[one.joint]] += (value / one.size) ** 2
+        return found
 
 
 def ratios(point: Point) -> Array:
@@ -172,7 +218,12 @@ def ratios(point: Point) -> Array:
     return found
 
 
-def deflated(point: Point, deflation: Array) -> Gram:
+def worth(point: Point, deflation: Array) -> Array:
+    """(J,) number of independent readings that each joint's are worth, by the median ratio of its parameters."""
+    return np.array([len(one.residual) / float(np.median(deflation[one.columns])) for one in point.rows])
+
+
+def deflated(point: Point, deflation: Array, worth: Array) -> Gram:
     """Return normal equations in units of prior sizes, deflated to the independent information of the motions.
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
@@ -184,8 +235,7 @@ def deflated(point: Point, deflation: Array) -> Gram:
     less = np.diag(sizes / np.sqrt(deflation))
     whole = less @ matrix @ less
     along = whole @ (found / sizes)
-    each = [float(np.median(deflation[one.columns])) for one in point.rows]
-    equations = sum(len(one.residual) / ratio for one, ratio in zip(point.rows, each, strict=True))
+    equations = float(worth.sum())
     k = range(len(sizes))
     return Gram(
         whole,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Mask = NDArray[np.bool_]
+T = TypeVar("T")
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -62,11 +63,13 @@ class JointModel(ABC):
     """Base class of models of a log's joints: parameters by name, and functions of every joint run in threads."""
 
     parameters: tuple[Parameter, ...] = ()
+    groups: tuple[tuple[int, ...], ...]  # of joints that move each other
     motions: list[NDArray[np.int64]]  # of each joint the motions (N,) of its readings
     unit = "rad"
 
     def __init__(self, log: MotionLog) -> None:
         self.log, self.joints = log, range(len(log.joints))
+        self.groups = tuple((j,) for j in self.joints)
         self.servos = [log.servo(name) for name in log.joints]
         payload, robot = log.payload[1] if log.payload else np.zeros(3), log.robot
         self.dynamics = Dynamics(robot.urdf, log.joints, robot.tool_frame, robot.model.gravity.linear, payload)
@@ -106,9 +109,9 @@ class JointModel(ABC):
         """Return the index of the first parameter of an effect in a joint, ``None`` where there is none."""
         return next((p for p, one in enumerate(self.parameters) if (one.effect, one.joint) == (effect, joint)), None)
 
-    def own(self, joint: int, wanted: Mask | None = None) -> NDArray[np.int64]:
-        """Return indices of a joint's parameters and of those that all joints share, within the mask ``wanted``."""
-        places = [p for p, one in enumerate(self.parameters) if one.joint in (joint, SHARED)]
+    def own(self, joints: Collection[int], wanted: Mask | None = None) -> NDArray[np.int64]:
+        """Return indices of the joints' parameters and of those that all joints share, within the mask ``wanted``."""
+        places = [p for p, one in enumerate(self.parameters) if one.joint in (*joints, SHARED)]
         return np.array([p for p in places if wanted is None or wanted[p]], dtype=np.int64)
 
     def payload(self, torque: Array) -> Parameter:
@@ -127,12 +130,12 @@ class JointModel(ABC):
         """Recompute the loads along the positions that the parameters (P,) give."""
 
     @abstractmethod
-    def residuals(self, joint: int, values: Array) -> Array:
-        """(S, N) measured minus model of a joint for S sets (S, P) of all parameters."""
+    def residuals(self, group: Sequence[int], values: Array) -> list[Array]:
+        """Residual (S, N) of each joint of a group, measured minus model, for S sets (S, P) of all parameters."""
 
     @abstractmethod
-    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
-        """Return residual and model derivatives of a joint at the parameters (P,), by those of ``wanted``."""
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
+        """Return residual and derivatives of each joint of a group at the parameters (P,), by those of ``wanted``."""
 
     @abstractmethod
     def noise(self, joint: int) -> float:
@@ -152,47 +155,62 @@ class JointModel(ABC):
         rest = {name: told[name] for name in ("velocity", "load", "time")}
         return {f"the position of {self.log.joints[joint]}": told["position"], **rest}
 
-    def curves(self, joint: int, values: Array) -> pd.DataFrame:
-        """Table of a joint's command, measurement, load and simulations; ``nominal`` is without any effect."""
+    def curves(self, values: Array) -> dict[str, pd.DataFrame]:
+        """Tables of each joint's command, measurement, load and simulations; ``nominal`` is without any effect."""
         import pandas as pd
 
-        told = self.readings(joint)
-        nominal, simulated = told["measured"] - self.residuals(joint, np.stack([np.zeros_like(values), values]))
-        given = {name: told[name] for name in ("time", "command", "measured")}
-        more = {"nominal": nominal, "simulated": simulated, "load": told["load"]}
-        return pd.DataFrame({"motion": self.motions[joint], **given, **more})
+        found, sets = {}, np.stack([np.zeros_like(values), values])
+        for joint, left in zip(self.joints, self.by_joint(lambda group: self.residuals(group, sets)), strict=True):
+            told = self.readings(joint)
+            nominal, simulated = told["measured"] - left
+            given = {name: told[name] for name in ("time", "command", "measured")}
+            more = {"nominal": nominal, "simulated": simulated, "load": told["load"]}
+            found[self.log.joints[joint]] = pd.DataFrame({"motion": self.motions[joint], **given, **more})
+        return found
+
+    def moved(self, values: Array, places: NDArray[np.int64]) -> Array:
+        """Local sensitivity (K, J): rms change of each joint's model as each parameter of ``places`` (K,) is zero."""
+        sets = np.tile(values, (1 + len(places), 1))
+        sets[1 + np.arange(len(places)), places] = 0.0
+        each = self.by_joint(lambda group: self.residuals(group, sets))
+        return np.stack([np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1)) for left in each], axis=1)
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
-        """Local sensitivity: rms change of each joint's simulation as one effect is set to zero, in the gap's unit.
+        """Rms change of each joint's model as an effect in it is set to zero, in the gap's unit, by effect and joint.
 
-        Keys are effect and joint; a shared effect has every joint. Parameters at zero in the values (P,) are left out.
+        A shared effect has every joint; of several parameters of an effect the largest counts.
         """
+        places, found = np.flatnonzero(values), dict[tuple[str, str], float]()
+        for p, sizes in zip(places, self.moved(values, places), strict=True):
+            one = self.parameters[p]
+            for joint in self.joints if one.joint == SHARED else (one.joint,):
+                key = one.effect, self.log.joints[joint]
+                found[key] = max(found.get(key, 0.0), float(sizes[joint]))
+        return found
 
-        def of_joint(joint: int) -> dict[tuple[str, str], float]:
-            own = self.own(joint, values != 0.0)
-            effects = list(dict.fromkeys(self.parameters[p].effect for p in own))
-            sets = np.tile(values, (1 + len(effects), 1))
-            for p in own:
-                sets[1 + effects.index(self.parameters[p].effect), p] = 0.0
-            left = self.residuals(joint, sets)
-            sizes = np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1))
-            return {(name, self.log.joints[joint]): float(x) for name, x in zip(effects, sizes, strict=True)}
+    def each(self, function: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
+        """Apply a function to every item in parallel threads, to a single one at once; return the results in order."""
+        return [function(items[0])] if len(items) == 1 else list(self._pool.map(function, items))
 
-        return {key: size for one in self.each(of_joint) for key, size in one.items()}
-
-    def each(self, function: Callable[[int], Any]) -> list[Any]:
-        """Apply a function to every joint's index in parallel threads; return the results in order."""
-        return list(self._pool.map(function, self.joints))
+    def by_joint(
+        self, function: Callable[[Sequence[int]], list[T]], groups: Sequence[Sequence[int]] | None = None
+    ) -> list[T]:
+        """Apply a function to groups of joints, by default all; return its results for the joints in their order."""
+        groups = groups or self.groups
+        found = self.each(function, groups)
+        told = {j: one for group, each in zip(groups, found, strict=True) for j, one in zip(group, each, strict=True)}
+        return [told[j] for j in sorted(told)]
 
     def all_residuals(self, values: Array) -> list[Array]:
         """Residual (N,) of every joint at the parameters (P,)."""
-        return self.each(lambda joint: self.residuals(joint, values[None])[0])
+        return self.by_joint(lambda group: [one[0] for one in self.residuals(group, values[None])])
 
 
 class ServoModel(JointModel):
     """Residual and derivative of a log's encoder readings by the parameters of the servo model.
 
-    Parameters of one joint are independent of those of another, but for the loads that masses bring.
+    Joints whose servos are all stated move each other, as one multibody system. Else each goes its own way, and what
+    loads it is the arm's weight.
     """
 
     def __init__(self, log: MotionLog) -> None:
@@ -202,9 +220,10 @@ class ServoModel(JointModel):
         self.measured = np.concatenate([motion.position.values for motion in log.motions])
         self.reach = np.nanmin(self.measured, axis=0), np.nanmax(self.measured, axis=0)
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
-        self.about = np.clip(self.commanded, *self.reach)
-        self.loads = self.dynamics.along(self.about)
-        self.moving = False
+        if self.coupled:
+            self.groups = (tuple(self.joints),)
+        self.about = self._read() if self.coupled else np.clip(self.commanded, *self.reach)
+        self.loads = self._loads()
         self.lowest = float(self._heights(self.commanded)[0].min())
         self.motions = [samples[3] for samples in self._samples]
         self.parameters = self._parameters()
@@ -230,16 +249,25 @@ class ServoModel(JointModel):
             parts.append(command[np.clip(np.searchsorted(time, grid + 1e-9, side="right") - 1, 0, None)])
         return np.concatenate(parts)
 
+    def _read(self) -> Array:
+        """(n, J) measured positions, linear between readings; a joint without any is where its command is."""
+        found = self.commanded.copy()
+        for k, motion in enumerate(self.log.motions):
+            rows = slice(self.begins[k], self.begins[k + 1])
+            for j in self.joints:
+                time, q = motion.position.of(j)
+                if np.isfinite(q).any():
+                    found[rows, j] = np.interp(self.grid[rows], time[np.isfinite(q)], q[np.isfinite(q)])
+        return found
+
     @cached_property
     def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
-        """Of each joint: stamps of all motions, the command's cumulative integral and value, and motions' begins."""
+        """Of each joint: stamps and values of the command in all motions, and the motions' begins."""
         found = []
         for j in self.joints:
-            each = [motion.command.of(j) for motion in self.log.motions]
-            parts = [np.column_stack([np.concatenate([[0.0], np.cumsum(u[:-1] * np.diff(t))]), u]) for t, u in each]
-            begins = np.concatenate([[0], np.cumsum([len(t) for t, _ in each])]).astype(np.int64)
-            times = np.concatenate([t for t, _ in each])
-            found.append((times, np.ascontiguousarray(np.concatenate(parts)), begins))
+            times, values = zip(*(motion.command.of(j) for motion in self.log.motions), strict=True)
+            begins = np.concatenate([[0], np.cumsum([len(one) for one in times])]).astype(np.int64)
+            found.append((np.concatenate(times), np.concatenate(values), begins))
         return found
 
     @cached_property
@@ -264,6 +292,8 @@ class ServoModel(JointModel):
             for e in EFFECTS
             if e.number not in (("droop",) if servo.kp else ("kp",))
         ]
+        if self.coupled:
+            found.append(Parameter("step", SHARED, "time step", "s", settings.TIME_STEP, 1.0, True, "step"))
         if self.log.robot.has_masses:
             height = "height above the lowest command"
             found.append(self.payload(self.loads.torque[1]))
@@ -298,17 +328,18 @@ class ServoModel(JointModel):
         return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 14) inputs of the simulation and (S, 3) weights of load, payload, contact, for S sets (S, P)."""
+        """(S, 14) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
-        weights = np.zeros((len(values), 3))
-        weights[:, 0] = 1.0
+        weights = np.zeros((len(values), 2))
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
                 x[parameter.number] = values[:, p]
+            elif parameter.number == "step":
+                x["step"] = values[:, p]
             elif parameter.number == "payload":
-                weights[:, 1] = values[:, p]
+                weights[:, 0] = values[:, p]
             elif parameter.number == "contact":
-                weights[:, 2] = values[:, p] - self.touching
+                weights[:, 1] = values[:, p] - self.touching
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.maximum(1.0 + x["kp"], settings.LEAST_STIFFNESS)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
@@ -323,37 +354,64 @@ class ServoModel(JointModel):
         x["high"] = np.where(x["high"] > 0.0, reach[1] - x["high"], np.inf)
         return np.column_stack([x[name] for name in PARAMETERS]), weights
 
-    def positions(self, joint: int, values: Array, free: bool = False) -> Array:
-        """(S, n) simulated positions of a joint on the grid for S sets (S, P); ``free``: without contact."""
-        numbers, weights = self.numbers(joint, values)
-        parts = self.loads.torque[:2, :, joint]
-        contact, pressing = (0.0 if free else 1.0) * np.stack([self.contact[:, joint], self.pressing[:, joint]])
-        loads = np.stack([parts[0] + pressing, parts[1], contact])
-        inertias = np.vstack([self.loads.inertia[:2, :, joint], np.zeros((1, len(self.grid)))])
-        around = loads, self.loads.slope[:, joint].copy(), self.about[:, joint].copy(), inertias
-        begun = [motion.position.of(joint)[1][0] for motion in self.log.motions]
-        start = np.where(np.isfinite(begun), begun, self.commanded[self.begins[:-1], joint])
-        return simulate(
-            numbers, weights, (self.begins, self.first), self._commands[joint], around, start, self.step, self.substeps
+    def positions(self, group: Sequence[int], values: Array, free: bool = False) -> Array:
+        """(S, n, J') simulated positions of a group's joints on the grid, S sets (S, P); ``free``: out of contact."""
+        at, whole = list(group), len(group) > 1
+        each = [self.numbers(j, values) for j in group]
+        loads, parts = np.zeros((3, len(self.grid), len(group))), self.loads
+        loads[:2] = parts.torque[:, :, at]
+        if not free:
+            loads[0] += self.pressing[:, at]
+            loads[2] = self.contact[:, at]
+        matrices = [one if whole else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
+        around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at]
+        start = np.empty((len(self.first), len(group)))
+        for k, motion in enumerate(self.log.motions):
+            begun = [motion.position.of(j)[1][0] for j in group]
+            start[k] = np.where(np.isfinite(begun), begun, self.commanded[self.begins[k], at])
+        commands = [self._commands[j] for j in group]
+        offsets = np.cumsum([0, *(len(times) for times, _, _ in commands[:-1])])
+        command = (
+            np.concatenate([times for times, _, _ in commands]),
+            np.concatenate([values for _, values, _ in commands]),
+            np.array([begins + offset for (_, _, begins), offset in zip(commands, offsets, strict=True)]),
         )
+        numbers = np.ascontiguousarray(np.stack([one for one, _ in each], axis=1))
+        grid = self.begins, self.first
+        return simulate(numbers, each[0][1], grid, command, around, start, self.step, self.substeps)
 
-    def residuals(self, joint: int, values: Array) -> Array:
-        """(S, N) measured minus simulated positions of a joint, rad, at the encoder's own stamps."""
-        measured, at, beyond, _ = self._samples[joint]
-        simulated, left = self.positions(joint, values), np.empty((len(values), len(measured)))
-        for one, own in zip(left, simulated, strict=True):  # one by one, as of all together each term would be large
-            one[:] = measured - (1.0 - beyond) * own[at] - beyond * own[at + 1]
-        return left
+    def path(self, values: Array, free: bool = False) -> Array:
+        """(n, J) simulated positions of all joints on the grid at the parameters (P,); ``free``: without contact."""
+        found = self.by_joint(lambda group: list(self.positions(group, values[None], free)[0].T))
+        return np.stack(found, axis=1)
 
-    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
+    def residuals(self, group: Sequence[int], values: Array) -> list[Array]:
+        """Residual (S, N) of each joint of a group, rad, measured minus simulated positions at the encoder's stamps."""
+        size = settings.TOGETHER if len(self.groups) == 1 else len(values)
+        parts = [slice(k, k + size) for k in range(0, len(values), size)]
+        found = [np.empty((len(values), len(self._samples[joint][0]))) for joint in group]
+
+        def simulated(part: slice) -> None:
+            path = self.positions(group, values[part])
+            for k, joint in enumerate(group):
+                measured, at, beyond, _ = self._samples[joint]
+                for left, own in zip(found[k][part], path[:, :, k], strict=True):  # together each term would be large
+                    left[:] = measured - (1.0 - beyond) * own[at] - beyond * own[at + 1]
+
+        self.each(simulated, parts)
+        return found
+
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
         """Return residual and forward-difference derivatives of the simulation at the parameters (P,)."""
-        own = self.own(joint, wanted)
+        own = self.own(group, wanted)
         steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
-        found = self.residuals(joint, sets)
-        found[1:] = (found[0] - found[1:]) / steps[:, None]
-        return Rows(found[0].copy(), found[1:].T, own, self.motion_of(joint))
+        rows = []
+        for joint, found in zip(group, self.residuals(group, sets), strict=True):
+            found[1:] = (found[0] - found[1:]) / steps[:, None]
+            rows.append(Rows(found[0].copy(), found[1:].T, own, self.motion_of(joint)))
+        return rows
 
     def noise(self, joint: int) -> float:
         """Return a joint's encoder noise, rad: median spacing of distinct readings over √12, at least LEAST_NOISE."""
@@ -373,33 +431,23 @@ class ServoModel(JointModel):
         }
 
     def refreshed(self, values: Array) -> None:
-        """Recompute the loads along the simulated positions; where joints are coupled, with inertial torques.
-
-        Joints wait for each other's accelerations: Jacobi's iteration, relaxed by 2/(J + 1), as the eigenvalues of a
-        positive mass matrix that is scaled by its diagonal lie between 0 and J.
-        """
-        share, rounds = (2.0 / (len(self.joints) + 1), settings.WAVES) if self.coupled else (1.0, 1)
-        for _ in range(rounds):
-            about = np.stack(self.each(lambda joint: self.positions(joint, values[None], free=True)[0]), axis=1)
-            loads = self._loads(about)
-            if self.moving:
-                about, loads = self.about + share * (about - self.about), self.loads.towards(loads, share)
-            self.moving, moved = self.coupled, float(np.abs(about - self.about).max())
-            self.about, self.loads = about, loads
-            if moved < min(self.noise(joint) for joint in self.joints):
+        """Recompute the loads along the simulated positions; where joints are coupled, until these come to rest."""
+        for _ in range(settings.WAVES if self.coupled else 1):
+            about = self.path(values, free=True)
+            moved, self.about = np.sqrt(np.mean((about - self.about) ** 2, axis=0)), about
+            self.loads = self._loads()
+            if (moved < [self.noise(joint) for joint in self.joints]).all():
                 break
         self._press(values)
 
-    def _loads(self, about: Array) -> Loads:
-        """Return the loads along positions (n, J) on the grid; with speeds and accelerations where coupled."""
-        if not self.coupled:
-            return self.dynamics.along(about)
-        speed, rate = np.zeros_like(about), np.zeros_like(about)
+    def _loads(self) -> Loads:
+        """Return the loads in the middle of the steps, and keep as ``reference`` (n, J) position and velocity there."""
+        q, v = self.about.copy(), np.zeros_like(self.about)
         for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
-            if b - a > 2:
-                speed[a:b] = np.gradient(about[a:b], self.step, axis=0)
-                rate[a:b] = np.gradient(speed[a:b], self.step, axis=0)
-        return self.dynamics.along(about, speed, rate)
+            q[a + 1 : b] = 0.5 * (self.about[a : b - 1] + self.about[a + 1 : b])
+            v[a + 1 : b] = np.diff(self.about[a:b], axis=0) / self.step
+        self.reference = q, v if self.coupled else np.zeros_like(v)
+        return self.dynamics.along(q, v) if self.coupled else self.dynamics.at_rest(q)
 
     def _press(self, values: Array) -> None:
         """Compute the frictionless force that keeps the tool on a plane, to which the joints' springs yield.
@@ -410,7 +458,7 @@ class ServoModel(JointModel):
         self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
         if p is None or values[p] <= 0.0:
             return
-        height, slope = self._heights(self.about)
+        height, slope = self._heights(self.reference[0])
         compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
         self.touching = float(values[p])

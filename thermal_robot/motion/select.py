@@ -1,22 +1,23 @@
-"""Backward elimination of servo effects: deflated evidence and the held-out loss of motions decide."""
+"""Stepwise selection of servo effects: evidence at the fit of each set, and the held-out loss of motions, decide."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import total_probability
-from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
-from thermal_robot.motion.fit import Point, deflated, fit, ratios
-from thermal_robot.motion.model import JointModel, Mask
+from thermal_robot.motion.fit import Point, deflated, fit
+from thermal_robot.motion.model import SHARED, JointModel, Mask
+from thermal_robot.motion.weigh import Scales, Weighed
 
-PLAIN = ("zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
+PLAIN = ("step", "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 """Effects that do nothing until they are reached."""
@@ -24,50 +25,48 @@ ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Chosen parameters, the model linearised at their fit, and the search by evidence there.
+    """Chosen set of parameters, and the ``rivals`` that were weighed beside it, all of effects that can be seen."""
 
-    ``active`` (P,) masks those chosen of those ``allowed`` (P,); ``point`` is the model there, ``best`` the combination
-    of largest evidence in ``search``, ``deflation`` (P,) the ratios of clustered to independent variance.
-    """
+    own: Weighed
+    rivals: tuple[Weighed, ...]
 
-    active: Mask
-    allowed: Mask
-    point: Point
-    best: Combination
-    search: Search
-    deflation: Array
+    @property
+    def point(self) -> Point:
+        """The model linearised at the fit of the choice."""
+        return self.own.point
+
+    @property
+    def active(self) -> Mask:
+        """(P,) mask of the chosen parameters."""
+        return self.own.active
+
+    @cached_property
+    def weights(self) -> list[tuple[Weighed, float]]:
+        """Posterior probability of each set, the choice first."""
+        every = (self.own, *self.rivals)
+        log = np.array([one.log_evidence for one in every])
+        weight = np.exp(log - log.max())
+        return list(zip(every, (weight / weight.sum()).tolist(), strict=True))
 
     def probability(self, block: int) -> float:
-        """Posterior probability that a parameter is in the model, summed over the combinations searched."""
-        found = zip(*self.search.probabilities(), strict=True)
-        return total_probability([weight for one, weight in found if block in one.blocks])
+        """Posterior probability that a parameter is in the model, summed over the sets weighed."""
+        return total_probability([weight for one, weight in self.weights if one.active[block]])
 
-    def without(self, block: int) -> Mask:
-        """(P,) mask of the chosen parameters without one."""
-        return np.asarray(self.active & (np.arange(len(self.active)) != block))
-
-    def evidence(self, active: Mask) -> float:
-        """Log evidence of the parameters of a mask (P,); leaves the search and its probabilities unchanged."""
-        apart = replace(self.search, seen={})
-        return apart.evaluate(np.flatnonzero(active).tolist(), self.best).log_evidence
-
-    def odds(self, block: int) -> float:
-        """Log odds of the choice against the same without one of its parameters."""
-        return self.best.log_evidence - self.evidence(self.without(block))
+    def fewer(self, block: int) -> Weighed:
+        """Return the set without one of its parameters."""
+        return self.own.scales.others(self.own, [(without(self.active, block), self.point.values)])[0]
 
     def alternatives(self, block: int) -> list[int]:
         """Return parameters that could replace one: log evidence no more than ALIKE below the choice's."""
-        rest, least = self.without(block), self.best.log_evidence - settings.ALIKE
-        places = np.arange(len(rest))
-        others = places[self.allowed & ~self.active & (np.array(self.search.gram.ranks) > 0)].tolist()
-        return [b for b in others if self.evidence(rest | (places == b)) > least]
+        rest, least = without(self.active, block), self.own.log_evidence - settings.ALIKE
+        near = [one.active for one in self.rivals if one.log_evidence > least and not one.active[block]]
+        added = [np.flatnonzero(one & ~rest).tolist() for one in near if one[rest].all()]
+        return [one[0] for one in added if len(one) == 1]
 
-    def deviations(self) -> Array:
-        """(P,) posterior standard deviations of the chosen parameters, NaN of the others."""
-        found, own = np.full(len(self.active), np.nan), list(self.best.blocks)
-        _, covariance = self.search.gram.posterior(self.best)
-        found[own] = self.point.model.sizes[own] * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return found
+
+def without(active: Mask, block: int) -> Mask:
+    """(P,) mask of the parameters without one."""
+    return np.asarray(active & (np.arange(len(active)) != block))
 
 
 def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Array:
@@ -89,118 +88,103 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
 
 
 def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Choice:
-    """Search effects by evidence at the fit of all, refit, keep the round of least held-out loss, then prune it."""
+    """Search effects by evidence at the fit of all, then at the fit of the choice, and settle it among exact fits."""
     values = everything(model, allowed, start, progress)
-    deflation: Array | None = None
-    known: Mask | None = None
-    fitted: list[tuple[float, Choice]] = []
+    scales: Scales | None = None
+    fitted: list[Weighed] = []
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
-        choice = _weighed(model, values, allowed, deflation, known)
-        deflation = choice.deflation
-        if known is not None and (choice.active == known).all():
+        point = Point.at(model, values)
+        scales = scales or Scales.of(point)
+        first = fitted[-1].own.tolist() if fitted else []
+        known = np.isin(np.arange(len(values)), _search(point, scales, allowed).run(first).blocks)
+        if fitted and (known == fitted[-1].active).all():
             break
-        known = choice.active
         values = fit(model, values, known)
         model.refreshed(values)
-        values = fit(model, values, known)
-        choice = _weighed(model, values, allowed, deflation, known, frozenset())
-        left = held_out_loss(choice.point, known).sum(axis=1) * choice.point.noise**2
-        counts = [len(one.residual) for one in choice.point.rows]
-        fitted.append((float(counts @ np.log(np.maximum(left, 1e-300))), choice))
+        fitted.append(scales.fitted(known, values))
+        values = fitted[-1].point.values
+    assert scales is not None
     # a search that left the neighbourhood of its point may have chosen worse than the round before
-    choice = min(fitted, key=lambda one: one[0])[1]
-    model.refreshed(choice.point.values)
-    return _pruned(choice)
+    chosen = min(fitted, key=lambda one: one.loss)
+    return _settled(scales, chosen, allowed, progress)
 
 
-def _weighed(
-    model: JointModel, values: Array, allowed: Mask, deflation: Array | None, start: Mask | None,
-    gone: frozenset[int] | None = None,
-) -> Choice:  # fmt: skip
-    """Search combinations of parameters by deflated evidence, linearised at some values (P,).
+def _search(point: Point, scales: Scales, allowed: Mask) -> Search:
+    """Return the search among parameters by the evidence of the problem that is linear at a point."""
+    barred = frozenset(np.flatnonzero(~allowed).tolist())
+    return Search(deflated(point, scales.deflation, scales.worth), [log_odds()] * len(allowed), out=barred)
 
-    With ``gone``, parameters that are barred, the choice is ``start`` itself; the search only weighs its rivals.
+
+def _settled(scales: Scales, chosen: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Choice:
+    """Drop, exchange and add parameters, one at a time, until no set beside the choice is better.
+
+    A parameter goes at odds below nine to one, where motions held out are no worse without it, or if nobody could see
+    it; another comes in its place, or beside it, where the evidence is better, by nine to one of one more.
     """
-    point = Point.at(model, values)
-    deflation = ratios(point) if deflation is None else deflation
-    barred = frozenset(np.flatnonzero(~allowed).tolist()) | (gone or frozenset())
-    search = Search(deflated(point, deflation), [log_odds()] * len(values), out=barred)
-    first = [] if start is None else np.flatnonzero(start).tolist()
-    best = search.run(first)
-    best = best if gone is None else search.evaluate(first)
-    return Choice(np.isin(np.arange(len(values)), best.blocks), allowed, point, best, search, deflation)
+    own = chosen
+    for number in range(1, settings.MOVES + 1):
+        progress(f"sets of effects fitted, round {number}")
+        scales.model.refreshed(own.point.values)
+        scales.known.clear()
+        own = scales.fitted(own.active, own.point.values)
+        while (fewer := _fewer(scales, own)) is not None:
+            own = fewer
+        rivals = _rivals(scales, own, allowed)
+        better = [one for one in rivals if _gain(own, one) > 0.0 and one.seen[one.own].all()]
+        if not better or number == settings.MOVES:
+            break
+        own = max(better, key=lambda one: _gain(own, one))
+    # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
+    least = own.log_evidence - settings.FAR_BELOW
+    near = [one for one in rivals if least < one.log_evidence and one.loss < own.loss + settings.ALIKE]
+    near = [one for one in near if _gain(own, one) <= 0.0 and one.seen[one.own].all()]
+    return Choice(own, (*_drops(scales, own), *near))
 
 
-def _fewer(choice: Choice, values: Array, kept: Mask) -> Choice:
-    """Return the choice of the mask ``kept`` (P,), linearised at values fitted with it; parameters removed stay out."""
-    gone = choice.search.out | set(np.flatnonzero(choice.active & ~kept).tolist())
-    return _weighed(choice.point.model, values, choice.allowed, choice.deflation, kept, gone)
+def _gain(own: Weighed, one: Weighed) -> float:
+    """Log odds of a set against one of as many parameters, less nine to one for each that it has more.
 
-
-def held_out_loss(point: Point, active: Mask) -> Array:
-    """Linearised leave-one-motion-out cross-validation: squared residual (J, M) over the noise variance."""
-    matrix, vector, total = point.products
-    own = np.flatnonzero(active)
-    if not len(own):
-        return total
-    whole, along = matrix[:, :, own[:, None], own], vector[:, :, own]
-    others, pull = (one.sum(axis=(0, 1)) - one.sum(axis=0) for one in (whole, along))
-    found = np.linalg.solve(others + np.diag(point.model.sizes[own] ** -2.0), pull[:, :, None])[:, :, 0]
-    fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
-    return np.asarray(total + fitted - 2.0 * (found * along).sum(axis=2))
-
-
-def _pruned(choice: Choice) -> Choice:
-    """Backward elimination of parameters with odds below 9 or that raise the held-out loss, repeated after a refit.
-
-    Then the weakest are tested by likelihood ratio.
+    Zero where motions held out are no better.
     """
-    for _ in range(settings.SELECTIONS):
-        kept = _kept(choice)
-        choice = _fewer(choice, fit(choice.point.model, choice.point.values, kept), kept)
-        if (_kept(choice) == kept).all():
-            break
-    return _needed(choice)
+    more = max(len(one.own) - len(own.own), 0)
+    return one.log_evidence - own.log_evidence - more * np.log(settings.ODDS) if one.loss < own.loss else 0.0
 
 
-def _needed(choice: Choice) -> Choice:
-    """Backward elimination by likelihood ratio against a refit without the weakest parameter, rows deflated.
+def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
+    """Weigh the set without each of its parameters."""
+    return scales.others(own, [(without(own.active, b), own.point.values) for b in own.own.tolist()])
 
-    No odds exceed that ratio; but a linear problem misses what other effects can do together in its place.
+
+def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
+    """Return the set without the parameter that is needed least, if any is not needed."""
+    needless = [
+        (one.log_evidence, one)
+        for b, one in zip(own.own.tolist(), _drops(scales, own), strict=True)
+        if one.log_evidence > own.log_evidence - np.log(settings.ODDS) or one.loss <= own.loss or not own.seen[b]
+    ]
+    return max(needless, key=lambda pair: pair[0])[1] if needless else None
+
+
+def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
+    """Weigh the sets with one parameter exchanged, or one more, that the linear problem there finds likeliest.
+
+    Of each parameter of the choice so many, of each joint so many more.
     """
-    model = choice.point.model
-    worth = [len(one.residual) / choice.deflation[one.columns].mean() for one in choice.point.rows]
-    while choice.active.any():
-        less = choice.without(min(choice.best.blocks, key=choice.odds))
-        values = fit(model, choice.point.values, less)
-        if worth @ np.log(Point.at(model, values, less).noise / choice.point.noise) >= np.log(settings.ODDS):
-            break
-        choice = _fewer(choice, values, less)
-    return choice
+    model, joint = scales.model, scales.joint
+    search = _search(Point.at(model, own.point.values), scales, allowed)
+    others = np.flatnonzero(allowed & ~own.active & (np.array(search.gram.ranks) > 0)).tolist()
+    start, sets = model.start(), list[tuple[Mask, Array]]()
 
+    def propose(rest: Mask, added: list[int]) -> None:
+        base = search.evaluate(np.flatnonzero(rest).tolist())
+        told = {k: search.evaluate([*base.blocks, k], base).log_evidence for k in added}
+        for k in sorted(told, key=lambda k: -told[k])[: settings.RIVALS]:
+            more = rest | (np.arange(len(rest)) == k)
+            sets.append((more, np.where(rest, own.point.values, np.where(more, start, 0.0))))
 
-def _kept(choice: Choice) -> Mask:
-    """Backward elimination at one fit: mask of visible parameters with odds of 9 or more that lower held-out loss."""
-    active = choice.active & seen(choice.point)
-    while active.any():
-        here, whole, worst = choice.evidence(active), held_out_loss(choice.point, active).sum(), None
-        for block in np.flatnonzero(active).tolist():
-            less = active & (np.arange(len(active)) != block)
-            odds = here - choice.evidence(less)
-            harm = whole - held_out_loss(choice.point, less).sum()
-            if (odds < np.log(settings.ODDS) or harm > 0.0) and (worst is None or odds < worst[0]):
-                worst = odds, block
-        if worst is None:
-            break
-        active[worst[1]] = False
-    return active
-
-
-def seen(point: Point) -> Mask:
-    """(P,) whether a parameter's rms contribution to any joint reaches both twice its noise and the tolerance."""
-    found, model = np.zeros(len(point.values), dtype=bool), point.model
-    for joint, one in zip(model.joints, point.rows, strict=True):
-        least = model.log.visible_from(model.log.joints[joint], model.noise(joint))
-        found[one.columns] |= one.moved >= least
-    return found
+    for b in own.own.tolist():
+        propose(without(own.active, b), [k for k in others if joint[k] in (joint[b], SHARED) or joint[b] == SHARED])
+    for j in (*model.joints, SHARED):
+        propose(own.active, [k for k in others if joint[k] == j])
+    return scales.others(own, sets)

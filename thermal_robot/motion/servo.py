@@ -1,16 +1,23 @@
-"""Servo model of one joint: a free-running simulation of what the encoder reads, from the command alone.
+"""Servo model of joints that move together: a forward simulation of what encoders read, from the commands alone.
 
-Per joint, everything over the servo's stiffness K (rad for N·m), with the command u, Coulomb and load friction exact in
-sticking,
+Per joint j, everything over the servo's stiffness K (rad for N·m), with the command u, Coulomb and load friction exact
+in sticking,
 
-    τ₂ q̈ + τ₁ q̇ + F = clip(D[(1 + g) u(t − T) + z − q] − τ_d q̇, ±L) − c load(q) ,
+    I q̈ + τ₁ q̇(t + s/2) + F = clip(D[(1 + g) u(t + s/2 − T) + z − q] − τ_d q̇(t + s/2), ±L) − c load ,
+    load = Σ_k M_jk q̈_k + h_j + Σ_k (∂h_j/∂q_k (q − q̄)_k + ∂h_j/∂q̇_k (q̇ − q̄̇)_k) ,
     |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
-D a dead zone, c = 1/K, τ₂ = c (M(q) + I_a), L the torque limit over K, load the torque of
-gravity and of the other joints. One step of the
-implicit midpoint rule solves a monotone inclusion for the velocity at its middle (Moreau's time stepping: Acary and
-Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), and a joint that sticks is at rest at its end; a
-command that is held between its stamps is averaged over the step, so that the answer is smooth in the delay.
+D a dead zone, c = 1/K, I the drive's own inertia over K, L the torque limit over K. Mass matrix M and bias torques h
+are those of a reference motion q̄ (Newton's method on waveforms: Lelarasmee, Ruehli and Sangiovanni-Vincentelli, *IEEE
+Transactions on Computer-Aided Design* 1, 1982), so that a motion near it needs no rigid-body algorithm. One step of the
+implicit midpoint rule solves a monotone inclusion for the velocities at its middle (Moreau's time stepping: Acary and
+Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), by semismooth Newton, and a joint that sticks is
+at rest at its end. A step ends where a command changes, or of a single joint averages it, so that the answer is smooth
+in the delay.
+
+A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
+is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
+*Geometric Numerical Integration*, 2006, IX).
 """
 
 from __future__ import annotations
@@ -18,6 +25,7 @@ from __future__ import annotations
 import math
 from functools import cache
 from importlib.util import find_spec
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -27,79 +35,110 @@ from thermal_robot.compiling import compiled
 from thermal_robot.errors import EstimationError
 
 PARAMETERS = tuple(
-    "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative".split()
+    "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative "
+    "step".split()
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s."""
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s."""
+SHORTEST = 1e-7
+"""s: what a step leaves below this to a change of a command is rounding."""
 STRIBECK_VELOCITY = 0.1
 """rad/s: v_s, at which sliding has begun: BAM's measured servos, 0.05 to 0.2."""
 NEAR = 0.5
 """rad: farther from where it was taken a load grows no more; it is a sine."""
+STEPS, SWEEPS, EXACT = 10, 100, 1e-9
+"""Newton steps, then Gauss-Seidel sweeps at most of one time step (two or three steps are usual), and the change of a
+velocity, rad/s, below which they end: in a step of 4 ms a millionth of what the finest encoder reads."""
+_ONE = Lock()
 FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
 
-def _middle(q, v, u, load, most, inertia, drag, derivative, bend, half, dead, limit):  # type: ignore[no-untyped-def]
-    """Velocity at the middle of a step: zero where friction holds the joint, else the root of a monotone function."""
-    e, pull, drive = u - q, inertia * v - load, 0.0
+def _middle(  # type: ignore[no-untyped-def]
+    q, v, u, load, most, inertia, drag, derivative, early, bend, half, dead, limit
+):
+    """Velocity at the middle of a step, the root of a monotone function, and minus its derivative by load, inverse.
+
+    Where friction holds the joint both are zero.
+    """
+    e, pull, drive = u - q, inertia * v - load, derivative * early * v
+    kick = drive
     if e > dead:
-        drive = min(e - dead, limit)
+        drive += e - dead
     elif e < -dead:
-        drive = max(e + dead, -limit)
-    at_rest = pull + drive
+        drive += e + dead
+    at_rest = pull + max(min(drive, limit), -limit)
     if abs(at_rest) <= most:
-        return 0.0
+        return 0.0, 0.0
     pull += -most if at_rest > 0.0 else most
     damping = max(inertia + drag + bend * half, 1e-12)
     # unclipped, in the piece of D that holds; where that asks for too much, the limit
-    free = damping + derivative
-    w = pull / free
+    slope = damping + derivative * (1.0 + early)
+    w = (pull + kick) / slope
     if e - half * w > dead:
-        w = (pull + e - dead) / (free + half)
+        slope += half
+        w = (pull + kick + e - dead) / slope
     elif e - half * w < -dead:
-        w = (pull + e + dead) / (free + half)
+        slope += half
+        w = (pull + kick + e + dead) / slope
     asked = damping * w - pull
-    if asked > limit:
-        w = (pull + limit) / damping
-    elif asked < -limit:
-        w = (pull - limit) / damping
+    if abs(asked) > limit:
+        slope = damping
+        w = (pull + (limit if asked > 0.0 else -limit)) / damping
     w = max(min(w, FASTEST), -FASTEST)
-    return w if w * at_rest > 0.0 else 0.0
+    return (w, slope) if w * at_rest > 0.0 else (0.0, 0.0)
 
 
-def _simulate(  # type: ignore[no-untyped-def]
-    numbers, weights, begins, first, step, substeps, times, integral, command_begins, loads, slope, about, inertias,
+def _solve(matrix, right):  # type: ignore[no-untyped-def]
+    """Solve a small linear system in place by Gauss's elimination; a mass matrix of scaled rows needs no pivots."""
+    for k in range(len(right)):
+        for i in range(k + 1, len(right)):
+            share = matrix[i, k] / matrix[k, k]
+            if share != 0.0:
+                for j in range(k + 1, len(right)):
+                    matrix[i, j] -= share * matrix[k, j]
+                right[i] -= share * right[k]
+    for k in range(len(right) - 1, -1, -1):
+        for j in range(k + 1, len(right)):
+            right[k] -= matrix[k, j] * right[j]
+        right[k] /= matrix[k, k]
+
+
+def _alone(  # type: ignore[no-untyped-def]
+    numbers, weights, begins, first, step, substeps, times, commands, command_begins, loads, masses, slopes, about,
     start, out,
 ):  # fmt: skip
-    """Integrate all motions for each set of numbers; ``out`` (S, n) is q on the grid."""
+    """Integrate all motions of a single joint; a command is averaged over a step, in which it may change."""
     h, half = step / substeps, 0.5 * step / substeps
+    integral = np.zeros(len(times))
+    for k in range(1, len(times)):
+        integral[k] = integral[k - 1] + commands[k - 1] * (times[k] - times[k - 1])
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
-        coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:]
+        coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:14]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
             q, v, t = start[m], 0.0, first[m] - delay
             k, last = command_begins[m], command_begins[m + 1] - 1
             while k < last and times[k + 1] <= t:
                 k += 1
-            before = integral[k, 0] + integral[k, 1] * (t - times[k])
-            for n in range(begins[m], begins[m + 1]):
-                force, mass = 0.0, 0.0
-                for i in range(weights.shape[1]):
-                    force += droop * weights[s, i] * loads[i, n]
-                    mass += droop * weights[s, i] * inertias[i, n]
-                heavy, bend = 2.0 * max(mass + inertia, 0.0) / h, droop * slope[n]
+            before = integral[k] + commands[k] * (t - times[k])
+            out[s, begins[m]] = q
+            for n in range(begins[m] + 1, begins[m + 1]):
+                force = loads[0, n] + weights[s, 0] * loads[1, n] + weights[s, 1] * loads[2, n]
+                mass, slope = masses[0, n] + weights[s, 0] * masses[1, n], slopes[0, n] + weights[s, 0] * slopes[1, n]
+                heavy, bend = 2.0 * max(droop * mass + inertia, 0.0) / h, droop * slope
                 # without inertia the midpoint rule would ring about a command that is followed at once
                 drag = max(lag, half - derivative) if heavy < half else lag
-                for _ in range(substeps if n > begins[m] else 0):
+                for _ in range(substeps):
                     t += h
                     while k < last and times[k + 1] <= t:
                         k += 1
-                    late = integral[k, 0] + integral[k, 1] * (t - times[k])
+                    late = integral[k] + commands[k] * (t - times[k])
                     u, before = (1.0 + gain) * (late - before) / h + zero, late
-                    load = force + bend * max(min(q - about[n], NEAR), -NEAR)
+                    load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
-                    middle = _middle(  # type: ignore[no-untyped-call]
-                        q, v, u, load, most, heavy, drag, derivative, bend, half, dead, limit
+                    middle, _slope = _middle(  # type: ignore[no-untyped-call]
+                        q, v, u, load, most, heavy, drag, derivative, 0.0, bend, half, dead, limit
                     )
                     then = q + h * middle
                     if then < low or then > high:
@@ -108,27 +147,140 @@ def _simulate(  # type: ignore[no-untyped-def]
                 out[s, n] = q
 
 
+def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix):  # type: ignore[no-untyped-def]
+    """Solve a time step of set s for all joints' velocities ``w`` (S, J) at its middle, by semismooth Newton."""
+    joints, half = len(u), 0.5 * h
+    for number in range(STEPS + SWEEPS):
+        change = 0.0
+        for j in range(joints):
+            load = base[j]
+            for i in range(joints):
+                load += joined[j, i] * w[s, i]
+            most = numbers[s, j, 6] + numbers[s, j, 7] * abs(load)
+            if numbers[s, j, 8] != 0.0:
+                most += numbers[s, j, 8] * math.exp(-((v[s, j] / STRIBECK_VELOCITY) ** 2))
+            middle, slope = _middle(  # type: ignore[no-untyped-call]
+                q[s, j], v[s, j], u[j], load, most, heavy[j], drag[j], numbers[s, j, 13], numbers[s, j, 14] / h,
+                bend[j], half, numbers[s, j, 9], limits[s, j],
+            )  # fmt: skip
+            then = q[s, j] + h * middle
+            stops[j] = then < numbers[s, j, 11] or then > numbers[s, j, 12]
+            if stops[j]:
+                middle, slope = (max(min(then, numbers[s, j, 12]), numbers[s, j, 11]) - q[s, j]) / h, 0.0
+            left[j] = middle - w[s, j]
+            change = max(change, abs(left[j]))
+            if number >= STEPS:
+                w[s, j] = middle
+            for i in range(joints):
+                matrix[j, i] = joined[j, i] / slope if slope > 0.0 else 0.0
+            matrix[j, j] = 1.0
+        if change < EXACT:
+            return
+        if number < STEPS:
+            _solve(matrix, left)  # type: ignore[no-untyped-call]
+            for j in range(joints):
+                w[s, j] = max(min(w[s, j] + left[j], FASTEST), -FASTEST)
+
+
+def _together(  # type: ignore[no-untyped-def]
+    numbers, weights, begins, first, step, times, commands, command_begins, loads, masses, slopes, drags, about, pace,
+    start, out,
+):  # fmt: skip
+    """Integrate all motions of several joints; a step ends where a command changes."""
+    sets, joints = numbers.shape[:2]
+    shape = (sets, joints)
+    q, v, w, t, k = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+    u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
+    base, left, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
+    joined, matrix = np.zeros((joints, joints)), np.zeros((joints, joints))
+    limits = np.full(shape, 1e9)
+    for s in range(sets):
+        for j in range(joints):
+            if numbers[s, j, 10] > 0.0:
+                limits[s, j] = 1.0 / numbers[s, j, 10]
+    for m in range(len(begins) - 1):
+        for s in range(sets):
+            for j in range(joints):
+                q[s, j], v[s, j], w[s, j], k[s, j] = start[m, j], 0.0, 0.0, command_begins[j, m]
+                t[s, j] = first[m] - numbers[s, j, 2] + 0.5 * numbers[s, j, 14]
+                out[s, begins[m], j] = q[s, j]
+        for n in range(begins[m] + 1, begins[m + 1]):
+            for s in range(sets):  # all of one instant, whose matrices are then at hand
+                payload, rest = weights[s, 0], step
+                while rest > SHORTEST:
+                    h = rest
+                    for j in range(joints):
+                        last = command_begins[j, m + 1] - 1
+                        while k[s, j] < last and times[k[s, j] + 1] <= t[s, j] + SHORTEST:
+                            k[s, j] += 1
+                        u[j] = (1.0 + numbers[s, j, 1]) * commands[k[s, j]] + numbers[s, j, 0]
+                        if k[s, j] < last:
+                            h = min(h, times[k[s, j] + 1] - t[s, j])
+                    half = 0.5 * h
+                    rest -= h
+                    for j in range(joints):
+                        t[s, j] += h
+                        droop, lag, derivative = numbers[s, j, 5], numbers[s, j, 3], numbers[s, j, 13]
+                        told = loads[0, n, j] + payload * loads[1, n, j] + weights[s, 1] * loads[2, n, j]
+                        for i in range(joints):
+                            mass = masses[0, n, j, i] + payload * masses[1, n, j, i]
+                            slope = slopes[0, n, j, i] + payload * slopes[1, n, j, i]
+                            turn = drags[0, n, j, i] + payload * drags[1, n, j, i]
+                            told += slope * max(min(q[s, i] - about[n, i], NEAR), -NEAR) - turn * pace[n, i]
+                            if i == j:
+                                bend[j], drag[j] = droop * slope, droop * turn
+                                inertia = droop * mass + numbers[s, j, 4] + 0.5 * lag * numbers[s, j, 14]
+                                heavy[j] = 2.0 * max(inertia, 0.0) / h
+                            else:
+                                told -= 2.0 * mass * v[s, i] / h
+                                joined[j, i] = droop * (2.0 * mass / h + turn + half * slope)
+                        base[j] = droop * told
+                        # without inertia the midpoint rule would ring about a command that is followed at once
+                        drag[j] += max(lag, half - derivative) if heavy[j] < half else lag
+                    _velocities(  # type: ignore[no-untyped-call]
+                        s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix
+                    )
+                    for j in range(joints):
+                        q[s, j] += h * w[s, j]
+                        v[s, j] = 2.0 * w[s, j] - v[s, j] if w[s, j] != 0.0 and not stops[j] else 0.0
+                for j in range(joints):
+                    out[s, n, j] = q[s, j]
+
+
 @cache
-def _kernel() -> Any:
-    """Return the simulation loops, compiled at the first call; raise :class:`EstimationError` without numba."""
-    global _middle
+def _kernels() -> tuple[Any, Any]:
+    """Return the loops of one joint and of several, compiled at the first call.
+
+    Raises :class:`EstimationError` without numba.
+    """
+    global _middle, _solve, _velocities
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
-    if not hasattr(_middle, "py_func"):
-        _middle = compiled(_middle)
-    return compiled(_simulate)
+    with _ONE:  # threads ask at once
+        if not hasattr(_middle, "py_func"):
+            _middle, _solve = compiled(_middle), compiled(_solve)
+            _velocities = compiled(_velocities)
+    return compiled(_alone), compiled(_together)
 
 
 def simulate(
     numbers: Array, weights: Array, grid: tuple[Any, ...], command: tuple[Any, ...], around: tuple[Array, ...],
     start: Array, step: float, substeps: int,
 ) -> Array:  # fmt: skip
-    """Simulate one joint by time stepping in all motions, for S sets of numbers: (S, n) rad on the grid.
+    """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, 14) as :data:`PARAMETERS`, ``weights`` (S, k) of the ``loads`` (k, n), N·m, and ``inertias`` (k, n),
-    kg·m²; ``grid`` begins of motions and their first instants; ``command`` stamps, integral with slope and begins;
-    ``around`` loads, their slope (n,), N·m/rad, the position (n,) at which they hold, and inertias; ``start`` (M,) rad.
+    ``numbers`` (S, J, 14) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
+    motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
+    middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, of
+    contact, and of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and
+    velocities (n, J) at which they hold; ``start`` (M, J) rad.
     """
-    out = np.empty((len(numbers), grid[0][-1]))
-    _kernel()(numbers, weights, *grid, step, substeps, *command, *around, start, out)
+    out, (alone, together) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
+    if numbers.shape[1] > 1:
+        together(numbers, weights, *grid, step, *command, *around, start, out)
+        return out
+    loads, masses, slopes, _, about, _ = around
+    times, values, begins = command
+    own = (np.ascontiguousarray(one[..., 0]) for one in (loads, masses[..., 0], slopes[..., 0], about, start))
+    alone(numbers[:, 0], weights, *grid, step, substeps, times, values, begins[0], *own, out[..., 0])
     return out

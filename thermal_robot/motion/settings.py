@@ -100,6 +100,13 @@ SELECTIONS = 2
 """Choices among all effects: at the fit of all, then at the exact fit of what was chosen."""
 ODDS = 9.0
 """Against nothing in its place, from which an effect is kept: nine to one, as for poses."""
+RIVALS = 2
+"""Effects that are fitted in the place of each that is chosen, and beside those of each joint: the likeliest of the
+linear problem, which orders what is near and not what is far."""
+MOVES = 6
+"""Exchanges and additions at most among exact fits, each of which betters the evidence."""
+FAR_BELOW = 20.0
+"""Log evidence below the choice's from which a set is no rival: all of them together weigh less than a millionth."""
 ALIKE = 2.2
 """Log evidence, nine to one, within which another effect may stand in the place of a chosen one."""
 GATE = 3.0
@@ -134,7 +141,12 @@ STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 a second; here a thousand times more slowly."""
 STIFFEST = 2.0
 """Time steps: shortest time constant that MuJoCo lets a constraint have."""
-WAVES = 3
-"""Rounds at most in which joints take each other's accelerations."""
+WAVES = 10
+"""Rounds at most in which an arm's reference motion is taken anew: it comes to rest within three or four, but for what
+is far from its commands."""
+TIME_STEP = 1e-3
+"""s: expected time step of a simulator that made a log; MuJoCo's is 2 ms unless somebody changes it."""
+TOGETHER = 4
+"""Sets of parameters that a thread simulates at once: of fifty motions their paths take 30 MB."""
 MOST = 0.5
 """Share of a gap's mean square: effects that explain less than what stays unexplained are not told."""

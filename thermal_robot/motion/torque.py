@@ -10,6 +10,7 @@ Hélouvry, Dupont and Canudas de Wit, *Automatica* 30, 1994). All but κ is line
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -39,7 +40,7 @@ class TorqueModel(JointModel):
         parts = [_sampled(motion.position, motion.torque) for motion in log.motions if motion.torque]
         self._time, self._q, self._v, self._a, *others = (np.concatenate(one) for one in zip(*parts, strict=True))
         self._sign, self._slow, self._measured, self._scatter = others
-        self._loads = self.dynamics.along(self._q, self._v, self._a, whole=True)
+        self._loads = self.dynamics.torques(self._q, self._v, self._a)
         self._inertial, self._bodies = self.dynamics.inertial(self._q, self._v, self._a), self.dynamics.bodies
         self._motion = np.repeat(np.arange(len(parts)), [len(one[0]) for one in parts])
         self._used = [np.flatnonzero(np.isfinite(self._measured[:, j])) for j in self.joints]
@@ -47,7 +48,7 @@ class TorqueModel(JointModel):
         self.parameters = self._parameters()
 
     def _parameters(self) -> tuple[Parameter, ...]:
-        found, left = [], np.nan_to_num(np.abs(self._measured - self._loads.torque[0])).max(axis=0)
+        found, left = [], np.nan_to_num(np.abs(self._measured - self._loads[0])).max(axis=0)
         for j, servo in enumerate(self.servos):
             # sizes go by the torque limit: as stated, else no less than the masses leave
             limit = servo.limit or max(settings.TORQUE_LIMIT, float(left[j]))
@@ -56,7 +57,7 @@ class TorqueModel(JointModel):
                 size = e.size * (limit if e.of_limit else 1.0) / (fastest if e.of_speed else 1.0)
                 found.append(Parameter(e.name, j, e.label, e.unit, size, e.spread, e.positive, e.name))
         if self.log.robot.has_masses:
-            found.append(self.payload(self._loads.torque[1]))
+            found.append(self.payload(self._loads[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
                 first = 0.1 * numbers[0] * settings.LINK
                 known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
@@ -70,7 +71,7 @@ class TorqueModel(JointModel):
         """Regressors of each joint: torque (N,) per unit of each number, before the torque constant."""
         found = []
         for j in self.joints:
-            rows, load, sign = self._used[j], self._loads.torque[:, :, j], self._sign[:, j]
+            rows, load, sign = self._used[j], self._loads[:, :, j], self._sign[:, j]
             bodies = self._inertial[:, j].copy()
             bodies[:, :, 0] = np.einsum("nbi,bi->nb", bodies, np.array(list(self._bodies.values())))
             own = {
@@ -86,12 +87,15 @@ class TorqueModel(JointModel):
             found.append({name: values[rows] for name, values in own.items()})
         return found
 
-    def residuals(self, joint: int, values: Array) -> Array:
-        """(S, N) measured torque minus the model's, N·m."""
+    def residuals(self, group: Sequence[int], values: Array) -> list[Array]:
+        """Residual (S, N) of each joint, N·m, measured torque minus the model's, for S sets (S, P)."""
+        return [self._residuals(joint, values) for joint in group]
+
+    def _residuals(self, joint: int, values: Array) -> Array:
         columns, found = self._columns[joint], []
         for one in values:
             told = columns["nominal"].copy()
-            for p in self.own(joint, one != 0.0):
+            for p in self.own((joint,), one != 0.0):
                 if self.parameters[p].number in columns:
                     told += one[p] * columns[self.parameters[p].number]
             bias = one[self.index("offset", joint)]
@@ -101,9 +105,13 @@ class TorqueModel(JointModel):
     def _factor(self, joint: int, values: Array) -> float:
         return 1.0 + float(values[self.index("torque_constant", joint)])
 
-    def rows(self, joint: int, values: Array, wanted: Mask | None = None) -> Rows:
-        """Return residual and model derivatives of a joint at the parameters (P,), by those of ``wanted``."""
-        own, left, factor = self.own(joint, wanted), self.residuals(joint, values[None])[0], self._factor(joint, values)
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
+        """Return residual and model derivatives of each joint at the parameters (P,), by those of ``wanted``."""
+        return [self._rows(joint, values, wanted) for joint in group]
+
+    def _rows(self, joint: int, values: Array, wanted: Mask | None) -> Rows:
+        own, factor = self.own((joint,), wanted), self._factor(joint, values)
+        left = self._residuals(joint, values[None])[0]
         bare = self._measured[self._used[joint], joint] - left - values[self.index("offset", joint)]
         apart, columns = {"offset": np.ones(len(left)), "torque_constant": bare / factor}, self._columns[joint]
         numbers = [self.parameters[p].number for p in own]
@@ -121,7 +129,7 @@ class TorqueModel(JointModel):
         """
         cluster, found = self.cluster_of(self._motion), []
         there = np.isfinite(self._measured)
-        for values in (self._loads.torque[0], self._measured):
+        for values in (self._loads[0], self._measured):
             values, count = np.where(there, values, 0.0), np.maximum(_sums(self._motion, there), 1.0)
             found.append(np.where(there, values - (_sums(self._motion, values) / count)[self._motion], 0.0))
         told, measured = found
@@ -134,7 +142,7 @@ class TorqueModel(JointModel):
     def readings(self, joint: int) -> dict[str, Array]:
         """(N,) by name: time, s, position, in place of a command, too, and its velocity, measured torque and load."""
         names = "command", "position", "velocity", "measured", "load"
-        every = self._q, self._q, self._v, self._measured, self._loads.torque[0]
+        every = self._q, self._q, self._v, self._measured, self._loads[0]
         rows = self._used[joint]
         return {"time": self._time[rows], **{n: one[rows, joint] for n, one in zip(names, every, strict=True)}}
 

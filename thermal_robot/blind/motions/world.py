@@ -107,14 +107,21 @@ def draw_world(rng: np.random.Generator, joints: int, motions: int) -> World:
     commands = np.stack([np.stack([MOVES[kind](rng, time) for _ in range(joints)], axis=1) for kind in kinds])
     count = 2.0 * np.pi / 2.0 ** rng.integers(*sizes.BITS, endpoint=True)
     world = World(arm, commands, kinds, rate, float(rng.choice(sizes.STEPS)), False, float(count))
-    model = world.spec(Fault("nothing")).compile()
-    mass = np.empty((model.nv, model.nv))
-    data = mujoco_or_error().MjData(model)
-    mujoco_or_error().mj_forward(model, data)
-    mujoco_or_error().mj_fullM(model, data, mass)
-    fastest = np.max(np.array([servo.kd for servo in arm.servos.values()]) / np.diag(mass))
+    fastest = _fastest(world, commands[:, :: round(rate)].reshape(-1, joints))
     explicit = bool(rng.random() < 0.5 and fastest * world.step < sizes.STIFF)
     return replace(world, explicit=explicit, sticks=bool(rng.random() < 0.5))
+
+
+def _fastest(world: World, q: Array) -> float:
+    """Fastest rate, 1/s, at which the servos' damping acts in configurations (n, J): largest eigenvalue of M⁻¹ D."""
+    mujoco, model = mujoco_or_error(), world.spec(Fault("nothing")).compile()
+    data, mass = mujoco.MjData(model), np.empty((len(q), model.nv, model.nv))
+    for one, out in zip(q, mass, strict=True):
+        data.qpos[:] = one
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, out)
+    damping = np.diag([float(servo.kd or 0.0) for servo in world.arm.servos.values()])
+    return float(np.linalg.eigvals(np.linalg.solve(mass, damping)).real.max())
 
 
 def draw_log(rng: np.random.Generator, world: World, name: str, stated: bool = True) -> tuple[MotionLog, Fault]:
