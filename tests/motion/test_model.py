@@ -17,7 +17,7 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import select, without
+from thermal_robot.motion.select import searched, settled, without
 from thermal_robot.motion.weigh import Scales
 
 
@@ -227,7 +227,8 @@ def test_what_is_asked_of_a_choice_changes_no_probability():
     """Of a short log, in which a dead zone does what friction does, and nobody asked for it."""
     model = ServoModel(short("coulomb", size=0.05))
     names = np.array([one.effect for one in model.parameters])
-    choice = select(model, names != "dead_zone", lambda _: None)
+    allowed = names != "dead_zone"
+    choice = settled(searched(model, allowed, print), allowed, print)
     told = [choice.probability(p) for p in range(len(names))]
     own = np.flatnonzero(choice.active).tolist()
     rivals = {names[k] for p in own for k in choice.alternatives(p)}

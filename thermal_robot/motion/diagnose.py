@@ -16,13 +16,13 @@ from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
-from thermal_robot.motion.fit import fit
+from thermal_robot.motion.fit import Point, fit
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
-from thermal_robot.motion.select import Choice, select
+from thermal_robot.motion.select import Choice, searched, settled
 from thermal_robot.motion.torque import TorqueModel
 
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
@@ -69,28 +69,29 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = np.array([one.effect in kept or one.effect not in ALL for one in model.parameters])
-    choice = select(model, allowed, progress)
-    refused = _gate(choice)
+    found = searched(model, allowed, progress)
+    refused = _gate(found.point)
     if refused:
         progress("without the motions that nothing explains")
-        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), choice.point.values
-        del model, choice  # of a long log each is large
-        choice = select(kind(replace(log, motions=motions)), allowed, progress, values)
+        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), found.point.values
+        del model, found  # of a long log each is large
+        found = searched(kind(replace(log, motions=motions)), allowed, progress, values)
+    choice = settled(found, allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
 
 
-def _gate(choice: Choice) -> dict[str, float]:
+def _gate(point: Point) -> dict[str, float]:
     """Return kinds of motion whose rms residual over noise exceeds GATE times the kinds' median, with that ratio.
 
     Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
     """
-    if parts(choice.point.model.log) > 1:  # what one motion leaves has no others to be compared with
+    if parts(point.model.log) > 1:  # what one motion leaves has no others to be compared with
         return {}
-    kinds = np.array([m.kind or m.name for m in choice.point.model.log.motions])
-    each = np.zeros((len(kinds), len(choice.point.rows)))
-    for j, (one, noise) in enumerate(zip(choice.point.rows, choice.point.noise, strict=True)):
+    kinds = np.array([m.kind or m.name for m in point.model.log.motions])
+    each = np.zeros((len(kinds), len(point.rows)))
+    for j, (one, noise) in enumerate(zip(point.rows, point.noise, strict=True)):
         count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
         each[:, j] = np.bincount(one.motion, (one.residual / noise) ** 2, len(kinds)) / count
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}

@@ -170,10 +170,17 @@ class JointModel(ABC):
 
     def moved(self, values: Array, places: NDArray[np.int64]) -> Array:
         """Local sensitivity (K, J): rms change of each joint's model as each parameter of ``places`` (K,) is zero."""
-        sets = np.tile(values, (1 + len(places), 1))
-        sets[1 + np.arange(len(places)), places] = 0.0
-        each = self.by_joint(lambda group: self.residuals(group, sets))
-        return np.stack([np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1)) for left in each], axis=1)
+
+        def of_group(group: Sequence[int]) -> list[Array]:
+            own = np.flatnonzero(np.isin(places, self.own(group)))
+            sets, found = np.tile(values, (1 + len(own), 1)), np.zeros((len(group), len(places)))
+            sets[1 + np.arange(len(own)), places[own]] = 0.0
+            for one, left in zip(found, self.residuals(group, sets), strict=True):
+                one[own] = np.sqrt(np.mean((left[1:] - left[0]) ** 2, axis=1))
+            return list(found)
+
+        found = self.by_joint(of_group)
+        return np.stack(found, axis=1)
 
     def moves(self, values: Array) -> dict[tuple[str, str], float]:
         """Rms change of each joint's model as an effect in it is set to zero, in the gap's unit, by effect and joint.

@@ -87,8 +87,8 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     return values
 
 
-def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Choice:
-    """Search effects by evidence at the fit of all, then at the fit of the choice, and settle it among exact fits."""
+def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Weighed:
+    """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
     values = everything(model, allowed, start, progress)
     scales: Scales | None = None
     fitted: list[Weighed] = []
@@ -106,8 +106,7 @@ def select(model: JointModel, allowed: Mask, progress: Callable[[str], None], st
         values = fitted[-1].point.values
     assert scales is not None
     # a search that left the neighbourhood of its point may have chosen worse than the round before
-    chosen = min(fitted, key=lambda one: one.loss)
-    return _settled(scales, chosen, allowed, progress)
+    return min(fitted, key=lambda one: one.loss)
 
 
 def _search(point: Point, scales: Scales, allowed: Mask) -> Search:
@@ -116,18 +115,19 @@ def _search(point: Point, scales: Scales, allowed: Mask) -> Search:
     return Search(deflated(point, scales.deflation, scales.worth), [log_odds()] * len(allowed), out=barred)
 
 
-def _settled(scales: Scales, chosen: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Choice:
+def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Choice:
     """Drop, exchange and add parameters, one at a time, until no set beside the choice is better.
 
     A parameter goes at odds below nine to one, where motions held out are no worse without it, or if nobody could see
     it; another comes in its place, or beside it, where the evidence is better, by nine to one of one more.
     """
-    own = chosen
+    scales = own.scales
     for number in range(1, settings.MOVES + 1):
         progress(f"sets of effects fitted, round {number}")
-        scales.model.refreshed(own.point.values)
-        scales.known.clear()
-        own = scales.fitted(own.active, own.point.values)
+        if number == 1 or len(scales.model.groups) == 1:  # a weight alone hardly changes with a joint's parameters
+            scales.model.refreshed(own.point.values)
+            scales.known.clear()
+            own = scales.fitted(own.active, own.point.values)
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
         rivals = _rivals(scales, own, allowed)

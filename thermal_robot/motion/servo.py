@@ -48,6 +48,8 @@ NEAR = 0.5
 STEPS, SWEEPS, EXACT = 10, 100, 1e-9
 """Newton steps, then Gauss-Seidel sweeps at most of one time step (two or three steps are usual), and the change of a
 velocity, rad/s, below which they end: in a step of 4 ms a millionth of what the finest encoder reads."""
+FINER, NEARLY = 8, 0.5
+"""Parts of a step in which a servo may saturate, where its torque bends, and share of its limit from which it may."""
 _ONE = Lock()
 FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
@@ -216,6 +218,8 @@ def _together(  # type: ignore[no-untyped-def]
                         u[j] = (1.0 + numbers[s, j, 1]) * commands[k[s, j]] + numbers[s, j, 0]
                         if k[s, j] < last:
                             h = min(h, times[k[s, j] + 1] - t[s, j])
+                        if abs(u[j] - q[s, j] - numbers[s, j, 13] * v[s, j]) > NEARLY * limits[s, j]:
+                            h = min(h, step / FINER)
                     half = 0.5 * h
                     rest -= h
                     for j in range(joints):
