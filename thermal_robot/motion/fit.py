@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -49,6 +49,10 @@ class Part:
         total = np.array([y @ y for _, y in each])
         return cls(rows.residual, rows.motion, rows.columns, own, noise, matrix, vector, total)
 
+    def without_residual(self) -> Part:
+        """Return the sums alone."""
+        return replace(self, residual=np.empty(0), motion=np.empty(0, dtype=np.int64))
+
     @property
     def bread(self) -> Array:
         """(M, P') diagonals of the information matrices: sums of squared derivatives over the noise, by motion."""
@@ -58,12 +62,6 @@ class Part:
     def score(self) -> Array:
         """(M, P') gradient of the log likelihood by the parameters, by motion."""
         return np.asarray(self.vector - self.matrix @ self.values)
-
-    @property
-    def moved(self) -> Array:
-        """(P',) rms contribution of each parameter to the joint's output, its size times the rms derivative, rad."""
-        mean = self.bread.sum(axis=0) / len(self.residual)
-        return np.asarray(self.noise * np.sqrt(mean) * np.abs(self.values))
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,7 +139,8 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
     least = own.log_evidence - settings.FAR_BELOW
     near = [one for one in rivals if least < one.log_evidence and one.loss < own.loss + settings.ALIKE]
     near = [one for one in near if _gain(own, one) <= 0.0 and one.seen[one.own].all()]
-    return Choice(own, (*_drops(scales, own), *near))
+    whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
+    return Choice(whole, (*_drops(scales, own), *near))
 
 
 def _gain(own: Weighed, one: Weighed) -> float:
@@ -183,8 +184,11 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
             more = rest | (np.arange(len(rest)) == k)
             sets.append((more, np.where(rest, own.point.values, np.where(more, start, 0.0))))
 
+    # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
+    together = len(model.groups) == 1
     for b in own.own.tolist():
-        propose(without(own.active, b), [k for k in others if joint[k] in (joint[b], SHARED) or joint[b] == SHARED])
+        alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
+        propose(without(own.active, b), [k for k in others if alike[k]])
     for j in (*model.joints, SHARED):
         propose(own.active, [k for k in others if joint[k] == j])
     return scales.others(own, sets)

@@ -8,7 +8,7 @@ independent readings, costs n_j ln σ_j.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,7 +60,10 @@ class Scales:
 
         def fitted(key: tuple[bytes, ...]) -> Point:
             groups, active, values = missing[key]
-            return Point.at(self.model, fit(self.model, values, active, groups=groups), active, groups)
+            point = Point.at(self.model, fit(self.model, values, active, groups=groups), active, groups)
+            return replace(
+                point, rows=[one.without_residual() for one in point.rows]
+            )  # of long logs they would be large
 
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
         found = dict(zip(alone, self.model.each(fitted, alone), strict=True)) if alone else {}
@@ -98,7 +101,7 @@ class Scales:
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A set of parameters ``active`` (P,) at its own fit ``point``."""
+    """A set of parameters ``active`` (P,) at its own fit ``point``, whose joints may have no residuals kept."""
 
     scales: Scales
     active: Mask
