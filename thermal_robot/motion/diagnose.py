@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOu
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import SHARED_TITLES, TITLES, TORQUE_TITLES
+from thermal_robot.motion.effects import ABRUPT, SHARED_TITLES, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import Point, fit
 from thermal_robot.motion.following import parts
@@ -69,14 +69,14 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = np.array([one.effect in kept or one.effect not in ALL for one in model.parameters])
-    found = searched(model, allowed, progress)
-    refused = _gate(found.point)
+    choice = settled(searched(model, allowed, progress), allowed, progress)
+    refused = _gate(choice.point)
     if refused:
         progress("without the motions that nothing explains")
-        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), found.point.values
-        del model, found  # of a long log each is large
+        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), choice.point.values
+        del model, choice  # of a long log each is large
         found = searched(kind(replace(log, motions=motions)), allowed, progress, values)
-    choice = settled(found, allowed, progress)
+        choice = settled(found, allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
@@ -101,12 +101,20 @@ def _gate(point: Point) -> dict[str, float]:
 
 
 def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:
-    """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command."""
+    """Cross-validation by motion: residual of each joint where its motion was held out, simulated from the command.
+
+    An end stop, contact or limit that no other motion reaches stays as it was told.
+    """
     model, found = choice.point.model, [one.residual.copy() for one in choice.point.rows]
+    abrupt = np.array([one.effect in ABRUPT for one in model.parameters])
     for fold in range(settings.FOLDS if choice.active.any() else 0):
         progress(f"motions held out, part {fold + 1} of {settings.FOLDS}")
         held = np.arange(model.clusters) % settings.FOLDS == fold
-        values = fit(model, choice.point.values, choice.active, ~held)
+        told = np.zeros(len(abrupt))
+        for one in choice.point.rows:
+            told[one.columns] += one.bread[~held].sum(axis=0) * model.sizes[one.columns] ** 2
+        known = abrupt & (told < settings.SEEN)
+        values = fit(model, choice.point.values, choice.active, ~held, known=known)
         for joint, left in enumerate(model.all_residuals(values)):
             out = held[choice.point.rows[joint].motion]
             found[joint][out] = left[out]

@@ -74,6 +74,8 @@ TORQUE_EFFECTS = (
 )  # fmt: skip
 """Effects that a torque channel shows, in its units."""
 
+ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
+"""Effects that do nothing until they are reached, so that one motion alone may tell them."""
 TITLES = {effect.name: effect.title for effect in EFFECTS}
 SHARED_TITLES = {
     "payload": "payload",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -90,7 +89,7 @@ class Point:
         """(J,) root mean square of each joint's residual, rad."""
         return np.array([one.noise for one in self.rows])
 
-    @cached_property
+    @property
     def products(self) -> tuple[Array, Array, Array]:
         """Return normal equations of all parameters (J, M, P, P), right sides (J, M, P), squared targets (J, M)."""
         shape, width = (len(self.rows), self.model.clusters), len(self.values)
@@ -101,16 +100,18 @@ class Point:
 
 
 def fit(
-    model: JointModel, values: Array, active: Mask, motions: Mask | None = None, groups: Groups | None = None
-) -> Array:
+    model: JointModel, values: Array, active: Mask, motions: Mask | None = None, groups: Groups | None = None,
+    known: Mask | None = None,
+) -> Array:  # fmt: skip
     """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
     The prior counts as much as one independent reading. ``motions`` (M,) are the clusters that are fitted, by default
-    all. Of some ``groups`` of joints only their own parameters move.
+    all. Of some ``groups`` of joints only their own parameters move; those ``known`` (P,) stay.
     """
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
     values = np.where(active, values, 0.0)
     joint_of = np.array([one.joint for one in model.parameters])
+    active = active if known is None else active & ~known
     positive = np.array([one.positive for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     common = active & (joint_of == SHARED) & (not some)

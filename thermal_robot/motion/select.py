@@ -13,14 +13,13 @@ from thermal_robot.inference.algebra import total_probability
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
+from thermal_robot.motion.effects import ABRUPT
 from thermal_robot.motion.fit import Point, deflated, fit
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
 PLAIN = ("step", "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
-ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
-"""Effects that do nothing until they are reached."""
 
 
 @dataclass(frozen=True, eq=False)

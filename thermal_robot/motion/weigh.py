@@ -18,6 +18,7 @@ from scipy.special import ndtr, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
+from thermal_robot.motion.effects import ABRUPT
 from thermal_robot.motion.fit import Groups, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 
@@ -131,16 +132,28 @@ class Weighed:
         return float(self._laplace[0] - self.scales.worth @ np.log(self.point.noise))
 
     @cached_property
+    def _smooth(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
+        """Places (K,) of parameters that are not abrupt, and normal equations of these by joint and motion.
+
+        What is abrupt is taken as known, as one motion alone may tell it.
+        """
+        (matrix, vector, total), model = self.point.products, self.point.model
+        abrupt = np.array([model.parameters[p].effect in ABRUPT for p in self.own], dtype=bool)
+        own, known = self.own[~abrupt], self.own[abrupt]
+        there = self.point.values[known]
+        moved = matrix[:, :, own[:, None], known] @ there
+        left = total - 2.0 * vector[:, :, known] @ there
+        left += np.einsum("p,jmpq,q->jm", there, matrix[:, :, known[:, None], known], there, optimize=True)
+        return own, matrix[:, :, own[:, None], own], vector[:, :, own] - moved, left
+
+    @cached_property
     def left_out(self) -> Array:
         """(J,) linearised leave-one-motion-out cross-validation: sum of squared residuals, rad²."""
-        matrix, vector, total = self.point.products
-        own = self.own
-        if not len(own):
-            return np.asarray(total.sum(axis=1) * self.point.noise**2)
-        whole, along = matrix[:, :, own[:, None], own], vector[:, :, own]
-        found = deleted(whole.sum(axis=0), along.sum(axis=0), self.point.model.sizes[own])
-        fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
-        left = total + fitted - 2.0 * (found * along).sum(axis=2)
+        own, whole, along, left = self._smooth
+        if len(own):
+            found = deleted(whole.sum(axis=0), along.sum(axis=0), self.point.model.sizes[own])
+            fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
+            left = left + fitted - 2.0 * (found * along).sum(axis=2)
         return np.asarray(left.sum(axis=1) * self.point.noise**2)
 
     @property
@@ -150,11 +163,15 @@ class Weighed:
 
     @cached_property
     def seen(self) -> Mask:
-        """(P,) whether a parameter, set to zero, moves a joint by twice its noise, rms, and by the tolerance."""
+        """(P,) whether a parameter, set to zero, moves a joint by twice its noise, rms, and by the tolerance.
+
+        A simulator's time step, which is not told of the robot, need not.
+        """
         model, log = self.point.model, self.point.model.log
         least = np.array([log.visible_from(log.joints[joint], model.noise(joint)) for joint in model.joints])
         found = np.zeros(len(self.active), dtype=bool)
-        found[self.own] = (model.moved(self.point.values, self.own) >= least).any(axis=1)
+        step = np.array([model.parameters[p].effect == "step" for p in self.own], dtype=bool)
+        found[self.own] = step | (model.moved(self.point.values, self.own) >= least).any(axis=1)
         return found
 
     @cached_property
@@ -163,16 +180,16 @@ class Weighed:
 
         Delete-one-motion estimates, linearised (of clusters: MacKinnon, Nielsen and Webb, *Journal of Applied
         Econometrics* 38, 2023), times what Student's t with M − 1 degrees has at two sigma over a normal's. What
-        motions differ by a single one does not tell: of its pieces.
+        motions differ by a single one does not tell: of its pieces. What is abrupt has the posterior's.
         """
-        found, model, own = np.full(len(self.active), np.nan), self.point.model, self.own
+        found, model = np.full(len(self.active), np.nan), self.point.model
+        found[self.own] = self._laplace[1]
         count = len(model.log.motions) if len(model.log.motions) > 1 else model.clusters
-        matrix, vector, _ = self.point.products
-        each = (one.sum(axis=0).reshape(count, -1, *one.shape[2:]).sum(axis=1) for one in (matrix, vector))
-        whole, along = each
-        estimates = deleted(whole[:, own[:, None], own], along[:, own], model.sizes[own])
+        own, matrix, vector, _ = self._smooth
+        whole, along = (one.sum(axis=0).reshape(count, -1, *one.shape[2:]).sum(axis=1) for one in (matrix, vector))
+        estimates = deleted(whole, along, model.sizes[own])
         square = (count - 1) * np.var(estimates, axis=0) * (0.5 * stdtrit(count - 1, ndtr(2.0))) ** 2
-        found[own] = np.sqrt(np.maximum(square, self._laplace[1] ** 2))
+        found[own] = np.maximum(np.sqrt(square), found[own])
         return found
 
 
