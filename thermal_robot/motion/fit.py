@@ -17,6 +17,7 @@ from thermal_robot.motion.following import slope
 from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 
 Groups = Sequence[Sequence[int]]
+Problem = tuple[Array, Array, Array, Mask]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,37 +127,45 @@ def fit(
             continue
         point = Point.at(model, values, now, groups)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0
+        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, positive[own]
         # as one where a shared parameter moves, else each group by itself
         sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
         parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
-        cost = _Cost(model, groups, point, motions)
-        least = before = parts @ cost.of(values)
-        found, better = values.copy(), np.zeros(len(sets), dtype=bool)
-        for damping in settings.DAMPINGS:
-            ahead = values.copy()
-            ahead[own], promised = _ahead(problem, values[own], positive[own], damping)
-            if damping == 0.0 and promised < settings.SETTLED * before.sum():
-                break
-            costs = parts @ cost.of(ahead)
-            for k in np.flatnonzero(~better & (costs < least)):
-                found[sets[k]], better[k] = ahead[sets[k]], True
-            least = np.where(better, np.minimum(least, costs), least)
-            if better.all():
-                break
-        values = found
-        quiet = quiet + 1 if (before - least).sum() < settings.SETTLED * before.sum() else 0
+        values, gain = _line_search(_Cost(model, groups, point, motions, parts), problem, own, sets)
+        quiet = quiet + 1 if gain < settings.SETTLED else 0
         if quiet > (common.any() and not alone):
             break
     return values
 
 
-def _ahead(problem: tuple[Array, Array, Array], here: Array, positive: Mask, damping: float) -> tuple[Array, float]:
+def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: list[Mask]) -> tuple[Array, float]:
+    """Take for each set of parameters the step of least damping that betters its cost; return also the relative gain.
+
+    Nothing moves where the undamped step promises less than SETTLED of the cost.
+    """
+    here = cost.point.values
+    least = before = cost.of(here)
+    found, better = here.copy(), np.zeros(len(sets), dtype=bool)
+    for damping in settings.DAMPINGS:
+        then = here.copy()
+        then[own], promised = _ahead(problem, here[own], damping)
+        if damping == 0.0 and promised < settings.SETTLED * before.sum():
+            break
+        costs = cost.of(then)
+        for k in np.flatnonzero(~better & (costs < least)).tolist():
+            found[sets[k]], better[k] = then[sets[k]], True
+        least = np.where(better, np.minimum(least, costs), least)
+        if better.all():
+            break
+    return found, float((before - least).sum() / max(before.sum(), 1e-300))
+
+
+def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:
     """Return values (K,) after a Levenberg-Marquardt step, bounded at zero, and by how much −2 log posterior falls.
 
-    ``problem``: information (K, K), right side (K,) and the priors' precisions (K,).
+    ``problem``: information (K, K), right side (K,), the priors' precisions (K,), and what is positive (K,).
     """
-    inside, along, prior = problem
+    inside, along, prior, positive = problem
     whole = inside + np.diag(damping * np.diag(inside) + prior)
     root = np.linalg.cholesky(whole)
     pull = np.linalg.solve(root, along + damping * np.diag(inside) * here)
@@ -169,16 +178,18 @@ def _ahead(problem: tuple[Array, Array, Array], here: Array, positive: Mask, dam
 class _Cost:
     """−2 log posterior by group of joints: squares over the noise at a point, of some motions, and the prior's squares.
 
-    A parameter's prior counts in its joint's group, that of a shared parameter in the last one.
+    A parameter's prior counts in its joint's group, that of a shared parameter in the last one. ``parts`` (K, G) of the
+    groups are added.
     """
 
     model: JointModel
     groups: Groups
     point: Point
     motions: Mask
+    parts: Array
 
     def of(self, values: Array) -> Array:
-        """(G,) costs at values (P,)."""
+        """(K,) costs at values (P,)."""
         order = sorted(j for group in self.groups for j in group)
         noise, model = dict(zip(order, self.point.noise, strict=True)), self.model
 
@@ -195,7 +206,7 @@ class _Cost:
         for value, one in zip(values, model.parameters, strict=True):
             if one.joint in place:
                 found[place[one.joint]] += (value / one.size) ** 2
-        return found
+        return np.asarray(self.parts @ found)
 
 
 def ratios(point: Point) -> Array:

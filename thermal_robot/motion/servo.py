@@ -149,6 +149,31 @@ def _alone(  # type: ignore[no-untyped-def]
                 out[s, n] = q
 
 
+def _couple(  # type: ignore[no-untyped-def]
+    s, n, numbers, weights, loads, masses, slopes, drags, about, pace, q, v, h, base, joined, heavy, drag, bend
+):
+    """Write the load that joints of set s have at rest, and its derivatives by their velocities, over the stiffness."""
+    joints, half, payload = len(base), 0.5 * h, weights[s, 0]
+    for j in range(joints):
+        droop, lag, derivative = numbers[s, j, 5], numbers[s, j, 3], numbers[s, j, 13]
+        told = loads[0, n, j] + payload * loads[1, n, j] + weights[s, 1] * loads[2, n, j]
+        for i in range(joints):
+            mass = masses[0, n, j, i] + payload * masses[1, n, j, i]
+            slope = slopes[0, n, j, i] + payload * slopes[1, n, j, i]
+            turn = drags[0, n, j, i] + payload * drags[1, n, j, i]
+            told += slope * max(min(q[s, i] - about[n, i], NEAR), -NEAR) - turn * pace[n, i]
+            if i == j:
+                bend[j], drag[j] = droop * slope, droop * turn
+                inertia = droop * mass + numbers[s, j, 4] + 0.5 * lag * numbers[s, j, 14]
+                heavy[j] = 2.0 * max(inertia, 0.0) / h
+            else:
+                told -= 2.0 * mass * v[s, i] / h
+                joined[j, i] = droop * (2.0 * mass / h + turn + half * slope)
+        base[j] = droop * told
+        # without inertia the midpoint rule would ring about a command that is followed at once
+        drag[j] += max(lag, half - derivative) if heavy[j] < half else lag
+
+
 def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix):  # type: ignore[no-untyped-def]
     """Solve a time step of set s for all joints' velocities ``w`` (S, J) at its middle, by semismooth Newton."""
     joints, half = len(u), 0.5 * h
@@ -189,17 +214,12 @@ def _together(  # type: ignore[no-untyped-def]
     start, out,
 ):  # fmt: skip
     """Integrate all motions of several joints; a step ends where a command changes."""
-    sets, joints = numbers.shape[:2]
-    shape = (sets, joints)
+    sets, joints = shape = numbers.shape[:2]
     q, v, w, t, k = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
     u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
     base, left, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
     joined, matrix = np.zeros((joints, joints)), np.zeros((joints, joints))
-    limits = np.full(shape, 1e9)
-    for s in range(sets):
-        for j in range(joints):
-            if numbers[s, j, 10] > 0.0:
-                limits[s, j] = 1.0 / numbers[s, j, 10]
+    limits = 1.0 / np.maximum(numbers[:, :, 10], 1e-9)
     for m in range(len(begins) - 1):
         for s in range(sets):
             for j in range(joints):
@@ -208,7 +228,7 @@ def _together(  # type: ignore[no-untyped-def]
                 out[s, begins[m], j] = q[s, j]
         for n in range(begins[m] + 1, begins[m + 1]):
             for s in range(sets):  # all of one instant, whose matrices are then at hand
-                payload, rest = weights[s, 0], step
+                rest = step
                 while rest > SHORTEST:
                     h = rest
                     for j in range(joints):
@@ -220,35 +240,20 @@ def _together(  # type: ignore[no-untyped-def]
                             h = min(h, times[k[s, j] + 1] - t[s, j])
                         if abs(u[j] - q[s, j] - numbers[s, j, 13] * v[s, j]) > NEARLY * limits[s, j]:
                             h = min(h, step / FINER)
-                    half = 0.5 * h
                     rest -= h
                     for j in range(joints):
                         t[s, j] += h
-                        droop, lag, derivative = numbers[s, j, 5], numbers[s, j, 3], numbers[s, j, 13]
-                        told = loads[0, n, j] + payload * loads[1, n, j] + weights[s, 1] * loads[2, n, j]
-                        for i in range(joints):
-                            mass = masses[0, n, j, i] + payload * masses[1, n, j, i]
-                            slope = slopes[0, n, j, i] + payload * slopes[1, n, j, i]
-                            turn = drags[0, n, j, i] + payload * drags[1, n, j, i]
-                            told += slope * max(min(q[s, i] - about[n, i], NEAR), -NEAR) - turn * pace[n, i]
-                            if i == j:
-                                bend[j], drag[j] = droop * slope, droop * turn
-                                inertia = droop * mass + numbers[s, j, 4] + 0.5 * lag * numbers[s, j, 14]
-                                heavy[j] = 2.0 * max(inertia, 0.0) / h
-                            else:
-                                told -= 2.0 * mass * v[s, i] / h
-                                joined[j, i] = droop * (2.0 * mass / h + turn + half * slope)
-                        base[j] = droop * told
-                        # without inertia the midpoint rule would ring about a command that is followed at once
-                        drag[j] += max(lag, half - derivative) if heavy[j] < half else lag
+                    _couple(  # type: ignore[no-untyped-call]
+                        s, n, numbers, weights, loads, masses, slopes, drags, about, pace, q, v, h, base, joined, heavy,
+                        drag, bend,
+                    )  # fmt: skip
                     _velocities(  # type: ignore[no-untyped-call]
                         s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix
                     )
                     for j in range(joints):
                         q[s, j] += h * w[s, j]
                         v[s, j] = 2.0 * w[s, j] - v[s, j] if w[s, j] != 0.0 and not stops[j] else 0.0
-                for j in range(joints):
-                    out[s, n, j] = q[s, j]
+                out[s, n] = q[s]
 
 
 @cache
@@ -257,13 +262,13 @@ def _kernels() -> tuple[Any, Any]:
 
     Raises :class:`EstimationError` without numba.
     """
-    global _middle, _solve, _velocities
+    global _middle, _solve, _couple, _velocities
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
         if not hasattr(_middle, "py_func"):
             _middle, _solve = compiled(_middle), compiled(_solve)
-            _velocities = compiled(_velocities)
+            _couple, _velocities = compiled(_couple), compiled(_velocities)
     return compiled(_alone), compiled(_together)
 
 
