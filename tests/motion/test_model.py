@@ -215,6 +215,22 @@ def test_time_steps_of_semi_implicit_euler_are_told_by_the_error_they_make(step)
     assert after - rounding < 0.1 * (before - rounding)
 
 
+def test_friction_of_a_simulator_that_creeps_is_told_with_its_size():
+    """MuJoCo's friction holds a joint but for a tenth of what pulls at it; a width in rad is the torque over kp."""
+    world = smooth(replace(draw_world(np.random.default_rng(13), 3, 10), step=2e-4, explicit=False, sticks=False))
+    kp = world.arm.servos["joint_2"].kp
+    log = world.log(world.simulated(Fault("coulomb", 1, 0.004 * kp)))
+    model = ServoModel(log)
+    own = np.array([one.effect == "creep" or (one.effect, one.joint) == ("coulomb", 1) for one in model.parameters])
+    model.refreshed(np.zeros(len(own)))
+    found = fit(model, np.where(own, model.start(), 0.0), own)
+    assert found[model.index("coulomb", 1)] == pytest.approx(0.004, rel=0.05)
+    assert 0.05 < found[model.index("creep")] < 0.2
+    stuck = fit(model, np.where(own, model.start(), 0.0), own & (np.arange(len(own)) != model.index("creep")))
+    left = [float((model.all_residuals(one)[1] ** 2).sum()) for one in (stuck, found)]
+    assert left[1] < 0.5 * left[0]
+
+
 def short(name, joint=0, size=0.0, seed=5):
     """A short log of a world of three joints with a fault."""
     world = draw_world(np.random.default_rng(seed), 3, 9)

@@ -197,12 +197,16 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
 
 
 def _simulator(choice: Choice) -> list[str]:
-    """Return a sentence about the integrator of the simulator that the log seems to come from, if any."""
-    at = choice.point.model.index("step")
-    if at is None or not choice.active[at]:
-        return []
-    told = 1e3 * choice.point.values[at], 1e3 * choice.own.deviations[at]
-    return ["the log looks simulated by semi-implicit Euler in steps of {:.2g} ± {:.1g} ms".format(*told)]
+    """Return sentences about the simulator that the log seems to come from, if any: its integrator, its friction."""
+    told = {choice.point.model.parameters[p].effect: p for p in choice.own.own}
+    value, error, found = choice.point.values, choice.own.deviations, []
+    if (p := told.get("step")) is not None:
+        step = f"{1e3 * value[p]:.2g} ± {1e3 * error[p]:.1g} ms"
+        found.append(f"the log looks simulated by semi-implicit Euler in steps of {step}")
+    if (p := told.get("creep")) is not None:
+        share = f"{100.0 * value[p]:.2g} ± {100.0 * error[p]:.1g} %"
+        found.append(f"joints that friction holds creep, as in a simulator whose friction is soft by {share}")
+    return found
 
 
 def _unexplained(choice: Choice) -> Unexplained:

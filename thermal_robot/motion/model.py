@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 T = TypeVar("T")
+SIMULATOR = ("step", "creep")
+"""Effects of a simulator that made a log, which are told of no robot: its time step, its soft friction."""
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -301,6 +303,7 @@ class ServoModel(JointModel):
         ]
         if self.coupled:
             found.append(Parameter("step", SHARED, "time step", "s", settings.TIME_STEP, 1.0, True, "step"))
+            found.append(Parameter("creep", SHARED, "creep of friction", "", settings.CREEP, 1.0, True, "creep"))
         if self.log.robot.has_masses:
             height = "height above the lowest command"
             found.append(self.payload(self.loads.torque[1]))
@@ -341,8 +344,8 @@ class ServoModel(JointModel):
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
                 x[parameter.number] = values[:, p]
-            elif parameter.number == "step":
-                x["step"] = values[:, p]
+            elif parameter.effect in SIMULATOR:
+                x[parameter.number] = values[:, p]
             elif parameter.number == "payload":
                 weights[:, 0] = values[:, p]
             elif parameter.number == "contact":
@@ -359,6 +362,7 @@ class ServoModel(JointModel):
         reach = self.commanded[:, joint].min(), self.commanded[:, joint].max()
         x["low"] = np.where(x["low"] > 0.0, reach[0] + x["low"], -np.inf)
         x["high"] = np.where(x["high"] > 0.0, reach[1] - x["high"], np.inf)
+        x["creep"] = np.minimum(x["creep"], settings.SOFTEST)
         return np.column_stack([x[name] for name in PARAMETERS]), weights
 
     def positions(self, group: Sequence[int], values: Array, free: bool = False) -> Array:

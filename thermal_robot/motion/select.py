@@ -15,10 +15,10 @@ from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT
 from thermal_robot.motion.fit import Point, deflated, fit
-from thermal_robot.motion.model import SHARED, JointModel, Mask
+from thermal_robot.motion.model import SHARED, SIMULATOR, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
-PLAIN = ("step", "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
+PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 
 

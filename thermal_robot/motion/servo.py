@@ -17,7 +17,8 @@ in the delay.
 
 A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
 is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
-*Geometric Numerical Integration*, 2006, IX).
+*Geometric Numerical Integration*, 2006, IX). Its friction is soft: f = −min(w, |f|) with f = (1 − c) (G + M b q̇) of the
+other torques G holds a joint but for a share c (MuJoCo's documentation, *Computation*, constraint model).
 """
 
 from __future__ import annotations
@@ -36,9 +37,11 @@ from thermal_robot.errors import EstimationError
 
 PARAMETERS = tuple(
     "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative "
-    "step".split()
+    "step creep".split()
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s."""
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, –."""
+CREEP_RATE = 2.0 / (0.95 * 0.02)
+"""1/s: at which MuJoCo's friction brakes a joint that it holds, by its usual ``solref`` and ``solimp``."""
 SHORTEST = 1e-7
 """s: what a step leaves below this to a change of a command is rounding."""
 STRIBECK_VELOCITY = 0.1
@@ -55,27 +58,11 @@ FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
 
-def _middle(  # type: ignore[no-untyped-def]
-    q, v, u, load, most, inertia, drag, derivative, early, bend, half, dead, limit
-):
-    """Velocity at the middle of a step, the root of a monotone function, and minus its derivative by load, inverse.
-
-    Where friction holds the joint both are zero.
-    """
-    e, pull, drive = u - q, inertia * v - load, derivative * early * v
-    kick = drive
-    if e > dead:
-        drive += e - dead
-    elif e < -dead:
-        drive += e + dead
-    at_rest = pull + max(min(drive, limit), -limit)
-    if abs(at_rest) <= most:
-        return 0.0, 0.0
-    pull += -most if at_rest > 0.0 else most
-    damping = max(inertia + drag + bend * half, 1e-12)
-    # unclipped, in the piece of D that holds; where that asks for too much, the limit
+def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # type: ignore[no-untyped-def]
+    """Root of a servo's monotone equation of motion in the velocity, and its slope: unclipped, or else at the limit."""
     slope = damping + derivative * (1.0 + early)
     w = (pull + kick) / slope
+    # in the piece of D that holds; where that asks for too much, the limit
     if e - half * w > dead:
         slope += half
         w = (pull + kick + e - dead) / slope
@@ -86,8 +73,36 @@ def _middle(  # type: ignore[no-untyped-def]
     if abs(asked) > limit:
         slope = damping
         w = (pull + (limit if asked > 0.0 else -limit)) / damping
-    w = max(min(w, FASTEST), -FASTEST)
-    return (w, slope) if w * at_rest > 0.0 else (0.0, 0.0)
+    return max(min(w, FASTEST), -FASTEST), slope
+
+
+def _middle(  # type: ignore[no-untyped-def]
+    q, v, u, load, most, inertia, drag, derivative, early, bend, half, dead, limit, creep
+):
+    """Velocity at the middle of a step, the root of a monotone function, and minus its derivative by load, inverse.
+
+    Where friction holds the joint both are zero, or it creeps.
+    """
+    e, pull, kick = u - q, inertia * v - load, derivative * early * v
+    rest, drive = drag + bend * half, kick
+    if e > dead:
+        drive += e - dead
+    elif e < -dead:
+        drive += e + dead
+    at_rest = pull + max(min(drive, limit), -limit)
+    if creep > 0.0 and most > 0.0:
+        # f = −(1 − c) (G + M b q̇), so that M q̈ = G + f is M q̈ / c = G − (1 − c) M b q̇ / c
+        held, soft = inertia / creep, (1.0 - creep) / creep
+        damping = max(held + rest + soft * inertia * half * CREEP_RATE, 1e-12)
+        w, slope = _sliding(e, held * v - load, kick, damping, derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
+        at_rest = soft * inertia * (w - v + half * CREEP_RATE * w)
+        if abs(at_rest) <= most:
+            return w, slope
+    elif abs(at_rest) <= most:
+        return 0.0, 0.0
+    pull += -most if at_rest > 0.0 else most
+    w, slope = _sliding(e, pull, kick, max(inertia + rest, 1e-12), derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
+    return (w, slope) if w * at_rest > 0.0 or creep > 0.0 else (0.0, 0.0)
 
 
 def _solve(matrix, right):  # type: ignore[no-untyped-def]
@@ -140,7 +155,7 @@ def _alone(  # type: ignore[no-untyped-def]
                     load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
                     middle, _slope = _middle(  # type: ignore[no-untyped-call]
-                        q, v, u, load, most, heavy, drag, derivative, 0.0, bend, half, dead, limit
+                        q, v, u, load, most, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
                     )
                     then = q + h * middle
                     if then < low or then > high:
@@ -188,7 +203,7 @@ def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h,
                 most += numbers[s, j, 8] * math.exp(-((v[s, j] / STRIBECK_VELOCITY) ** 2))
             middle, slope = _middle(  # type: ignore[no-untyped-call]
                 q[s, j], v[s, j], u[j], load, most, heavy[j], drag[j], numbers[s, j, 13], numbers[s, j, 14] / h,
-                bend[j], half, numbers[s, j, 9], limits[s, j],
+                bend[j], half, numbers[s, j, 9], limits[s, j], numbers[s, j, 15],
             )  # fmt: skip
             then = q[s, j] + h * middle
             stops[j] = then < numbers[s, j, 11] or then > numbers[s, j, 12]
@@ -262,12 +277,12 @@ def _kernels() -> tuple[Any, Any]:
 
     Raises :class:`EstimationError` without numba.
     """
-    global _middle, _solve, _couple, _velocities
+    global _sliding, _middle, _solve, _couple, _velocities
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
         if not hasattr(_middle, "py_func"):
-            _middle, _solve = compiled(_middle), compiled(_solve)
+            _sliding, _middle, _solve = compiled(_sliding), compiled(_middle), compiled(_solve)
             _couple, _velocities = compiled(_couple), compiled(_velocities)
     return compiled(_alone), compiled(_together)
 

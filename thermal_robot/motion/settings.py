@@ -146,6 +146,9 @@ WAVES = 10
 is far from its commands."""
 TIME_STEP = 1e-3
 """s: expected time step of a simulator that made a log; MuJoCo's is 2 ms unless somebody changes it."""
+CREEP, SOFTEST = 0.1, 0.9
+"""Expected and largest share of what pulls at a joint that a simulator's friction does not hold: MuJoCo's is 0.1 unless
+somebody changes it, and with 0.9 friction would be none."""
 TOGETHER = 4
 """Sets of parameters that a thread simulates at once: of fifty motions their paths take 30 MB."""
 MOST = 0.5

@@ -20,7 +20,7 @@ from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.motion.effects import ABRUPT
 from thermal_robot.motion.fit import Groups, Point, deflated, fit, ratios, worth
-from thermal_robot.motion.model import SHARED, JointModel, Mask
+from thermal_robot.motion.model import SHARED, SIMULATOR, JointModel, Mask
 
 
 @dataclass(eq=False)
@@ -165,13 +165,13 @@ class Weighed:
     def seen(self) -> Mask:
         """(P,) whether a parameter, set to zero, moves a joint by twice its noise, rms, and by the tolerance.
 
-        A simulator's time step, which is not told of the robot, need not.
+        What is of a simulator, and not told of the robot, need not.
         """
         model, log = self.point.model, self.point.model.log
         least = np.array([log.visible_from(log.joints[joint], model.noise(joint)) for joint in model.joints])
         found = np.zeros(len(self.active), dtype=bool)
-        step = np.array([model.parameters[p].effect == "step" for p in self.own], dtype=bool)
-        found[self.own] = step | (model.moved(self.point.values, self.own) >= least).any(axis=1)
+        other = np.array([model.parameters[p].effect in SIMULATOR for p in self.own], dtype=bool)
+        found[self.own] = other | (model.moved(self.point.values, self.own) >= least).any(axis=1)
         return found
 
     @cached_property
