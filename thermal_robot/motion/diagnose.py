@@ -69,14 +69,14 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = np.array([one.effect in kept or one.effect not in ALL for one in model.parameters])
-    choice = settled(searched(model, allowed, progress), allowed, progress)
-    refused = _gate(choice.point)
+    found = searched(model, allowed, progress)
+    refused = _gate(found.point)
     if refused:
         progress("without the motions that nothing explains")
-        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), choice.point.values
-        del model, choice  # of a long log each is large
+        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), found.point.values
+        del model, found  # of a long log each is large
         found = searched(kind(replace(log, motions=motions)), allowed, progress, values)
-        choice = settled(found, allowed, progress)
+    choice = settled(found, allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
