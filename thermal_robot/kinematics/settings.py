@@ -21,7 +21,5 @@ LARGEST_REDUCED = 1e6
 MANY = 20_000
 """Configurations from which the compiled kernels are used: the first call loads numba, which takes a second, and
 compiles, which takes a minute at most and is kept on disk. NumPy has done fewer in a hundredth of a second."""
-ANGLE_STEP = 1e-4
-"""rad: step by which a load's slope is told; a load is linear over it, and rounding stays below 1e-10 of it."""
 LOAD_STEP = 0.02
 """rad along the way: loads are linear between configurations so near, to 5e-5 of themselves."""

@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, HeldOu
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import ABRUPT, SHARED_TITLES, TITLES, TORQUE_TITLES
+from thermal_robot.motion.effects import ABRUPT, SHARED_TITLES, SIMULATOR, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
 from thermal_robot.motion.fit import Point, fit
 from thermal_robot.motion.following import parts
@@ -68,7 +68,7 @@ def diagnose_motion(
     log = sound.log.with_joints(sound.joints)
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
-    allowed = np.array([one.effect in kept or one.effect not in ALL for one in model.parameters])
+    allowed = model.of_effects((*kept, *SIMULATOR))
     found = searched(model, allowed, progress)
     refused = _gate(found.point)
     if refused:
@@ -106,7 +106,7 @@ def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     An end stop, contact or limit that no other motion reaches stays as it was told.
     """
     model, found = choice.point.model, [one.residual.copy() for one in choice.point.rows]
-    abrupt = np.array([one.effect in ABRUPT for one in model.parameters])
+    abrupt = model.of_effects(ABRUPT)
     for fold in range(settings.FOLDS if choice.active.any() else 0):
         progress(f"motions held out, part {fold + 1} of {settings.FOLDS}")
         held = np.arange(model.clusters) % settings.FOLDS == fold

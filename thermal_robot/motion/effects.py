@@ -76,6 +76,8 @@ TORQUE_EFFECTS = (
 
 ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
 """Effects that do nothing until they are reached, so that one motion alone may tell them."""
+SIMULATOR = ("step", "creep")
+"""Effects of a simulator that made a log, which are told of no robot: its time step, its soft friction."""
 TITLES = {effect.name: effect.title for effect in EFFECTS}
 SHARED_TITLES = {
     "payload": "payload",

@@ -111,7 +111,7 @@ def fit(
     """
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
     values = np.where(active, values, 0.0)
-    joint_of = np.array([one.joint for one in model.parameters])
+    joint_of = model.placed
     active = active if known is None else active & ~known
     positive = np.array([one.positive for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions

@@ -17,7 +17,7 @@ from thermal_robot.compiling import threads
 from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import EFFECTS, size
+from thermal_robot.motion.effects import EFFECTS, SIMULATOR, size
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.servo import PARAMETERS, simulate
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 T = TypeVar("T")
-SIMULATOR = ("step", "creep")
-"""Effects of a simulator that made a log, which are told of no robot: its time step, its soft friction."""
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -85,6 +83,15 @@ class JointModel(ABC):
     def sizes(self) -> Array:
         """(P,) expected sizes of the parameters: one sigma of their priors."""
         return np.array([one.size for one in self.parameters])
+
+    @cached_property
+    def placed(self) -> NDArray[np.int64]:
+        """(P,) joint of each parameter; ``SHARED`` where all joints share it."""
+        return np.array([one.joint for one in self.parameters])
+
+    def of_effects(self, names: Collection[str]) -> Mask:
+        """(P,) mask of the parameters of some effects."""
+        return np.array([one.effect in names for one in self.parameters], dtype=bool)
 
     @cached_property
     def clusters(self) -> int:
@@ -338,7 +345,7 @@ class ServoModel(JointModel):
         return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 14) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
+        """(S, 16) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
         weights = np.zeros((len(values), 2))
         for p, parameter in enumerate(self.parameters):

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import softmax
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import total_probability
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
-from thermal_robot.motion.effects import ABRUPT
+from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Point, deflated, fit
-from thermal_robot.motion.model import SHARED, SIMULATOR, JointModel, Mask
+from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
 PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
@@ -43,9 +44,7 @@ class Choice:
     def weights(self) -> list[tuple[Weighed, float]]:
         """Posterior probability of each set, the choice first."""
         every = (self.own, *self.rivals)
-        log = np.array([one.log_evidence for one in every])
-        weight = np.exp(log - log.max())
-        return list(zip(every, (weight / weight.sum()).tolist(), strict=True))
+        return list(zip(every, softmax([one.log_evidence for one in every]).tolist(), strict=True))
 
     def probability(self, block: int) -> float:
         """Posterior probability that a parameter is in the model, summed over the sets weighed."""
@@ -75,9 +74,9 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     """
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
-        plain = allowed & np.array([one.effect in PLAIN for one in model.parameters])
+        plain = allowed & model.of_effects(PLAIN)
         start = fit(model, begun, plain)
-    abrupt = allowed & (start == 0.0) & np.array([one.effect in ABRUPT for one in model.parameters])
+    abrupt = allowed & (start == 0.0) & model.of_effects(ABRUPT)
     values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
@@ -171,7 +170,7 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
 
     Of each parameter of the choice so many, of each joint so many more.
     """
-    model, joint = scales.model, scales.joint
+    model, joint = scales.model, scales.model.placed
     search = _search(Point.at(model, own.point.values), scales, allowed)
     others = np.flatnonzero(allowed & ~own.active & (np.array(search.gram.ranks) > 0)).tolist()
     start, sets = model.start(), list[tuple[Mask, Array]]()

@@ -293,7 +293,7 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 14) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 16) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
     middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, of
     contact, and of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and

@@ -18,9 +18,9 @@ from scipy.special import ndtr, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
-from thermal_robot.motion.effects import ABRUPT
+from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Groups, Point, deflated, fit, ratios, worth
-from thermal_robot.motion.model import SHARED, SIMULATOR, JointModel, Mask
+from thermal_robot.motion.model import SHARED, JointModel, Mask
 
 
 @dataclass(eq=False)
@@ -41,11 +41,6 @@ class Scales:
         deflation = ratios(point)
         return cls(point.model, deflation, worth(point, deflation))
 
-    @cached_property
-    def joint(self) -> NDArray[np.int64]:
-        """(P,) joint of each parameter."""
-        return np.array([one.joint for one in self.model.parameters])
-
     def fitted(self, active: Mask, values: Array) -> Weighed:
         """Weigh a set ``active`` (P,) at its maximum a posteriori fit from some values (P,)."""
         return Weighed(self, active, Point.at(self.model, fit(self.model, values, active), active))
@@ -62,9 +57,8 @@ class Scales:
         def fitted(key: tuple[bytes, ...]) -> Point:
             groups, active, values = missing[key]
             point = Point.at(self.model, fit(self.model, values, active, groups=groups), active, groups)
-            return replace(
-                point, rows=[one.without_residual() for one in point.rows]
-            )  # of long logs they would be large
+            # of long logs residuals would be large
+            return replace(point, rows=[one.without_residual() for one in point.rows])
 
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
         found = dict(zip(alone, self.model.each(fitted, alone), strict=True)) if alone else {}
@@ -73,18 +67,18 @@ class Scales:
 
     def _touched(self, base: Weighed, active: Mask) -> list[Groups]:
         """Return the groups of joints whose parameters differ, one by one; all at once, if they share one of these."""
-        other = set(self.joint[active ^ base.active].tolist())
+        other = set(self.model.placed[active ^ base.active].tolist())
         if SHARED in other:
             return [self.model.groups]
         return [(group,) for group in self.model.groups if other & set(group)]
 
     def _key(self, base: Weighed, active: Mask, groups: Groups) -> tuple[bytes, ...]:
         """Key of the fit of some groups: their joints and parameters, and the values of what all share there."""
-        joints, shared = [j for group in groups for j in group], self.joint == SHARED
+        joints, shared = [j for group in groups for j in group], self.model.placed == SHARED
         whole = len(joints) == len(self.model.joints)
         return (
             bytes(joints),
-            active[np.isin(self.joint, joints) | shared].tobytes(),
+            active[np.isin(self.model.placed, joints) | shared].tobytes(),
             b"" if whole else base.point.values[shared].tobytes(),
         )
 
@@ -93,7 +87,7 @@ class Scales:
         rows, values = list(base.point.rows), np.where(active, base.point.values, 0.0)
         for groups in self._touched(base, active):
             point, joints = self.known[self._key(base, active, groups)], [j for group in groups for j in group]
-            own = np.isin(self.joint, (*joints, SHARED))
+            own = np.isin(self.model.placed, (*joints, SHARED))
             values[own] = point.values[own]
             for joint, part in zip(sorted(joints), point.rows, strict=True):
                 rows[joint] = part
@@ -138,7 +132,7 @@ class Weighed:
         What is abrupt is taken as known, as one motion alone may tell it.
         """
         (matrix, vector, total), model = self.point.products, self.point.model
-        abrupt = np.array([model.parameters[p].effect in ABRUPT for p in self.own], dtype=bool)
+        abrupt = model.of_effects(ABRUPT)[self.own]
         own, known = self.own[~abrupt], self.own[abrupt]
         there = self.point.values[known]
         moved = matrix[:, :, own[:, None], known] @ there
@@ -170,8 +164,9 @@ class Weighed:
         model, log = self.point.model, self.point.model.log
         least = np.array([log.visible_from(log.joints[joint], model.noise(joint)) for joint in model.joints])
         found = np.zeros(len(self.active), dtype=bool)
-        other = np.array([model.parameters[p].effect in SIMULATOR for p in self.own], dtype=bool)
-        found[self.own] = other | (model.moved(self.point.values, self.own) >= least).any(axis=1)
+        found[self.own] = model.of_effects(SIMULATOR)[self.own] | (
+            model.moved(self.point.values, self.own) >= least
+        ).any(axis=1)
         return found
 
     @cached_property
