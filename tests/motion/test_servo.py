@@ -117,6 +117,35 @@ def test_breakaway_is_above_sliding_friction():
     assert np.ptp(free) > 0.01
 
 
+@pytest.mark.parametrize("load_friction", [0.0, 0.1])
+def test_friction_of_joints_that_move_each_other_obeys_coulombs_law(load_friction):
+    rng, joints, h = np.random.default_rng(0), 7, 4e-3
+    stuck = 0
+    for _ in range(300):
+        root, turn, load, command = (rng.normal(size=shape) for shape in ((joints, joints), joints, joints, joints))
+        mass, load = 1e-4 * root @ root.T, 0.05 * load
+        row = np.zeros((joints, len(PARAMETERS)))
+        most = np.abs(0.2 * turn)
+        for name, value in (("low", -np.inf), ("high", np.inf), ("lag", 0.05), ("droop", 1.0), ("coulomb", most),
+                            ("load_friction", load_friction)):  # fmt: skip
+            row[:, PARAMETERS.index(name)] = value
+        loads, still = np.zeros((3, 2, joints)), np.zeros((2, joints))
+        masses = np.stack([np.stack([mass, mass]), np.zeros((2, joints, joints))])
+        loads[0], none = load, np.zeros_like(masses)
+        around = loads, masses, none, none, still, still
+        given = np.zeros(joints), command * 0.1, np.stack([np.arange(joints), np.arange(1, joints + 1)], axis=1)
+        grid = np.array([0, 2]), np.zeros(1)
+        found = simulate(row[None], np.zeros((1, 2)), grid, given, around, np.zeros((1, joints)), h, 1)
+        v = found[0, 1] / h
+        pulled = load + (2.0 / h) * (mass - np.diag(np.diag(mass))) @ v
+        force = 0.1 * command - 0.5 * h * v - 0.05 * v - (2.0 / h) * mass @ v - load
+        bound = most + load_friction * np.abs(pulled)
+        stuck += int((v == 0.0).sum())
+        np.testing.assert_allclose(force[v != 0.0], (np.sign(v) * bound)[v != 0.0], atol=1e-8)
+        assert (np.abs(force) <= bound + 1e-8).all()
+    assert 0.2 < stuck / (300 * joints) < 0.8
+
+
 def test_without_numba_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(servo, "find_spec", lambda name: None)
     servo._kernels.cache_clear()

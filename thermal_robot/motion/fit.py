@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -63,6 +64,19 @@ class Part:
         """(M, P') gradient of the log likelihood by the parameters, by motion."""
         return np.asarray(self.vector - self.matrix @ self.values)
 
+    def at(self, values: Array) -> Part:
+        """Return the sums at other values (P,) of all parameters, as far as the model is linear."""
+        there = values[self.columns]
+        square, here = (
+            float(self.total.sum() + x @ (self.matrix.sum(axis=0) @ x - 2.0 * self.vector.sum(axis=0)))
+            for x in (there, self.values)
+        )
+        noise = max(self.noise * float(np.sqrt(max(square, 0.0) / here)), settings.LEAST_NOISE)
+        less = (self.noise / noise) ** 2
+        matrix, vector, total = less * self.matrix, less * self.vector, less * self.total
+        one = self.without_residual()
+        return replace(one, values=there, noise=noise, matrix=matrix, vector=vector, total=total)
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -90,6 +104,21 @@ class Point:
         """(J,) root mean square of each joint's residual, rad."""
         return np.array([one.noise for one in self.rows])
 
+    @cached_property
+    def whole(self) -> tuple[Array, Array]:
+        """Return normal equations of all parameters (P, P) and right side (P,), summed over joints and motions."""
+        matrix, vector = (one.sum(axis=(0, 1)) for one in self.products[:2])
+        return matrix, vector
+
+    def ahead(self, active: Mask) -> Point:
+        """Predict the linearised model at the maximum a posteriori values of some parameters (P,), the others zero."""
+        own, (matrix, vector) = np.flatnonzero(active), self.whole
+        positive = np.array([one.positive for one in self.model.parameters])
+        values, problem = np.zeros(len(active)), (matrix[np.ix_(own, own)], vector[own])
+        if len(own):
+            values[own], _ = _ahead((*problem, self.model.sizes[own] ** -2.0, positive[own]), values[own], 0.0)
+        return Point(self.model, values, [one.at(values) for one in self.rows])
+
     @property
     def products(self) -> tuple[Array, Array, Array]:
         """Return normal equations of all parameters (J, M, P, P), right sides (J, M, P), squared targets (J, M)."""
@@ -103,14 +132,14 @@ class Point:
 def fit(
     model: JointModel, values: Array, active: Mask, motions: Mask | None = None, groups: Groups | None = None,
     known: Mask | None = None,
-) -> Array:  # fmt: skip
-    """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
+) -> Point:  # fmt: skip
+    """Maximum a posteriori fit of the active parameters, the others zero, by damped Gauss-Newton; linearised there.
 
     The prior counts as much as one independent reading. ``motions`` (M,) are the clusters that are fitted, by default
     all. Of some ``groups`` of joints only their own parameters move; those ``known`` (P,) stay.
     """
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
-    values = np.where(active, values, 0.0)
+    values, fitted = np.where(active, values, 0.0), active
     joint_of = model.placed
     active = active if known is None else active & ~known
     positive = np.array([one.positive for one in model.parameters])
@@ -132,10 +161,12 @@ def fit(
         sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
         parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
         values, gain = _line_search(_Cost(model, groups, point, motions, parts), problem, own, sets)
+        if gain == 0.0 and (now == fitted).all():
+            return point
         quiet = quiet + 1 if gain < settings.SETTLED else 0
         if quiet > (common.any() and not alone):
             break
-    return values
+    return Point.at(model, values, fitted, groups)
 
 
 def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: list[Mask]) -> tuple[Array, float]:
@@ -238,7 +269,7 @@ def deflated(point: Point, deflation: Array, worth: Array) -> Gram:
 
     G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
     """
-    matrix, vector = (one.sum(axis=(0, 1)) for one in point.products[:2])
+    matrix, vector = point.whole
     sizes, parameters = point.model.sizes, point.model.parameters
     wide = np.diag((settings.WIDE * sizes) ** -2.0)
     found = np.linalg.solve(matrix + wide, vector)

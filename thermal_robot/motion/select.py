@@ -67,7 +67,7 @@ def without(active: Mask, block: int) -> Mask:
     return np.asarray(active & (np.arange(len(active)) != block))
 
 
-def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Array:
+def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Point:
     """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
 
     From ``start``, by default from a fit of plain servos; effects that are abrupt start where the joints end.
@@ -75,34 +75,32 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
         plain = allowed & model.of_effects(PLAIN)
-        start = fit(model, begun, plain)
+        start = fit(model, begun, plain).values
     abrupt = allowed & (start == 0.0) & model.of_effects(ABRUPT)
     values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)
-        values = fit(model, values, allowed)
-    return values
+        point = fit(model, values, allowed)
+        values = point.values
+    return point
 
 
 def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Weighed:
     """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
-    values = everything(model, allowed, start, progress)
-    scales: Scales | None = None
-    fitted: list[Weighed] = []
+    point = everything(model, allowed, start, progress)
+    scales, fitted = Scales.of(point), list[Weighed]()
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
-        point = Point.at(model, values)
-        scales = scales or Scales.of(point)
+        if fitted:
+            point = Point.at(model, fitted[-1].point.values)
         first = fitted[-1].own.tolist() if fitted else []
-        known = np.isin(np.arange(len(values)), _search(point, scales, allowed).run(first).blocks)
+        known = np.isin(np.arange(len(allowed)), _search(point, scales, allowed).run(first).blocks)
         if fitted and (known == fitted[-1].active).all():
             break
-        values = fit(model, values, known)
+        values = fit(model, point.values, known).values
         model.refreshed(values)
         fitted.append(scales.fitted(known, values))
-        values = fitted[-1].point.values
-    assert scales is not None
     # a search that left the neighbourhood of its point may have chosen worse than the round before
     return min(fitted, key=lambda one: one.loss)
 
@@ -125,6 +123,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         if number == 1 or len(scales.model.groups) == 1:  # a weight alone hardly changes with a joint's parameters
             scales.model.refreshed(own.point.values)
             scales.known.clear()
+            scales.far.clear()
             own = scales.fitted(own.active, own.point.values)
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
@@ -156,13 +155,17 @@ def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
 
 
 def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
-    """Return the set without the parameter that is needed least, if any is not needed."""
-    needless = [
-        (one.log_evidence, one)
-        for b, one in zip(own.own.tolist(), _drops(scales, own), strict=True)
-        if one.log_evidence > own.log_evidence - np.log(settings.ODDS) or one.loss <= own.loss or not own.seen[b]
-    ]
-    return max(needless, key=lambda pair: pair[0])[1] if needless else None
+    """Backward elimination: return the first set found without a parameter that is not needed, if any.
+
+    The linear problem tells the order.
+    """
+    ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
+    for b in sorted(ahead, key=lambda b: -ahead[b].log_evidence):
+        seen, least = own.seen[b], own.log_evidence - settings.FAR_BELOW
+        (one,) = scales.others(own, [(ahead[b].active, own.point.values)], least=least if seen else -np.inf)
+        if not seen or one.log_evidence > own.log_evidence - np.log(settings.ODDS) or one.loss <= own.loss:
+            return one
+    return None
 
 
 def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
@@ -171,7 +174,8 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
     Of each parameter of the choice so many, of each joint so many more.
     """
     model, joint = scales.model, scales.model.placed
-    search = _search(Point.at(model, own.point.values), scales, allowed)
+    point = Point.at(model, own.point.values)
+    search = _search(point, scales, allowed)
     others = np.flatnonzero(allowed & ~own.active & (np.array(search.gram.ranks) > 0)).tolist()
     start, sets = model.start(), list[tuple[Mask, Array]]()
 
@@ -189,4 +193,4 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
         propose(without(own.active, b), [k for k in others if alike[k]])
     for j in (*model.joints, SHARED):
         propose(own.active, [k for k in others if joint[k] == j])
-    return scales.others(own, sets)
+    return scales.others(own, sets, point, own.log_evidence - settings.FAR_BELOW)

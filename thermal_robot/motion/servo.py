@@ -54,6 +54,8 @@ velocity, rad/s, below which they end: in a step of 4 ms a millionth of what the
 FINER, NEARLY = 8, 0.5
 """Parts of a step in which a servo may saturate, where its torque bends, and share of its limit from which it may."""
 _ONE = Lock()
+LEAST = 0.1
+"""Of a sliding joint's derivative by its load what friction leaves of it at least."""
 FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
@@ -77,11 +79,12 @@ def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # t
 
 
 def _middle(  # type: ignore[no-untyped-def]
-    q, v, u, load, most, inertia, drag, derivative, early, bend, half, dead, limit, creep
+    q, v, u, load, most, more, side, inertia, drag, derivative, early, bend, half, dead, limit, creep
 ):
-    """Velocity at the middle of a step, the root of a monotone function, and minus its derivative by load, inverse.
+    """Velocity at the middle of a step, the root of a monotone function; minus its derivative by load, inverse; side.
 
-    Where friction holds the joint both are zero, or it creeps.
+    Where friction holds the joint all are zero, or it creeps. ``more`` is the derivative of friction ``most`` by load.
+    What slid to one ``side`` at the last try is held before it slides to the other: else Newton's steps may leap over.
     """
     e, pull, kick = u - q, inertia * v - load, derivative * early * v
     rest, drive = drag + bend * half, kick
@@ -96,13 +99,16 @@ def _middle(  # type: ignore[no-untyped-def]
         damping = max(held + rest + soft * inertia * half * CREEP_RATE, 1e-12)
         w, slope = _sliding(e, held * v - load, kick, damping, derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
         at_rest = soft * inertia * (w - v + half * CREEP_RATE * w)
-        if abs(at_rest) <= most:
-            return w, slope
-    elif abs(at_rest) <= most:
-        return 0.0, 0.0
-    pull += -most if at_rest > 0.0 else most
+        if abs(at_rest) <= most or at_rest * side < 0.0:
+            return w, slope, 0.0
+    elif abs(at_rest) <= most or at_rest * side < 0.0:
+        return 0.0, 0.0, 0.0
+    way = 1.0 if at_rest > 0.0 else -1.0
+    pull -= way * most
     w, slope = _sliding(e, pull, kick, max(inertia + rest, 1e-12), derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
-    return (w, slope) if w * at_rest > 0.0 or creep > 0.0 else (0.0, 0.0)
+    if w * way < 0.0 and creep == 0.0:
+        return 0.0, 0.0, 0.0
+    return w, slope / max(1.0 + way * more, LEAST), way
 
 
 def _solve(matrix, right):  # type: ignore[no-untyped-def]
@@ -154,8 +160,8 @@ def _alone(  # type: ignore[no-untyped-def]
                     u, before = (1.0 + gain) * (late - before) / h + zero, late
                     load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
-                    middle, _slope = _middle(  # type: ignore[no-untyped-call]
-                        q, v, u, load, most, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
+                    middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
+                        q, v, u, load, most, 0.0, 0.0, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
                     )
                     then = q + h * middle
                     if then < low or then > high:
@@ -189,9 +195,10 @@ def _couple(  # type: ignore[no-untyped-def]
         drag[j] += max(lag, half - derivative) if heavy[j] < half else lag
 
 
-def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix):  # type: ignore[no-untyped-def]
+def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, sides, left, matrix):  # type: ignore[no-untyped-def]
     """Solve a time step of set s for all joints' velocities ``w`` (S, J) at its middle, by semismooth Newton."""
     joints, half = len(u), 0.5 * h
+    sides[:] = 0.0
     for number in range(STEPS + SWEEPS):
         change = 0.0
         for j in range(joints):
@@ -201,9 +208,10 @@ def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h,
             most = numbers[s, j, 6] + numbers[s, j, 7] * abs(load)
             if numbers[s, j, 8] != 0.0:
                 most += numbers[s, j, 8] * math.exp(-((v[s, j] / STRIBECK_VELOCITY) ** 2))
-            middle, slope = _middle(  # type: ignore[no-untyped-call]
-                q[s, j], v[s, j], u[j], load, most, heavy[j], drag[j], numbers[s, j, 13], numbers[s, j, 14] / h,
-                bend[j], half, numbers[s, j, 9], limits[s, j], numbers[s, j, 15],
+            more = numbers[s, j, 7] if load > 0.0 else -numbers[s, j, 7]
+            middle, slope, sides[j] = _middle(  # type: ignore[no-untyped-call]
+                q[s, j], v[s, j], u[j], load, most, more, sides[j], heavy[j], drag[j], numbers[s, j, 13],
+                numbers[s, j, 14] / h, bend[j], half, numbers[s, j, 9], limits[s, j], numbers[s, j, 15],
             )  # fmt: skip
             then = q[s, j] + h * middle
             stops[j] = then < numbers[s, j, 11] or then > numbers[s, j, 12]
@@ -232,7 +240,7 @@ def _together(  # type: ignore[no-untyped-def]
     sets, joints = shape = numbers.shape[:2]
     q, v, w, t, k = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
     u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
-    base, left, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
+    base, left, sides, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
     joined, matrix = np.zeros((joints, joints)), np.zeros((joints, joints))
     limits = 1.0 / np.maximum(numbers[:, :, 10], 1e-9)
     for m in range(len(begins) - 1):
@@ -263,7 +271,7 @@ def _together(  # type: ignore[no-untyped-def]
                         drag, bend,
                     )  # fmt: skip
                     _velocities(  # type: ignore[no-untyped-call]
-                        s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, left, matrix
+                        s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, sides, left, matrix
                     )
                     for j in range(joints):
                         q[s, j] += h * w[s, j]

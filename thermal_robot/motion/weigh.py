@@ -27,13 +27,15 @@ from thermal_robot.motion.model import SHARED, JointModel, Mask
 class Scales:
     """What all sets of parameters of a model are weighed by: ``deflation`` (P,) of their information, ``worth`` (J,).
 
-    ``known`` keeps the fit of each group of joints, whose parameters may be those of several sets.
+    ``known`` keeps the fit of each group of joints, whose parameters may be those of several sets; ``far`` what the
+    linear problem at its start predicts of a fit that was left off.
     """
 
     model: JointModel
     deflation: Array
     worth: Array
     known: dict[tuple[bytes, ...], Point] = field(default_factory=dict)
+    far: dict[tuple[bytes, ...], Point] = field(default_factory=dict)
 
     @classmethod
     def of(cls, point: Point) -> Scales:
@@ -43,27 +45,57 @@ class Scales:
 
     def fitted(self, active: Mask, values: Array) -> Weighed:
         """Weigh a set ``active`` (P,) at its maximum a posteriori fit from some values (P,)."""
-        return Weighed(self, active, Point.at(self.model, fit(self.model, values, active), active))
+        return Weighed(self, active, fit(self.model, values, active))
 
-    def others(self, base: Weighed, sets: Sequence[tuple[Mask, Array]]) -> list[Weighed]:
-        """Weigh sets of parameters near one; only groups of joints whose parameters are others are fitted anew."""
+    def others(
+        self, base: Weighed, sets: Sequence[tuple[Mask, Array]], point: Point | None = None, least: float = -np.inf
+    ) -> list[Weighed]:
+        """Weigh sets of parameters near one; only groups of joints whose parameters are others are fitted anew.
+
+        A fit starts from the set's values, or from where the problem that is linear at ``point`` has it, if better. It
+        is left off where the problem that is linear at its start promises a log evidence below ``least``, and motions
+        held out no gain.
+        """
+        point = point or base.point
         missing = dict[tuple[bytes, ...], tuple[Groups, Mask, Array]]()
         for active, values in sets:
             for groups in self._touched(base, active):
                 key = self._key(base, active, groups)
-                if key not in self.known:
+                if key not in self.known and (key not in self.far or least == -np.inf):
                     missing.setdefault(key, (groups, active, values))
 
-        def fitted(key: tuple[bytes, ...]) -> Point:
+        def fitted(key: tuple[bytes, ...]) -> Point | None:
             groups, active, values = missing[key]
-            point = Point.at(self.model, fit(self.model, values, active, groups=groups), active, groups)
+            begun = self._begun(point, groups, active, values)
+            if least > -np.inf:
+                self.far[key] = Point.at(self.model, begun, active, groups).ahead(active)
+                told = self._placed(base, np.where(self._within(groups), active, base.active))
+                if told.log_evidence < least and told.loss > base.loss:
+                    return None
+                begun = np.where(self._within(groups), self.far[key].values, begun)
+            found = fit(self.model, begun, active, groups=groups)
             # of long logs residuals would be large
-            return replace(point, rows=[one.without_residual() for one in point.rows])
+            return replace(found, rows=[one.without_residual() for one in found.rows])
 
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
         found = dict(zip(alone, self.model.each(fitted, alone), strict=True)) if alone else {}
-        self.known |= found | {key: fitted(key) for key in missing if key not in found}
+        found |= {key: fitted(key) for key in missing if key not in found}
+        self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
+
+    def _begun(self, point: Point, groups: Groups, active: Mask, values: Array) -> Array:
+        """(P,) starting values of a fit of some groups: those given, or predicted at a point, if these leave less."""
+        ahead = np.where(self._within(groups), point.ahead(active).values, values)
+        starts, left = np.stack([values, ahead]), np.zeros(2)
+        for group in groups:
+            for joint, one in zip(group, self.model.residuals(group, starts), strict=True):
+                left += self.worth[joint] * np.log(np.maximum((one**2).sum(axis=1), 1e-300))
+        return np.asarray(starts[np.argmin(left)])
+
+    def _within(self, groups: Groups) -> Mask:
+        """(P,) mask of what a fit of some groups moves: their own parameters, or if they are all, every one."""
+        joints = [j for group in groups for j in group]
+        return np.isin(self.model.placed, joints if len(joints) < len(self.model.joints) else (*joints, SHARED))
 
     def _touched(self, base: Weighed, active: Mask) -> list[Groups]:
         """Return the groups of joints whose parameters differ, one by one; all at once, if they share one of these."""
@@ -86,7 +118,8 @@ class Scales:
         """Return the set with the fits that are known of groups which differ, and the base's of the others."""
         rows, values = list(base.point.rows), np.where(active, base.point.values, 0.0)
         for groups in self._touched(base, active):
-            point, joints = self.known[self._key(base, active, groups)], [j for group in groups for j in group]
+            key, joints = self._key(base, active, groups), [j for group in groups for j in group]
+            point = self.known[key] if key in self.known else self.far[key]
             own = np.isin(self.model.placed, (*joints, SHARED))
             values[own] = point.values[own]
             for joint, part in zip(sorted(joints), point.rows, strict=True):
@@ -106,6 +139,10 @@ class Weighed:
     def own(self) -> NDArray[np.int64]:
         """(K,) places of the active parameters."""
         return np.flatnonzero(self.active)
+
+    def ahead(self, active: Mask) -> Weighed:
+        """Predict the weighing of some of its parameters (P,) alone, by the problem that is linear at its fit."""
+        return Weighed(self.scales, active, self.point.ahead(active))
 
     @property
     def effects(self) -> frozenset[str]:
