@@ -402,7 +402,7 @@ def test_changes_effects_and_parameters_are_told_with_their_chance():
     (said,) = changes(comparison([change()]))
     assert "since may: 1.00 mrad in april, 1.25 mrad in may; χ² 31.4 on 1, below 0.001 % by chance" in said
     apart = change(since="", groups=[["a", "c"], ["b"]], values=[], parameters=["x", "y"])
-    assert "between a, c | b (2 parameters)" in changes(comparison([apart]))[0]
+    assert "between a with c and b (2 parameters)" in changes(comparison([apart]))[0]
     for p, chance in ((None, "–"), (1e-9, "below 0.001 %"), (0.0213, "2.1 %"), (1.0, "100 %")):
         assert f"χ² 31.4 on 1, {chance} by chance" in changes(comparison([change(p_value=p)]))[0]
     row = {"name": "own", "status": "contradicts", "reason": "april alone needs it", "degrees": 0, "p_value": 1.0}

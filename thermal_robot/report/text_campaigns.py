@@ -74,7 +74,7 @@ def _change(change: Plain, names: Sequence[str]) -> str:
 
 def _in_short(change: Plain) -> str:
     place = change["place"] or change["kind"]
-    groups = " | ".join(", ".join(group) for group in change["groups"])
+    groups = listed([" with ".join(group) for group in change["groups"]])
     when = f" since {change['since']}" if change["since"] else f" between {groups}"
     return f"{change['title']}{f' at {place}' if place else ''} changed{when}"
 
@@ -438,4 +438,4 @@ def _reaches(crossing: Crossing, unit: str) -> str:
 
 
 def _rarely(probability: float) -> str:
-    return f"{100.0 * probability:.2g} %"
+    return f"{max(100.0 * probability, 0.001):.2g} %"
