@@ -183,6 +183,16 @@ def test_two_motions_that_differ_tell_their_mean_no_better_than_they_differ():
     assert found["alike"] < 0.2 * (lags[1] - lags[0])
 
 
+def test_an_end_stop_alone_has_a_standard_deviation():
+    """Nothing beside it is taken as smooth, so that the jackknife has no parameters."""
+    model = ServoModel(driven({("high_stop", 0): 0.1}, 4, joints=("joint_1",))[0])
+    stop = model.index("high_stop", 0)
+    scales = Scales.of(Point.at(model, model.start()))
+    found = scales.fitted(np.arange(len(model.parameters)) == stop, model.start())
+    assert 0.0 < found.deviations[stop] < 0.01
+    assert np.isnan(np.delete(found.deviations, stop)).all()
+
+
 def smooth(world):
     """A world without commands that jump, at which servos saturate."""
     commands = np.stack([one for one, kind in zip(world.commands, world.kinds, strict=True) if kind != "steps"])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
@@ -277,6 +278,13 @@ class ServoModel(JointModel):
         return found
 
     @cached_property
+    def _free(self) -> Array:
+        """(J,) inertia of each joint at zero, the other joints free, kg·m²: MuJoCo's friction is as stiff as that."""
+        zero = np.zeros((1, len(self.joints)))
+        mass = self.dynamics.along(zero, zero).inertia[0, 0] + np.diag([one.armature or 0.0 for one in self.servos])
+        return np.asarray(1.0 / np.diag(np.linalg.inv(mass)))
+
+    @cached_property
     def _commands(self) -> list[tuple[Array, Array, NDArray[np.int64]]]:
         """Of each joint: stamps and values of the command in all motions, and the motions' begins."""
         found = []
@@ -324,14 +332,31 @@ class ServoModel(JointModel):
             command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
             values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
             values[self.index("high_stop", joint)] = max(command.max() - high, 0.0)
-            measured, place, _, _ = self._samples[joint]
-            error = np.abs(command[place] - measured)
-            limit = 1.0 / np.quantile(error, settings.FEW) if error.any() else 0.0
-            values[self.index("torque_limit", joint)] = limit
+            values[self.index("torque_limit", joint)] = self._limits[joint]
         if (p := self.index("contact")) is not None:
             height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
         return values
+
+    @cached_property
+    def _limits(self) -> Array:
+        """(J,) inverse torque limits, 1/rad, to start from: by the largest torques of the motions (inverse dynamics).
+
+        Of a servo that is not stated the largest error tells it, and of one whose limit is, what it has more.
+        """
+        stiffness = np.array([servo.kp or 0.0 for servo in self.servos])
+        stated = np.array([servo.limit or np.inf for servo in self.servos])
+        if not self.coupled:
+            error = [np.abs(self.commanded[place, j] - q) for j, (q, place, _, _) in enumerate(self._samples)]
+            most = np.array([np.quantile(one, settings.FEW) for one in error])
+            return np.divide(1.0, most, out=np.zeros_like(most), where=most > 0.0)
+        torques, read = [], self._read()
+        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+            width = min(round(settings.STRIDE / self.step) // 2 * 2 + 1, (b - a - 1) // 2 * 2 + 1)
+            moved = [savgol_filter(read[a:b], width, 3, k, self.step, axis=0) for k in range(3)]
+            torques.append(self.dynamics.torques(*moved)[0])
+        most = np.quantile(np.abs(np.concatenate(torques)), settings.FEW, axis=0)
+        return np.maximum(stiffness / np.maximum(most, 1e-12) - stiffness / stated, 0.0)
 
     def _heights(self, q: Array) -> tuple[Array, Array]:
         """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
@@ -346,7 +371,7 @@ class ServoModel(JointModel):
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
         """(S, 16) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
-        servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp"), np.zeros(len(values)))
+        servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
         weights = np.zeros((len(values), 2))
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
@@ -369,7 +394,9 @@ class ServoModel(JointModel):
         reach = self.commanded[:, joint].min(), self.commanded[:, joint].max()
         x["low"] = np.where(x["low"] > 0.0, reach[0] + x["low"], -np.inf)
         x["high"] = np.where(x["high"] > 0.0, reach[1] - x["high"], np.inf)
-        x["creep"] = np.minimum(x["creep"], settings.SOFTEST)
+        if self.coupled:
+            soft = np.minimum(x["creep"], settings.SOFTEST)
+            x["hold"] = (1.0 - soft) / np.where(soft > 0.0, soft, np.inf) * self._free[joint] * x["droop"]
         return np.column_stack([x[name] for name in PARAMETERS]), weights
 
     def positions(self, group: Sequence[int], values: Array, free: bool = False) -> Array:

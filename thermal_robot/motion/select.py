@@ -19,7 +19,8 @@ from thermal_robot.motion.fit import Point, deflated, fit
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
-PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous")
+PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous",
+         "torque_limit")  # fmt: skip
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 
 
@@ -128,7 +129,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
         rivals = _rivals(scales, own, allowed)
-        better = [one for one in rivals if _gain(own, one) > 0.0 and one.seen[one.own].all()]
+        better = [one for one in rivals if _gain(own, one) > 0.0 and one.seen[one.active & ~own.active].all()]
         if not better or number == settings.MOVES:
             break
         own = max(better, key=lambda one: _gain(own, one))

@@ -17,8 +17,9 @@ in the delay.
 
 A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
 is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
-*Geometric Numerical Integration*, 2006, IX). Its friction is soft: f = −min(w, |f|) with f = (1 − c) (G + M b q̇) of the
-other torques G holds a joint but for a share c (MuJoCo's documentation, *Computation*, constraint model).
+*Geometric Numerical Integration*, 2006, IX). Its friction is soft: a joint is held by f = −H (q̈ + b q̇) up to
+|f| = w, as if it had the inertia H more, H = (1 − c)/c of its inertia at zero with the other joints free (MuJoCo's
+documentation, *Computation*, constraint model: c is one less the impedance).
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ from thermal_robot.errors import EstimationError
 
 PARAMETERS = tuple(
     "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative "
-    "step creep".split()
+    "step hold".split()
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, –."""
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, and H, s², 0 if stiff."""
 CREEP_RATE = 2.0 / (0.95 * 0.02)
 """1/s: at which MuJoCo's friction brakes a joint that it holds, by its usual ``solref`` and ``solimp``."""
 SHORTEST = 1e-7
@@ -79,7 +80,7 @@ def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # t
 
 
 def _middle(  # type: ignore[no-untyped-def]
-    q, v, u, load, most, more, side, inertia, drag, derivative, early, bend, half, dead, limit, creep
+    q, v, u, load, most, more, side, inertia, drag, derivative, early, bend, half, dead, limit, hold
 ):
     """Velocity at the middle of a step, the root of a monotone function; minus its derivative by load, inverse; side.
 
@@ -93,12 +94,12 @@ def _middle(  # type: ignore[no-untyped-def]
     elif e < -dead:
         drive += e + dead
     at_rest = pull + max(min(drive, limit), -limit)
-    if creep > 0.0 and most > 0.0:
-        # f = −(1 − c) (G + M b q̇), so that M q̈ = G + f is M q̈ / c = G − (1 − c) M b q̇ / c
-        held, soft = inertia / creep, (1.0 - creep) / creep
-        damping = max(held + rest + soft * inertia * half * CREEP_RATE, 1e-12)
+    if hold > 0.0 and most > 0.0:
+        soft = hold / half
+        held, brake = inertia + soft, soft * half * CREEP_RATE
+        damping = max(held + rest + brake, 1e-12)
         w, slope = _sliding(e, held * v - load, kick, damping, derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
-        at_rest = soft * inertia * (w - v + half * CREEP_RATE * w)
+        at_rest = soft * (w - v) + brake * w
         if abs(at_rest) <= most or at_rest * side < 0.0:
             return w, slope, 0.0
     elif abs(at_rest) <= most or at_rest * side < 0.0:
@@ -106,7 +107,7 @@ def _middle(  # type: ignore[no-untyped-def]
     way = 1.0 if at_rest > 0.0 else -1.0
     pull -= way * most
     w, slope = _sliding(e, pull, kick, max(inertia + rest, 1e-12), derivative, early, half, dead, limit)  # type: ignore[no-untyped-call]
-    if w * way < 0.0 and creep == 0.0:
+    if w * way < 0.0 and hold == 0.0:
         return 0.0, 0.0, 0.0
     return w, slope / max(1.0 + way * more, LEAST), way
 

@@ -218,7 +218,8 @@ class Weighed:
         found[self.own] = self._laplace[1]
         count = len(model.log.motions) if len(model.log.motions) > 1 else model.clusters
         own, matrix, vector, _ = self._smooth
-        whole, along = (one.sum(axis=0).reshape(count, -1, *one.shape[2:]).sum(axis=1) for one in (matrix, vector))
+        pieces = matrix.shape[1] // count
+        whole, along = (one.sum(axis=0).reshape(count, pieces, *one.shape[2:]).sum(axis=1) for one in (matrix, vector))
         estimates = deleted(whole, along, model.sizes[own])
         square = (count - 1) * np.var(estimates, axis=0) * (0.5 * stdtrit(count - 1, ndtr(2.0))) ** 2
         found[own] = np.maximum(np.sqrt(square), found[own])
