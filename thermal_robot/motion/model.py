@@ -349,14 +349,14 @@ class ServoModel(JointModel):
         if not self.coupled:
             error = [np.abs(self.commanded[place, j] - q) for j, (q, place, _, _) in enumerate(self._samples)]
             most = np.array([np.quantile(one, settings.FEW) for one in error])
-            return np.divide(1.0, most, out=np.zeros_like(most), where=most > 0.0)
+            return np.asarray(np.divide(1.0, most, out=np.zeros_like(most), where=most > 0.0))
         torques, read = [], self._read()
         for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
             width = min(round(settings.STRIDE / self.step) // 2 * 2 + 1, (b - a - 1) // 2 * 2 + 1)
             moved = [savgol_filter(read[a:b], width, 3, k, self.step, axis=0) for k in range(3)]
             torques.append(self.dynamics.torques(*moved)[0])
         most = np.quantile(np.abs(np.concatenate(torques)), settings.FEW, axis=0)
-        return np.maximum(stiffness / np.maximum(most, 1e-12) - stiffness / stated, 0.0)
+        return np.asarray(np.maximum(stiffness / np.maximum(most, 1e-12) - stiffness / stated, 0.0))
 
     def _heights(self, q: Array) -> tuple[Array, Array]:
         """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
