@@ -17,13 +17,15 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import searched, settled, without
+from thermal_robot.motion.select import everything, searched, settled, without
 from thermal_robot.motion.weigh import Scales
 
 
-def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT):
+def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT, command=None):
     """A log whose encoders are what the servo model does with some true values, by effect and joint, and that model."""
     log = arms.log(*arms.tables(motions, seconds, seed)).with_joints(joints)
+    if command:
+        log = log.with_motions(lambda one: one.with_channels(["command"], lambda u: Channel(u.time, command(u))))
     model = ServoModel(log)
     values = np.zeros(len(model.parameters))
     for (effect, joint), value in true.items():
@@ -97,6 +99,27 @@ def test_the_fit_returns_to_the_true_values(known):
     np.testing.assert_allclose(found[values != 0.0], values[values != 0.0], rtol=0.03)
     left = [np.sqrt(np.mean(one**2)) for one in model.all_residuals(found)]
     assert max(left) < 2.0 * COUNT / np.sqrt(12.0)
+
+
+def test_a_step_that_saturates_is_dated_though_a_little_delay_changes_nothing():
+    """What a little of it does not show must not run away: a joint at its limit feels no early part of a command."""
+    true = {("lag", 0): 0.15, ("coulomb", 0): 0.01, ("delay", 0): 0.035, ("torque_limit", 0): 5.0}
+    log, values = driven(true, 3, 6.0, joints=("joint_1",), command=lambda u: 0.6 * np.sign(u.values))
+    model, delay = ServoModel(log), ServoModel(log).index("delay", 0)
+    model.refreshed(values)
+    active = model.of_effects(("lag", "coulomb", "delay", "torque_limit", "zero", "stribeck", "gain"))
+    early = np.where(np.arange(len(values)) == delay, 0.03, values)
+    assert fit(model, early, active).values[delay] == pytest.approx(0.035, rel=0.01)
+
+
+def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it():
+    log, values = driven(
+        {("lag", 0): 0.06, ("coulomb", 0): 0.006, ("torque_limit", 0): 20.0}, 6, 6.0, joints=("joint_1",)
+    )
+    model = ServoModel(log)
+    found = everything(model, np.ones(len(values), dtype=bool), None, lambda _: None).values
+    assert found[model.index("torque_limit", 0)] == pytest.approx(20.0, rel=0.1)
+    assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
 
 
 def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known):
@@ -199,9 +222,10 @@ def smooth(world):
     return replace(world, commands=commands, kinds=tuple(kind for kind in world.kinds if kind != "steps"))
 
 
-def test_an_arm_that_moves_fast_is_simulated_as_mujoco_does_by_runge_kutta():
+@pytest.mark.parametrize("joints", [1, 4])
+def test_an_arm_that_moves_fast_is_simulated_as_mujoco_does_by_runge_kutta(joints):
     """Inertial, Coriolis and gravity torques couple the joints; what remains is the encoder's count."""
-    world = draw_world(np.random.default_rng(11), 4, 5)
+    world = draw_world(np.random.default_rng(11), joints, 5)
     world = smooth(replace(world, step=2e-4, explicit=True))
     model = ServoModel(world.log(world.simulated(Fault("nothing"))))
     none = np.zeros(len(model.parameters))

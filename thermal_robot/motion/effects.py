@@ -6,6 +6,7 @@ Values fitted as a torque over the servo's stiffness are multiplied by the stiff
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.values import Estimate
@@ -21,7 +22,8 @@ class ServoEffect:
     """One number of the servo model, or of the torque channel's, that may differ from what the maker states.
 
     ``size`` is the prior's standard deviation in ``unit``; with ``of_limit`` in shares of torque limit over stiffness,
-    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed. ``torque``: name and unit times the stiffness.
+    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed; no value is below ``least``. ``torque``: name
+    and unit times the stiffness.
     """
 
     name: str
@@ -34,13 +36,13 @@ class ServoEffect:
     of_limit: bool = False
     of_speed: bool = False
     spread: float = SOURCED
-    positive: bool = True
+    least: float = 0.0
     torque: tuple[str, str] | None = None
 
 
 EFFECTS = (
-    ServoEffect("zero", "zeros of the joints", "the zero", "zero", "zero", "rad", 20e-3, positive=False),
-    ServoEffect("gain", "gain of the command", "the command's gain", "gain", "gain", "", 10e-3, positive=False),
+    ServoEffect("zero", "zeros of the joints", "the zero", "zero", "zero", "rad", 20e-3, least=-inf),
+    ServoEffect("gain", "gain of the command", "the command's gain", "gain", "gain", "", 10e-3, least=-1.0),
     ServoEffect("delay", "delay of the command", "a delay of the command", "delay", "delay", "s", 10e-3,
                 spread=UNSOURCED),
     ServoEffect("lag", "lag of the servos", "the servo's lag", "time constant", "lag", "s", 80e-3),
@@ -48,7 +50,7 @@ EFFECTS = (
                 5e-3, of_limit=True, torque=("inertia", "kg·m²")),
     ServoEffect("droop", "droop under load", "droop under load", "compliance", "droop", "rad/(N·m)", 0.07),
     ServoEffect("kp", "stiffness of the servos", "the servo's stiffness", "change of stiffness", "kp", "", 0.2,
-                positive=False),
+                least=settings.LEAST_STIFFNESS - 1.0),
     ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True,
                 torque=("torque", "N·m")),
     ServoEffect("load_friction", "friction that grows with load", "friction that grows with load",
@@ -66,11 +68,11 @@ EFFECTS = (
 TORQUE_EFFECTS = (
     *(replace(one, label=one.torque[0], unit=one.torque[1]) for one in EFFECTS if one.torque),
     ServoEffect("offset", "offsets of the torque channel", "the torque channel's offset", "offset", "offset", "N·m",
-                0.02, of_limit=True, positive=False),
+                0.02, of_limit=True, least=-inf),
     ServoEffect("viscous", "viscous friction", "viscous friction", "damping", "viscous", "N·m·s/rad", 0.02,
                 of_limit=True, of_speed=True, spread=UNSOURCED),
     ServoEffect("torque_constant", "the torque channel's constant", "the torque channel's constant",
-                "change of the torque constant", "torque_constant", "", 0.1, positive=False),
+                "change of the torque constant", "torque_constant", "", 0.1, least=-1.0),
 )  # fmt: skip
 """Effects that a torque channel shows, in its units."""
 

@@ -18,7 +18,7 @@ from thermal_robot.motion.following import slope
 from thermal_robot.motion.model import SHARED, JointModel, Mask, Rows
 
 Groups = Sequence[Sequence[int]]
-Problem = tuple[Array, Array, Array, Mask]
+Problem = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def fit(
     values, fitted = np.where(active, values, 0.0), active
     joint_of = model.placed
     active = active if known is None else active & ~known
-    positive = np.array([one.positive for one in model.parameters])
+    least = np.array([one.least for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     common = active & (joint_of == SHARED) & (not some)
     inside = active & np.isin(joint_of, [j for group in groups for j in group])
@@ -156,7 +156,7 @@ def fit(
             continue
         point = Point.at(model, values, now, groups)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, positive[own]
+        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, least[own]
         # as one where a shared parameter moves, else each group by itself
         sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
         parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
@@ -192,15 +192,17 @@ def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: li
 
 
 def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:
-    """Return values (K,) after a Levenberg-Marquardt step, bounded at zero, and by how much −2 log posterior falls.
+    """Return values (K,) after a Levenberg-Marquardt step, bounded, and by how much −2 log posterior falls.
 
-    ``problem``: information (K, K), right side (K,), the priors' precisions (K,), and what is positive (K,).
+    ``problem``: information (K, K), right side (K,), the priors' precisions and least values (K,).
     """
-    inside, along, prior, positive = problem
-    whole = inside + np.diag(damping * np.diag(inside) + prior)
+    inside, along, prior, least = problem
+    own = np.diag(inside)
+    held = damping * (own + np.median(own / prior) * prior)
+    whole = inside + np.diag(held + prior)
     root = np.linalg.cholesky(whole)
-    pull = np.linalg.solve(root, along + damping * np.diag(inside) * here)
-    found = np.asarray(lsq_linear(root.T, pull, bounds=(np.where(positive, 0.0, -np.inf), np.inf), method="bvls").x)
+    pull = np.linalg.solve(root, along + held * here)
+    found = np.asarray(lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x)
     cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
     return found, float(cost[0] - cost[1])
 
@@ -284,7 +286,7 @@ def deflated(point: Point, deflation: Array, worth: Array) -> Gram:
         equations + float(found / sizes @ along),
         tuple(slice(i, i + 1) for i in k),
         tuple(np.eye(1) for _ in k),
-        np.array([one.positive for one in parameters]),
+        np.array([one.least == 0.0 for one in parameters]),
         tuple(int(whole[i, i] > settings.SEEN) for i in k),
         np.array([one.spread for one in parameters]),
         equations,

@@ -45,7 +45,7 @@ class Parameter:
     unit: str
     size: float
     spread: float
-    positive: bool
+    least: float
     number: str
     of: str = ""
 
@@ -129,7 +129,7 @@ class JointModel(ABC):
         most = np.abs(torque).max(axis=0)
         limits = np.array([servo.limit or settings.TORQUE_LIMIT for servo in self.servos])
         size = settings.PAYLOAD * float(np.min(limits[most > 0.0] / most[most > 0.0], initial=settings.MOST_PAYLOAD))
-        return Parameter("payload", SHARED, "mass", "kg", size, 1.0, False, "payload")
+        return Parameter("payload", SHARED, "mass", "kg", size, 1.0, -np.inf, "payload")
 
     def start(self) -> Array:
         """(P,) starting values of the fit of all effects; zero by default, as for a nearly linear problem."""
@@ -311,23 +311,23 @@ class ServoModel(JointModel):
 
     def _parameters(self) -> tuple[Parameter, ...]:
         found = [
-            Parameter(e.name, j, e.label, e.unit, size(e, servo), e.spread, e.positive, e.number)
+            Parameter(e.name, j, e.label, e.unit, size(e, servo), e.spread, e.least, e.number)
             for j, servo in enumerate(self.servos)
             for e in EFFECTS
             if e.number not in (("droop",) if servo.kp else ("kp",))
         ]
         if self.coupled:
-            found.append(Parameter("step", SHARED, "time step", "s", settings.TIME_STEP, 1.0, True, "step"))
-            found.append(Parameter("creep", SHARED, "creep of friction", "", settings.CREEP, 1.0, True, "creep"))
+            found.append(Parameter("step", SHARED, "time step", "s", settings.TIME_STEP, 1.0, 0.0, "step"))
+            found.append(Parameter("creep", SHARED, "creep of friction", "", settings.CREEP, 1.0, 0.0, "creep"))
         if self.log.robot.has_masses:
             height = "height above the lowest command"
             found.append(self.payload(self.loads.torque[1]))
-            found.append(Parameter("contact", SHARED, height, "m", 0.1, 1.5, True, "contact"))
+            found.append(Parameter("contact", SHARED, height, "m", 0.1, 1.5, 0.0, "contact"))
         return tuple(found)
 
     def start(self) -> Array:
         """(P,) starting values: half a prior size, 0 if signed; stops, limit and contact from ends of the motion."""
-        values = np.array([0.5 * one.size if one.positive else 0.0 for one in self.parameters])
+        values = np.array([0.5 * one.size if one.least == 0.0 else 0.0 for one in self.parameters])
         for joint in self.joints:
             command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
             values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
@@ -383,7 +383,7 @@ class ServoModel(JointModel):
             elif parameter.number == "contact":
                 weights[:, 1] = values[:, p] - self.touching
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
-            stiffness = servo.kp * np.maximum(1.0 + x["kp"], settings.LEAST_STIFFNESS)
+            stiffness = servo.kp * (1.0 + x["kp"])
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
             x["saturation"] = x["saturation"] + (stiffness / servo.limit if servo.limit else 0.0)
             for name, torque in (("coulomb", servo.friction), ("lag", servo.damping), ("inertia", servo.armature)):
@@ -401,14 +401,14 @@ class ServoModel(JointModel):
 
     def positions(self, group: Sequence[int], values: Array, free: bool = False) -> Array:
         """(S, n, J') simulated positions of a group's joints on the grid, S sets (S, P); ``free``: out of contact."""
-        at, whole = list(group), len(group) > 1
+        at = list(group)
         each = [self.numbers(j, values) for j in group]
         loads, parts = np.zeros((3, len(self.grid), len(group))), self.loads
         loads[:2] = parts.torque[:, :, at]
         if not free:
             loads[0] += self.pressing[:, at]
             loads[2] = self.contact[:, at]
-        matrices = [one if whole else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
+        matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
         around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at]
         start = np.empty((len(self.first), len(group)))
         for k, motion in enumerate(self.log.motions):

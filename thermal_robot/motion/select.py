@@ -17,6 +17,7 @@ from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Point, deflated, fit
 from thermal_robot.motion.model import SHARED, JointModel, Mask
+from thermal_robot.motion.result import rms
 from thermal_robot.motion.weigh import Scales, Weighed
 
 PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous",
@@ -75,8 +76,14 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     """
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
-        plain = allowed & model.of_effects(PLAIN)
-        start = fit(model, begun, plain).values
+        # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
+        plain, limits = (allowed & model.of_effects(names) for names in (PLAIN, ("torque_limit",)))
+        fits = [fit(model, first, plain).values for first in (begun, np.where(limits, model.sizes, begun))]
+        left = np.log([[rms(one) for one in model.all_residuals(values)] for values in fits])
+        start = fits[int(left.sum(axis=1).argmin())].copy()
+        for group in model.groups:
+            own = np.isin(model.placed, group)
+            start[own] = fits[int(left[:, list(group)].sum(axis=1).argmin())][own]
     abrupt = allowed & (start == 0.0) & model.of_effects(ABRUPT)
     values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
     for number in range(1, settings.REFRESHES + 1):

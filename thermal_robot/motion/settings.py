@@ -89,7 +89,7 @@ SEEN = 1e-5
 PAYLOAD = 0.3
 """Expected payload over the rated one: the mass that the weakest joint can hold with the arm stretched as it moved."""
 LEAST_STIFFNESS = 0.05
-"""Of the stated stiffness: a servo with less does not hold its arm."""
+"""Of the stated stiffness: the least that is fitted, as a servo with less does not hold its arm."""
 LEAST_COMPLIANCE = 1e-3
 """rad/(N·m): of a joint whose droop is not known yet, where contact divides a force among joints."""
 FEW = 0.999

@@ -55,7 +55,7 @@ class TorqueModel(JointModel):
             fastest = max(float(np.abs(self._v[:, j]).max()), 1e-6)
             for e in TORQUE_EFFECTS:
                 size = e.size * (limit if e.of_limit else 1.0) / (fastest if e.of_speed else 1.0)
-                found.append(Parameter(e.name, j, e.label, e.unit, size, e.spread, e.positive, e.name))
+                found.append(Parameter(e.name, j, e.label, e.unit, size, e.spread, e.least, e.name))
         if self.log.robot.has_masses:
             found.append(self.payload(self._loads[1]))
             for k, (name, numbers) in enumerate(self._bodies.items()):
@@ -63,7 +63,7 @@ class TorqueModel(JointModel):
                 known = (0.1, ""), *[(first, "kg·m")] * 3, *[(first * settings.LINK, "kg·m²")] * 6
                 for i, (what, (size, unit)) in enumerate(zip(INERTIAL, known, strict=True), 10 * k):
                     label = what.format(name)
-                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, False, f"mass {i}", label))
+                    found.append(Parameter("masses", SHARED, label, unit, size, 1.0, -np.inf, f"mass {i}", label))
         return tuple(found)
 
     @cached_property
