@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from motion.found import COUNT, TRUE, found, nothing
 
-from thermal_robot.diagnosis.values import HeldOut
+from thermal_robot.diagnosis.values import Estimate, HeldOut
 from thermal_robot.motion.result import with_summary
 
 CASES = {
@@ -98,6 +98,22 @@ def test_what_no_log_of_this_kind_can_tell_is_always_said():
     assert "viscous friction in the joint and damping in the servo are one" in text
     assert "stiffness is not stated" in text
     assert "stiffness is not stated" not in str(found(stated=True))
+
+
+def test_of_a_single_joint_it_is_always_said_that_masses_and_stiffness_droop_alike():
+    several = found(stated=True)
+    mass = Estimate("mass", 0.3, 0.02, "kg", True)
+    payload = replace(several.finding("payload"), status="found", probability=0.99, shrinkage=0.5, parameters=(mass,))
+    effects = (payload, *(one for one in several.effects if one.name not in ("payload", "droop")))
+    moves = several.moves | {("payload", "joint_2"): 0.1}
+    alone = {
+        "effects": effects,
+        "verdict": ("payload",),
+        "moves": moves,
+        "joints": {"joint_2": several.joints["joint_2"]},
+    }
+    assert "masses droop alike" in str(with_summary(replace(several, **alone)))
+    assert "masses droop alike" not in str(with_summary(replace(several, **alone | {"joints": several.joints})))
 
 
 def test_a_remainder_is_told_with_what_it_follows():

@@ -117,7 +117,7 @@ def always(d: MotionDiagnosis) -> Iterator[str]:
         yield "Without a torque column, viscous friction in the joint and damping in the servo are one: both are lag."
     if "zero" in named and not torque:
         yield "Without a torque column, a zero that is off and a constant torque are one: both are told as zero."
-    if "droop" in named:
+    if "droop" in named or (len(d.joints) == 1 and named & {"kp", "payload"} and not torque):
         yield "A softer servo and heavier masses droop alike, unless the stiffness or the torque is known."
     if "torque_limit" in named and not torque:
         yield "A weak supply and a wrong motor constant saturate alike, without columns of volts and current."
