@@ -316,3 +316,15 @@ def test_diagnosis_names_what_was_put_in_and_little_else():
     for (effect, joint), value in TRUE.items():
         row = told[effect, log.joints[joint]]
         assert abs(row.value - value) < 4.0 * row.std + 0.05 * value, (effect, joint)
+
+
+@pytest.mark.slow
+def test_a_plane_that_saturates_servos_is_told_at_its_height_in_the_root_frame():
+    """A plane presses no harder than servos push; from the lowest command it would be told 0.1 m lower."""
+    world = draw_world(np.random.default_rng(5), 2, 9)
+    height = float(np.quantile(world.simulated(Fault("nothing")).height, 0.1))
+    log = world.log(world.simulated(Fault("table", -1, height)))
+    found = diagnose_motion(replace(log, motions=log.motions[1::2]), only=("contact",))
+    (told,) = found.finding("contact").parameters
+    assert told.value == pytest.approx(height, abs=5e-3)
+    assert max(gap.after for gap in found.joints.values()) < 0.1

@@ -184,7 +184,8 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     places, estimates = dict[str, float](), []
     for p, one, joint in ((p, model.parameters[p], model.joint_of(model.parameters[p])) for p in active):
         called = f"{one.label}, {joint}" if joint else one.label
-        estimates.append(Estimate(called, float(choice.point.values[p]), float(deviations[p]), one.unit, True))
+        value = float(choice.point.values[p]) + (model.lowest if name == "contact" else 0.0)
+        estimates.append(Estimate(called, value, float(deviations[p]), one.unit, True))
         if joint:
             places[joint] = places.get(joint, 0.0) + float(share[p].sum())
     status: Status = "confounded" if rivals and probability < settings.SURE else "found"

@@ -113,10 +113,10 @@ class Point:
     def ahead(self, active: Mask) -> Point:
         """Predict the linearised model at the maximum a posteriori values of some parameters (P,), the others zero."""
         own, (matrix, vector) = np.flatnonzero(active), self.whole
-        positive = np.array([one.positive for one in self.model.parameters])
+        least = np.array([one.least for one in self.model.parameters])
         values, problem = np.zeros(len(active)), (matrix[np.ix_(own, own)], vector[own])
         if len(own):
-            values[own], _ = _ahead((*problem, self.model.sizes[own] ** -2.0, positive[own]), values[own], 0.0)
+            values[own], _ = _ahead((*problem, self.model.sizes[own] ** -2.0, least[own]), values[own], 0.0)
         return Point(self.model, values, [one.at(values) for one in self.rows])
 
     @property

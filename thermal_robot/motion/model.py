@@ -67,6 +67,8 @@ class JointModel(ABC):
     groups: tuple[tuple[int, ...], ...]  # of joints that move each other
     motions: list[NDArray[np.int64]]  # of each joint the motions (N,) of its readings
     unit = "rad"
+    lowest = 0.0
+    """Height of the tool in the lowest command, m, above which a plane's is fitted."""
 
     def __init__(self, log: MotionLog) -> None:
         self.log, self.joints = log, range(len(log.joints))
@@ -320,9 +322,8 @@ class ServoModel(JointModel):
             found.append(Parameter("step", SHARED, "time step", "s", settings.TIME_STEP, 1.0, 0.0, "step"))
             found.append(Parameter("creep", SHARED, "creep of friction", "", settings.CREEP, 1.0, 0.0, "creep"))
         if self.log.robot.has_masses:
-            height = "height above the lowest command"
             found.append(self.payload(self.loads.torque[1]))
-            found.append(Parameter("contact", SHARED, height, "m", 0.1, 1.5, 0.0, "contact"))
+            found.append(Parameter("contact", SHARED, "height", "m", 0.1, 1.5, 0.0, "contact"))
         return tuple(found)
 
     def start(self) -> Array:
@@ -508,5 +509,7 @@ class ServoModel(JointModel):
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
         self.touching = float(values[p])
         into = self.lowest + self.touching - height
-        self.contact = np.where(into > 0.0, 1.0, 0.0)[:, None] * -slope / yields[:, None]
-        self.pressing = self.contact * np.maximum(into, 0.0)[:, None]
+        most = np.array([servo.limit or np.inf for servo in self.servos]) / np.maximum(np.abs(slope), 1e-12)
+        force = np.clip(into / yields, 0.0, most.min(axis=1))
+        self.contact = np.where(into / yields == force, 1.0, 0.0)[:, None] * -slope / yields[:, None]
+        self.pressing = -slope * force[:, None]

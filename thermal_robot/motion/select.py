@@ -72,7 +72,8 @@ def without(active: Mask, block: int) -> Mask:
 def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Point:
     """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
 
-    From ``start``, by default from a fit of plain servos; effects that are abrupt start where the joints end.
+    From ``start``, by default from fits of plain servos with torque limits at the largest errors and of the expected
+    size, the better of each group of joints; effects that are abrupt start where the joints end.
     """
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
