@@ -8,6 +8,7 @@ import pytest
 
 import thermal_robot as tr
 from thermal_robot import report
+from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.effects import library
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
@@ -140,6 +141,17 @@ def test_a_series_of_distances_shows_the_zero_that_moved(ur10):
     (alarm,) = tr.wear(series, effects=["joint_offset"]).alarms
     assert (alarm.place, alarm.kind) == ("elbow_joint", "jump")
     assert alarm.change == pytest.approx(1e-3, abs=4.0 * alarm.change_std)
+
+
+@pytest.mark.parametrize("kinds", [("distance",), ("plane", "distance")])
+def test_rows_that_share_unknown_places_are_diagnosed_and_not_summed(ur10, kinds, monkeypatch):
+    """Sums over a part of the rows lacked the artefacts of others: more than a thousand rows ended in a ValueError."""
+    monkeypatch.setattr(diagnosis_settings, "KEPT", 20)
+    old, new = (read_as(measured(ur10, noise=2e-5, rows=rows, seed=rows), kinds) for rows in (120, 12))
+    known = tr.diagnose(old, only=["joint_offset"])
+    assert known.verdict == ("joint_offset",)
+    with pytest.raises(tr.EstimationError, match="diagnose old and new rows together"):
+        known.update(new)
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,13 @@ from observables.test_along import TRUE, measured, read_as
 
 import thermal_robot as tr
 from thermal_robot.campaign.read import more_rows
+from thermal_robot.diagnosis.next_measurement import next_samples
 from thermal_robot.effects import library
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference.columns import unknown_frames
 from thermal_robot.inference.fit import fit_named
 from thermal_robot.inference.variance_components import reweighted, weighted_fit
+from thermal_robot.planning.plan import foreseen
 
 FINE, COARSE = 2e-5, 6e-4
 
@@ -100,3 +102,20 @@ def test_repeats_tell_the_noise_of_each_kind_by_what_it_sees(ur10, kinds):
     assert set(told) == set(kinds)
     for own, floor in told.items():
         assert floor == pytest.approx(sigma[own], rel=0.25)
+
+
+def test_next_samples_are_of_the_kind_that_tells_more(ur10):
+    """A wire that is thirty times as noisy as a plane is worth a thousandth of it; both counted alike."""
+    known = tr.diagnose(stated(mixed(ur10, 0)), only=["joint_offset"])
+    samples = next_samples(known.fit, count=10).samples
+    assert all("plane" in sample.labels for sample in samples)
+    assert samples[-1].gain > 0.5
+
+
+def test_what_is_foreseen_is_by_the_noise_of_each_row(ur10):
+    both = stated(mixed(ur10, 0))
+    touched = both.take(both.labels["kind"] == "plane")
+    (whole,), (planes,) = (foreseen(own, "joint_offset") for own in (both, touched))
+    assert sum(p.told for p in planes.parameters) == 4
+    for one, other in zip(whole.parameters, planes.parameters, strict=True):
+        assert 0.9 * other.sigma < one.sigma <= other.sigma * (1.0 + 1e-9)

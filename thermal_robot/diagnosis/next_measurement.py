@@ -334,7 +334,8 @@ class _Predictive:
 
 def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination]) -> list[_Predictive]:
     e = fit.explanation
-    noise = e.whitening.noise * e.best.noise
+    relative = offered.campaign.relative_noise
+    noise = e.whitening.noise * e.best.noise * (1.0 if relative is None else relative)
     flat = e.linear.frames.shape[2]
     index = sorted({b for combination in leading for b in combination.blocks})
     items = [e.linear.blocks[b] for b in index]
@@ -342,7 +343,7 @@ def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination])
     gram = products(Linear(e.linear.gap, e.linear.frames, tuple(items)), e.whitening) / e.best.noise**2
     # the simulator's own tool is never refitted: its columns come last and are left out
     columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]
-    asked = np.concatenate(columns, axis=2) / noise[:, None]
+    asked = np.concatenate(columns, axis=2) / np.atleast_2d(noise)[:, :, None]
     of = np.repeat([-1, *index], [flat, *(len(item.sizes) for item in items)])  # the block of each column
     found = []
     for combination in leading:

@@ -56,6 +56,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.grouping import blocks, each
 from thermal_robot.inference.inside import identified
 from thermal_robot.inference.weights import Noise, distance_limit
+from thermal_robot.observables import seen_components
 from thermal_robot.observations import observe
 from thermal_robot.prediction import Spread, moves
 
@@ -283,9 +284,13 @@ def watch(fit: Fit) -> Watch:
     return Watch(tuple(item for item in tested if len(item.sizes)), scatter, aside, fit.campaign.samples)
 
 
-def independent_rows(fit: Fit) -> bool:
-    """Whether rows are independent: no discrepancy is drawn anew in every pose or visit."""
-    return fit.explanation.whitening.smooth is None
+def in_common(fit: Fit) -> str:
+    """Say what rows have in common beside frames and parameters, so that sums cannot stand for them; else empty."""
+    if fit.explanation.whitening.smooth is not None:
+        return "what remains is drawn anew in every pose or visit"
+    if fit.corrected.frames.artefacts or seen_components(fit.campaign) is not None:
+        return "rows share planes, stands, anchors or cameras whose places are not known"
+    return ""
 
 
 class Diagnosed(Protocol):
@@ -317,10 +322,9 @@ def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
 
     Only alternatives that are less probable than the choice are followed.
     """
-    if not independent_rows(fit):
+    if why := in_common(fit):
         raise EstimationError(
-            f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
-            "on all of them; diagnose old and new rows together"
+            f"{fit.campaign.name}: {why}, and how rows count depends on all of them; diagnose old and new rows together"
         )
     if fit not in _BEGUN:
         estimate, runners = fixed_point(fit), chosen(fit)[1]
@@ -332,7 +336,7 @@ def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
 
 def prepare(found: Diagnosed) -> None:
     """Sum the rows of a large diagnosis beforehand, so that updates need no pass over them."""
-    if found.usable and found.fit is not None and found.samples > 2 * own_settings.KEPT and independent_rows(found.fit):
+    if found.usable and found.fit is not None and found.samples > 2 * own_settings.KEPT and not in_common(found.fit):
         start(found.fit)
 
 

@@ -156,7 +156,8 @@ class Columns:
         campaign = seen.campaign
         noise = np.repeat(np.array([campaign.noise_position, campaign.noise_orientation], dtype=float), 3)[:measures]
         linear = Linear(np.zeros((rows, measures)), frames, items)
-        stack = whitened(linear, Whitening(np.ones(rows), noise, 0.0)).reshape(rows, measures, -1)[:, :, :-1]
+        whitening = Whitening(np.ones(rows), noise, 0.0, relative=campaign.relative_noise)
+        stack = whitened(linear, whitening).reshape(rows, measures, -1)[:, :, :-1]
         return cls(stack * np.concatenate([np.ones(flat), *(item.sizes for item in items)]), flat, items)
 
     @property
