@@ -95,7 +95,7 @@ def test_derivatives_are_those_of_a_step_a_tenth_as_long(known, monkeypatch):
 
 def test_the_fit_returns_to_the_true_values(known):
     _, model, values = known
-    found = fit(model, np.where(values > 0.0, 1.5 * values, 0.0), values != 0.0).values
+    found = fit(model, np.where(values > 0.0, 1.5 * values, 0.0), values != 0.0)
     np.testing.assert_allclose(found[values != 0.0], values[values != 0.0], rtol=0.03)
     left = [np.sqrt(np.mean(one**2)) for one in model.all_residuals(found)]
     assert max(left) < 2.0 * COUNT / np.sqrt(12.0)
@@ -109,7 +109,7 @@ def test_a_step_that_saturates_is_dated_though_a_little_delay_changes_nothing():
     model.refreshed(values)
     active = model.of_effects(("lag", "coulomb", "delay", "torque_limit", "zero", "stribeck", "gain"))
     early = np.where(np.arange(len(values)) == delay, 0.03, values)
-    assert fit(model, early, active).values[delay] == pytest.approx(0.035, rel=0.01)
+    assert fit(model, early, active)[delay] == pytest.approx(0.035, rel=0.01)
 
 
 def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it():
@@ -241,7 +241,7 @@ def test_time_steps_of_semi_implicit_euler_are_told_by_the_error_they_make(step)
     model = ServoModel(world.log(world.simulated(Fault("nothing"))))
     own = np.array([one.effect == "step" for one in model.parameters])
     model.refreshed(np.where(own, step, 0.0))
-    found = fit(model, np.zeros(len(own)), own).values
+    found = fit(model, np.zeros(len(own)), own)
     assert found[own][0] == pytest.approx(step, rel=0.1)
     none = np.zeros(len(own))
     before, after = (sum((one**2).mean() for one in model.all_residuals(x)) for x in (none, found))
@@ -257,10 +257,10 @@ def test_friction_of_a_simulator_that_creeps_is_told_with_its_size():
     model = ServoModel(log)
     own = np.array([one.effect == "creep" or (one.effect, one.joint) == ("coulomb", 1) for one in model.parameters])
     model.refreshed(np.zeros(len(own)))
-    found = fit(model, np.where(own, model.start(), 0.0), own).values
+    found = fit(model, np.where(own, model.start(), 0.0), own)
     assert found[model.index("coulomb", 1)] == pytest.approx(0.004, rel=0.05)
     assert 0.05 < found[model.index("creep")] < 0.2
-    stuck = fit(model, np.where(own, model.start(), 0.0), own & (np.arange(len(own)) != model.index("creep"))).values
+    stuck = fit(model, np.where(own, model.start(), 0.0), own & (np.arange(len(own)) != model.index("creep")))
     left = [float((model.all_residuals(one)[1] ** 2).sum()) for one in (stuck, found)]
     assert left[1] < 0.5 * left[0]
 

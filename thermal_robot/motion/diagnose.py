@@ -114,7 +114,7 @@ def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:
         for one in choice.point.rows:
             told[one.columns] += one.bread[~held].sum(axis=0) * model.sizes[one.columns] ** 2
         known = abrupt & (told < settings.SEEN)
-        values = fit(model, choice.point.values, choice.active, ~held, known=known).values
+        values = fit(model, choice.point.values, choice.active, ~held, known=known)
         for joint, left in enumerate(model.all_residuals(values)):
             out = held[choice.point.rows[joint].motion]
             found[joint][out] = left[out]

@@ -112,11 +112,10 @@ class Point:
 
     def ahead(self, active: Mask) -> Point:
         """Predict the linearised model at the maximum a posteriori values of some parameters (P,), the others zero."""
-        own, (matrix, vector) = np.flatnonzero(active), self.whole
-        least = np.array([one.least for one in self.model.parameters])
-        values, problem = np.zeros(len(active)), (matrix[np.ix_(own, own)], vector[own])
+        own, (matrix, vector), values = np.flatnonzero(active), self.whole, np.zeros(len(active))
         if len(own):
-            values[own], _ = _ahead((*problem, self.model.sizes[own] ** -2.0, least[own]), values[own], 0.0)
+            problem = matrix[np.ix_(own, own)], vector[own], self.model.sizes[own] ** -2.0, self.model.least[own]
+            values[own], _ = _ahead(problem, values[own], 0.0)
         return Point(self.model, values, [one.at(values) for one in self.rows])
 
     @property
@@ -132,17 +131,29 @@ class Point:
 def fit(
     model: JointModel, values: Array, active: Mask, motions: Mask | None = None, groups: Groups | None = None,
     known: Mask | None = None,
-) -> Point:  # fmt: skip
-    """Maximum a posteriori fit of the active parameters, the others zero, by damped Gauss-Newton; linearised there.
+) -> Array:  # fmt: skip
+    """Maximum a posteriori values (P,) of the active parameters, the others zero, by damped Gauss-Newton.
 
     The prior counts as much as one independent reading. ``motions`` (M,) are the clusters that are fitted, by default
     all. Of some ``groups`` of joints only their own parameters move; those ``known`` (P,) stay.
     """
+    return _fit(model, values, active, motions, groups, known)[0]
+
+
+def fitted(model: JointModel, values: Array, active: Mask, groups: Groups | None = None) -> Point:
+    """Maximum a posteriori fit of the active parameters, as :func:`fit`, and the model linearised there by these."""
+    values, point = _fit(model, values, active, None, groups, None)
+    return point or Point.at(model, values, active, groups)
+
+
+def _fit(
+    model: JointModel, values: Array, active: Mask, motions: Mask | None, groups: Groups | None, known: Mask | None
+) -> tuple[Array, Point | None]:
+    """Return the fit's values (P,), and if the last round moved nothing, the model as it was linearised there."""
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
-    values, fitted = np.where(active, values, 0.0), active
+    values, every = np.where(active, values, 0.0), active
     joint_of = model.placed
     active = active if known is None else active & ~known
-    least = np.array([one.least for one in model.parameters])
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     common = active & (joint_of == SHARED) & (not some)
     inside = active & np.isin(joint_of, [j for group in groups for j in group])
@@ -156,17 +167,17 @@ def fit(
             continue
         point = Point.at(model, values, now, groups)
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, least[own]
+        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, model.least[own]
         # as one where a shared parameter moves, else each group by itself
         sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
         parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
         values, gain = _line_search(_Cost(model, groups, point, motions, parts), problem, own, sets)
-        if gain == 0.0 and (now == fitted).all():
-            return point
+        if gain == 0.0 and (now == every).all():
+            return values, point
         quiet = quiet + 1 if gain < settings.SETTLED else 0
         if quiet > (common.any() and not alone):
             break
-    return Point.at(model, values, fitted, groups)
+    return values, None
 
 
 def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: list[Mask]) -> tuple[Array, float]:
@@ -286,7 +297,7 @@ def deflated(point: Point, deflation: Array, worth: Array) -> Gram:
         equations + float(found / sizes @ along),
         tuple(slice(i, i + 1) for i in k),
         tuple(np.eye(1) for _ in k),
-        np.array([one.least == 0.0 for one in parameters]),
+        point.model.least == 0.0,
         tuple(int(whole[i, i] > settings.SEEN) for i in k),
         np.array([one.spread for one in parameters]),
         equations,

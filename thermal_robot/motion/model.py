@@ -88,6 +88,11 @@ class JointModel(ABC):
         return np.array([one.size for one in self.parameters])
 
     @cached_property
+    def least(self) -> Array:
+        """(P,) least values of the parameters, −∞ where they have none."""
+        return np.array([one.least for one in self.parameters])
+
+    @cached_property
     def placed(self) -> NDArray[np.int64]:
         """(P,) joint of each parameter; ``SHARED`` where all joints share it."""
         return np.array([one.joint for one in self.parameters])
@@ -328,7 +333,7 @@ class ServoModel(JointModel):
 
     def start(self) -> Array:
         """(P,) starting values: half a prior size, 0 if signed; stops, limit and contact from ends of the motion."""
-        values = np.array([0.5 * one.size if one.least == 0.0 else 0.0 for one in self.parameters])
+        values = np.where(self.least == 0.0, 0.5 * self.sizes, 0.0)
         for joint in self.joints:
             command, (low, high) = self.commanded[:, joint], (end[joint] for end in self.reach)
             values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
@@ -345,8 +350,6 @@ class ServoModel(JointModel):
 
         Of a servo that is not stated the largest error tells it, and of one whose limit is, what it has more.
         """
-        stiffness = np.array([servo.kp or 0.0 for servo in self.servos])
-        stated = np.array([servo.limit or np.inf for servo in self.servos])
         if not self.coupled:
             error = [np.abs(self.commanded[place, j] - q) for j, (q, place, _, _) in enumerate(self._samples)]
             most = np.array([np.quantile(one, settings.FEW) for one in error])
@@ -357,6 +360,8 @@ class ServoModel(JointModel):
             moved = [savgol_filter(read[a:b], width, 3, k, self.step, axis=0) for k in range(3)]
             torques.append(self.dynamics.torques(*moved)[0])
         most = np.quantile(np.abs(np.concatenate(torques)), settings.FEW, axis=0)
+        stiffness = np.array([servo.kp or 0.0 for servo in self.servos])
+        stated = np.array([servo.limit or np.inf for servo in self.servos])
         return np.asarray(np.maximum(stiffness / np.maximum(most, 1e-12) - stiffness / stated, 0.0))
 
     def _heights(self, q: Array) -> tuple[Array, Array]:

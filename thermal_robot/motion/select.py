@@ -15,7 +15,7 @@ from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Point, deflated, fit
+from thermal_robot.motion.fit import Point, deflated, fit, fitted
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.result import rms
 from thermal_robot.motion.weigh import Scales, Weighed
@@ -79,7 +79,7 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     if start is None:
         # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
         plain, limits = (allowed & model.of_effects(names) for names in (PLAIN, ("torque_limit",)))
-        fits = [fit(model, first, plain).values for first in (begun, np.where(limits, model.sizes, begun))]
+        fits = [fit(model, first, plain) for first in (begun, np.where(limits, model.sizes, begun))]
         left = np.log([[rms(one) for one in model.all_residuals(values)] for values in fits])
         start = fits[int(left.sum(axis=1).argmin())].copy()
         for group in model.groups:
@@ -90,7 +90,7 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)
-        point = fit(model, values, allowed)
+        point = fitted(model, values, allowed)
         values = point.values
     return point
 
@@ -98,20 +98,20 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
 def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Weighed:
     """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
     point = everything(model, allowed, start, progress)
-    scales, fitted = Scales.of(point), list[Weighed]()
+    scales, found = Scales.of(point), list[Weighed]()
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
-        if fitted:
-            point = Point.at(model, fitted[-1].point.values)
-        first = fitted[-1].own.tolist() if fitted else []
+        if found:
+            point = Point.at(model, found[-1].point.values)
+        first = found[-1].own.tolist() if found else []
         known = np.isin(np.arange(len(allowed)), _search(point, scales, allowed).run(first).blocks)
-        if fitted and (known == fitted[-1].active).all():
+        if found and (known == found[-1].active).all():
             break
-        values = fit(model, point.values, known).values
+        values = fit(model, point.values, known)
         model.refreshed(values)
-        fitted.append(scales.fitted(known, values))
+        found.append(scales.fitted(known, values))
     # a search that left the neighbourhood of its point may have chosen worse than the round before
-    return min(fitted, key=lambda one: one.loss)
+    return min(found, key=lambda one: one.loss)
 
 
 def _search(point: Point, scales: Scales, allowed: Mask) -> Search:

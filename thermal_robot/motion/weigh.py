@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, deflated, fit, ratios, worth
+from thermal_robot.motion.fit import Groups, Point, deflated, fitted, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 
 
@@ -45,7 +45,7 @@ class Scales:
 
     def fitted(self, active: Mask, values: Array) -> Weighed:
         """Weigh a set ``active`` (P,) at its maximum a posteriori fit from some values (P,)."""
-        return Weighed(self, active, fit(self.model, values, active))
+        return Weighed(self, active, fitted(self.model, values, active))
 
     def others(
         self, base: Weighed, sets: Sequence[tuple[Mask, Array]], point: Point | None = None, least: float = -np.inf
@@ -64,7 +64,7 @@ class Scales:
                 if key not in self.known and (key not in self.far or least == -np.inf):
                     missing.setdefault(key, (groups, active, values))
 
-        def fitted(key: tuple[bytes, ...]) -> Point | None:
+        def near(key: tuple[bytes, ...]) -> Point | None:
             groups, active, values = missing[key]
             begun = self._begun(point, groups, active, values)
             if least > -np.inf:
@@ -72,14 +72,14 @@ class Scales:
                 told = self._placed(base, np.where(self._within(groups), active, base.active))
                 if told.log_evidence < least and told.loss > base.loss:
                     return None
-                begun = np.where(self._within(groups), self.far[key].values, begun)
-            found = fit(self.model, begun, active, groups=groups)
+                begun = np.where(self._within(groups), self.far.pop(key).values, begun)
+            found = fitted(self.model, begun, active, groups=groups)
             # of long logs residuals would be large
             return replace(found, rows=[one.without_residual() for one in found.rows])
 
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
-        found = dict(zip(alone, self.model.each(fitted, alone), strict=True)) if alone else {}
-        found |= {key: fitted(key) for key in missing if key not in found}
+        found = dict(zip(alone, self.model.each(near, alone), strict=True)) if alone else {}
+        found |= {key: near(key) for key in missing if key not in found}
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
 

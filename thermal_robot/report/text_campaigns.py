@@ -369,7 +369,7 @@ def _wear_lines(wear: Wear) -> Iterator[str]:
     yield wear.summary
     yield ""
     yield f"campaigns    {len(wear.campaigns)}{days}"
-    yield f"alarms       at most {_rarely(wear.false_alarm)} of series without a change ring"
+    yield f"alarms       at most {_rarely(max(wear.false_alarm, 1e-5))} of series without a change ring"
     nothing = units.probability(wear.nothing)
     yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {nothing}"
     for worn in wear.alarms:
@@ -438,4 +438,4 @@ def _reaches(crossing: Crossing, unit: str) -> str:
 
 
 def _rarely(probability: float) -> str:
-    return f"{max(100.0 * probability, 0.001):.2g} %"
+    return f"{100.0 * probability:.2g} %"
