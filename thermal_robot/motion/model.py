@@ -328,7 +328,7 @@ class ServoModel(JointModel):
             found.append(Parameter("creep", SHARED, "creep of friction", "", settings.CREEP, 1.0, 0.0, "creep"))
         if self.log.robot.has_masses:
             found.append(self.payload(self.loads.torque[1]))
-            found.append(Parameter("contact", SHARED, "height", "m", 0.1, 1.5, 0.0, "contact"))
+            found.append(Parameter("contact", SHARED, "height in the root frame", "m", 0.1, 1.5, 0.0, "contact"))
         return tuple(found)
 
     def start(self) -> Array:
