@@ -12,8 +12,8 @@ from thermal_robot.motion.servo import PARAMETERS, simulate
 STEP = 0.02
 
 
-def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, **numbers):
-    """Position after a step of the command (or a table of stamps and values), and its instants."""
+def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, joints=1, **numbers):
+    """Position after a step of the command (or a table of stamps and values), and its instants; of joints alike."""
     times, values = (np.array([0.0]), np.array([command])) if np.isscalar(command) else map(np.asarray, command)
     values = values.astype(float)
     n = round(seconds / STEP) + 1
@@ -21,19 +21,30 @@ def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, 
     row[PARAMETERS.index("low")], row[PARAMETERS.index("high")] = -np.inf, np.inf
     for name, value in numbers.items():
         row[PARAMETERS.index(name)] = value
-    loads, none, slopes = np.zeros((3, n, 1)), np.zeros((2, n, 1, 1)), np.zeros((2, n, 1, 1))
-    loads[0], slopes[0] = load, slope
-    around = loads, none, slopes, none, np.zeros((n, 1)), np.zeros((n, 1))
+    loads, none, slopes = (np.zeros((k, n, *shape)) for k, shape in ((3, (joints,)), *[(2, (joints, joints))] * 2))
+    loads[0], slopes[0] = load, slope * np.eye(joints)
+    around = loads, none, slopes, none, np.zeros((n, joints)), np.zeros((n, joints))
     grid = np.array([0, n]), np.zeros(1)
-    ends = np.array([[0, len(times)]])
-    command = times, values, ends
-    found = simulate(row[None, None], np.zeros((1, 2)), grid, command, around, np.array([[start]]), STEP, substeps)
-    return found[0, :, 0], STEP * np.arange(n)
+    ends = len(times) * np.arange(joints)[:, None] + [0, len(times)]
+    command = np.tile(times, joints), np.tile(values, joints), ends
+    rows, begun = np.tile(row, (1, joints, 1)), np.full((1, joints), start)
+    found = simulate(rows, np.zeros((1, 2)), grid, command, around, begun, STEP, substeps)
+    return found[0, :, -1], STEP * np.arange(n)
 
 
 def test_lag_follows_its_exponential():
     q, t = moved(lag=0.07)
     np.testing.assert_allclose(q, 1.0 - np.exp(-t / 0.07), atol=2e-4)
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_a_set_point_of_limited_speed_is_a_ramp_that_the_lag_follows(joints):
+    lag, speed = 0.07, 1.3
+    q, t = moved(lag=lag, slew=1.0 / speed, joints=joints)
+    ramp = speed * (t - lag * (1.0 - np.exp(-t / lag)))
+    reached = speed * (1.0 / speed - lag * (1.0 - np.exp(-1.0 / (speed * lag))))
+    after = 1.0 - (1.0 - reached) * np.exp(-(t - 1.0 / speed) / lag)
+    np.testing.assert_allclose(q, np.where(t < 1.0 / speed, ramp, after), atol=2e-3)
 
 
 @pytest.mark.parametrize(("substeps", "error"), [(5, 2e-3), (10, 5e-4), (20, 1.3e-4)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -60,7 +61,7 @@ CASES = [
     ("coulomb", 0.2, lambda k, limit: {"coulomb": 0.2 / k}),
     ("armature", 0.02, lambda k, limit: {"armature": 0.02 / k}),
     ("viscous", 0.3, lambda k, limit: {"lag": 0.3 / k}),
-    ("kp", 0.3, lambda k, limit: {"kp": 0.3}),
+    ("kp", 0.3, lambda k, limit: {"kp": math.log(1.3)}),
     ("zero", 0.02, lambda k, limit: {"zero": 0.02}),
     ("gain", 0.03, lambda k, limit: {"gain": 0.03}),
     ("payload", 0.05, lambda k, limit: {("payload", ""): 0.05}),
@@ -200,7 +201,7 @@ def test_the_rollout_shrinks_the_gap_as_it_was_told():
     fitted = strong(a_world(5, 200))
     unseen = replace(fitted, commands=0.7 * fitted.commands[:, ::-1].copy())
     fault = Fault("kp", JOINT, -0.4)
-    found = found_of(fitted.log(fitted.simulated(fault)), {"kp": -0.4})
+    found = found_of(fitted.log(fitted.simulated(fault)), {"kp": math.log(0.6)})
     written = motion_mjcf(found, fitted.mjcf())
     did = rollout(found, written.text, unseen.log(unseen.simulated(fault)))
     assert did.shrinkage > 0.9

@@ -188,11 +188,11 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
         estimates.append(Estimate(called, value, float(deviations[p]), one.unit, True))
         if joint:
             places[joint] = places.get(joint, 0.0) + float(share[p].sum())
-    status: Status = "confounded" if rivals and probability < settings.SURE else "found"
+    status: Status = "confounded" if rivals else "found"
     total = float(sum(share[p].sum() for p in active))
     return Finding(
         name, status, probability, total, parameters=tuple(estimates), title=title,
-        confounded_with=tuple(sorted(rivals)) if status == "confounded" else (),
+        confounded_with=tuple(sorted(rivals)),
         locations=tuple(Location("joint", *one) for one in sorted(places.items(), key=lambda one: -one[1])),
     )  # fmt: skip
 

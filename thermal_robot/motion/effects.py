@@ -6,7 +6,7 @@ Values fitted as a torque over the servo's stiffness are multiplied by the stiff
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
+from math import exp, inf, log
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.values import Estimate
@@ -49,8 +49,8 @@ EFFECTS = (
     ServoEffect("armature", "inertia of the drives", "the drive's inertia", "inertia over stiffness", "inertia", "s²",
                 5e-3, of_limit=True, torque=("inertia", "kg·m²")),
     ServoEffect("droop", "droop under load", "droop under load", "compliance", "droop", "rad/(N·m)", 0.07),
-    ServoEffect("kp", "stiffness of the servos", "the servo's stiffness", "change of stiffness", "kp", "", 0.2,
-                least=settings.LEAST_STIFFNESS - 1.0),
+    ServoEffect("kp", "stiffness of the servos", "the servo's stiffness", "logarithm of its ratio", "kp", "", 0.2,
+                least=-log(settings.SOFTER)),
     ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True,
                 torque=("torque", "N·m")),
     ServoEffect("load_friction", "friction that grows with load", "friction that grows with load",
@@ -60,6 +60,8 @@ EFFECTS = (
     ServoEffect("dead_zone", "dead zone or play", "a dead zone or play", "half width", "dead_zone", "rad", 5e-3),
     ServoEffect("torque_limit", "saturation of the servos", "the servo's saturation", "inverse of the limit",
                 "saturation", "1/rad", 5.0),
+    ServoEffect("speed_limit", "speed limits of the servos", "the servo's speed limit", "inverse of the speed",
+                "slew", "s/rad", 0.2),
     ServoEffect("low_stop", "lower end stops", "a lower end stop", "below which it stops", "low", "rad", 0.5,
                 spread=UNSOURCED),
     ServoEffect("high_stop", "upper end stops", "an upper end stop", "above which it stops", "high", "rad", 0.5,
@@ -76,7 +78,7 @@ TORQUE_EFFECTS = (
 )  # fmt: skip
 """Effects that a torque channel shows, in its units."""
 
-ABRUPT = ("contact", "torque_limit", "low_stop", "high_stop")
+ABRUPT = ("contact", "torque_limit", "speed_limit", "low_stop", "high_stop")
 """Effects that do nothing until they are reached, so that one motion alone may tell them."""
 SIMULATOR = ("step", "creep")
 """Effects of a simulator that made a log, which are told of no robot: its time step, its soft friction."""
@@ -88,7 +90,7 @@ SHARED_TITLES = {
 }
 TORQUE_TITLES = {effect.name: effect.title for effect in TORQUE_EFFECTS if effect.name not in TITLES}
 _TIMES_STIFFNESS = {(effect.name, effect.unit): effect.torque for effect in EFFECTS if effect.torque}
-_SHARES = {"gain", "kp", "load_friction", "torque_constant", "masses"}
+_SHARES = {"gain", "load_friction", "torque_constant", "masses"}
 
 
 def size(effect: ServoEffect, servo: Servo) -> float:
@@ -115,6 +117,9 @@ def physical(effect: str, estimate: Estimate, servo: Servo, commanded: Array) ->
     label, _, joint = estimate.name.rpartition(", ")
     place = f", {joint}" if label else ""
     value, std = estimate.value or 0.0, estimate.std or 0.0
+    if effect == "kp":
+        ratio = exp(value)
+        return replace(estimate, name=f"change{place}", value=100.0 * (ratio - 1.0), std=100.0 * ratio * std, unit="%")
     if effect in _SHARES and estimate.unit == "":
         return replace(estimate, value=100.0 * value, std=100.0 * std, unit="%")
     if (effect, estimate.unit) in _TIMES_STIFFNESS and servo.kp:
@@ -126,6 +131,8 @@ def physical(effect: str, estimate: Estimate, servo: Servo, commanded: Array) ->
         name, unit, factor = ("torque", "N·m", servo.kp) if servo.kp else ("error from which it saturates", "rad", 1.0)
         limit = servo.saturation(factor, value)
         return replace(estimate, name=name + place, value=limit, std=std * limit**2 / factor, unit=unit)
+    if effect == "speed_limit" and value > 0.0:
+        return replace(estimate, name=f"speed{place}", value=1.0 / value, std=std / value**2, unit="rad/s")
     if effect in ("low_stop", "high_stop") and len(commanded):
         at = commanded.min() + value if effect == "low_stop" else commanded.max() - value
         return replace(estimate, name=f"stops at{place}", value=float(at))

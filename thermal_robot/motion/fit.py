@@ -99,6 +99,12 @@ class Point:
 
         return cls(model, values, model.by_joint(parts, groups))
 
+    def with_rows(self, other: Point, groups: Groups) -> Point:
+        """Return the point with the rows that another one has of some groups of joints."""
+        joints = sorted(j for group in groups for j in group)
+        own = dict(enumerate(self.rows)) | dict(zip(joints, other.rows, strict=True))
+        return replace(self, rows=[own[j] for j in range(len(self.rows))])
+
     @property
     def noise(self) -> Array:
         """(J,) root mean square of each joint's residual, rad."""
@@ -171,7 +177,11 @@ def _fit(
         # as one where a shared parameter moves, else each group by itself
         sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
         parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
-        values, gain = _line_search(_Cost(model, groups, point, motions, parts), problem, own, sets)
+        cost = _Cost(model, groups, point, motions, parts)
+        values, gain = _line_search(cost, problem, own, sets)
+        if gain < settings.SETTLED:
+            values, more = _shifted(cost, values, now, sets)
+            gain += more
         if gain == 0.0 and (now == every).all():
             return values, point
         quiet = quiet + 1 if gain < settings.SETTLED else 0
@@ -200,6 +210,26 @@ def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: li
         if better.all():
             break
     return found, float((before - least).sum() / max(before.sum(), 1e-300))
+
+
+def _shifted(cost: _Cost, here: Array, now: Mask, sets: list[Mask]) -> tuple[Array, float]:
+    """Pattern search along the valley of delay and lag, where kinks stop Newton's steps; return the relative gain too.
+
+    Delays go earlier and later by SHIFTS of their expected size, lags the other way, where that betters a set's cost.
+    """
+    delay, lag = (now & cost.model.of_effects((name,)) for name in ("delay", "lag"))
+    found, before = here, np.zeros(len(sets))
+    if delay.any():
+        least = before = cost.of(here)
+        for share in settings.SHIFTS:
+            own = share * cost.model.sizes[delay].mean() * (delay.astype(float) - lag)
+            then = np.maximum(here + own, np.where(now, cost.model.least, here))
+            costs = cost.of(then)
+            for k in np.flatnonzero(costs < least).tolist():
+                found = np.where(sets[k], then, found)
+            least = np.minimum(costs, least)
+        return found, float((before - least).sum() / before.sum())
+    return found, 0.0
 
 
 def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:

@@ -339,6 +339,7 @@ class ServoModel(JointModel):
             values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
             values[self.index("high_stop", joint)] = max(command.max() - high, 0.0)
             values[self.index("torque_limit", joint)] = self._limits[joint]
+            values[self.index("speed_limit", joint)] = 1.0 / self._fastest[joint]
         if (p := self.index("contact")) is not None:
             height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
@@ -354,15 +355,26 @@ class ServoModel(JointModel):
             error = [np.abs(self.commanded[place, j] - q) for j, (q, place, _, _) in enumerate(self._samples)]
             most = np.array([np.quantile(one, settings.FEW) for one in error])
             return np.asarray(np.divide(1.0, most, out=np.zeros_like(most), where=most > 0.0))
-        torques, read = [], self._read()
-        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
-            width = min(round(settings.STRIDE / self.step) // 2 * 2 + 1, (b - a - 1) // 2 * 2 + 1)
-            moved = [savgol_filter(read[a:b], width, 3, k, self.step, axis=0) for k in range(3)]
-            torques.append(self.dynamics.torques(*moved)[0])
-        most = np.quantile(np.abs(np.concatenate(torques)), settings.FEW, axis=0)
+        most = np.quantile(np.abs(self.dynamics.torques(*self._moved)[0]), settings.FEW, axis=0)
         stiffness = np.array([servo.kp or 0.0 for servo in self.servos])
         stated = np.array([servo.limit or np.inf for servo in self.servos])
         return np.asarray(np.maximum(stiffness / np.maximum(most, 1e-12) - stiffness / stated, 0.0))
+
+    @cached_property
+    def _moved(self) -> tuple[Array, Array, Array]:
+        """Measured positions (n, J) on the grid, and their first two derivatives, by local cubics (Savitzky, Golay)."""
+        read, found = self._read(), list[list[Array]]()
+        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+            width = min(round(settings.STRIDE / self.step) // 2 * 2 + 1, (b - a - 1) // 2 * 2 + 1)
+            found.append([savgol_filter(read[a:b], max(width, 5), 3, k, self.step, axis=0) for k in range(3)])
+        q, v, a = (np.concatenate(one) for one in zip(*found, strict=True))
+        return q, v, a
+
+    @cached_property
+    def _fastest(self) -> Array:
+        """(J,) largest measured speeds, rad/s, at which a limited set point would show; at least what stirs a joint."""
+        speed = np.quantile(np.abs(self._moved[1]), settings.FEW, axis=0)
+        return np.asarray(np.maximum(speed, settings.STIRRED / settings.STRIDE))
 
     def _heights(self, q: Array) -> tuple[Array, Array]:
         """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
@@ -376,7 +388,7 @@ class ServoModel(JointModel):
         return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 16) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
+        """(S, 17) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
         weights = np.zeros((len(values), 2))
         for p, parameter in enumerate(self.parameters):
@@ -389,7 +401,7 @@ class ServoModel(JointModel):
             elif parameter.number == "contact":
                 weights[:, 1] = values[:, p] - self.touching
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
-            stiffness = servo.kp * (1.0 + x["kp"])
+            stiffness = servo.kp * np.minimum(np.exp(x["kp"]), settings.SOFTER)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
             x["saturation"] = x["saturation"] + (stiffness / servo.limit if servo.limit else 0.0)
             for name, torque in (("coulomb", servo.friction), ("lag", servo.damping), ("inertia", servo.armature)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,13 +15,12 @@ from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Point, deflated, fit, fitted
+from thermal_robot.motion.fit import Groups, Point, deflated, fit, fitted
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.result import rms
 from thermal_robot.motion.weigh import Scales, Weighed
 
-PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "kp", "payload", "masses", "offset", "viscous",
-         "torque_limit")  # fmt: skip
+PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 
 
@@ -54,7 +53,7 @@ class Choice:
 
     def fewer(self, block: int) -> Weighed:
         """Return the set without one of its parameters."""
-        return self.own.scales.others(self.own, [(without(self.active, block), self.point.values)])[0]
+        return self.own.scales.others(self.own, [(without(self.active, block), (self.point.values,))])[0]
 
     def alternatives(self, block: int) -> list[int]:
         """Return parameters that could replace one: log evidence no more than ALIKE below the choice's."""
@@ -73,13 +72,14 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
 
     From ``start``, by default from fits of plain servos with torque limits at the largest errors and of the expected
-    size, the better of each group of joints; effects that are abrupt start where the joints end.
+    size, and with speed limits, the best of each group of joints; effects that are abrupt start where the joints end.
     """
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
         # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
-        plain, limits = (allowed & model.of_effects(names) for names in (PLAIN, ("torque_limit",)))
-        fits = [fit(model, first, plain) for first in (begun, np.where(limits, model.sizes, begun))]
+        limited, led = (model.of_effects((*PLAIN, limit)) for limit in ("torque_limit", "speed_limit"))
+        sized = np.where(model.of_effects(("torque_limit",)), model.sizes, begun)
+        fits = [fit(model, first, allowed & own) for first, own in ((begun, limited), (sized, limited), (begun, led))]
         left = np.log([[rms(one) for one in model.all_residuals(values)] for values in fits])
         start = fits[int(left.sum(axis=1).argmin())].copy()
         for group in model.groups:
@@ -160,7 +160,8 @@ def _gain(own: Weighed, one: Weighed) -> float:
 
 def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
     """Weigh the set without each of its parameters."""
-    return scales.others(own, [(without(own.active, b), own.point.values) for b in own.own.tolist()])
+    ahead = [own.ahead(without(own.active, b)) for b in own.own.tolist()]
+    return scales.others(own, [(one.active, (own.point.values, one.point.values)) for one in ahead])
 
 
 def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
@@ -171,35 +172,37 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
     for b in sorted(ahead, key=lambda b: -ahead[b].log_evidence):
         seen, least = own.seen[b], own.log_evidence - settings.FAR_BELOW
-        (one,) = scales.others(own, [(ahead[b].active, own.point.values)], least=least if seen else -np.inf)
+        starts = own.point.values, ahead[b].point.values
+        (one,) = scales.others(own, [(ahead[b].active, starts)], least if seen else -np.inf)
         if not seen or one.log_evidence > own.log_evidence - np.log(settings.ODDS) or one.loss <= own.loss:
             return one
     return None
 
 
 def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
-    """Weigh the sets with one parameter exchanged, or one more, that the linear problem there finds likeliest.
+    """Weigh the sets with one parameter exchanged, or one more, that the linear problem finds likeliest.
 
-    Of each parameter of the choice so many, of each joint so many more.
+    Of each parameter of the choice so many, of each joint so many more; what may come in the place of a parameter tells
+    the problem that is linear at the fit without it, and not where another effect stands in for it.
     """
     model, joint = scales.model, scales.model.placed
-    point = Point.at(model, own.point.values)
-    search = _search(point, scales, allowed)
-    others = np.flatnonzero(allowed & ~own.active & (np.array(search.gram.ranks) > 0)).tolist()
-    start, sets = model.start(), list[tuple[Mask, Array]]()
+    start, places, sets = model.start(), np.arange(len(allowed)), list[tuple[Mask, tuple[Array, ...]]]()
 
-    def propose(rest: Mask, added: list[int]) -> None:
-        base = search.evaluate(np.flatnonzero(rest).tolist())
-        told = {k: search.evaluate([*base.blocks, k], base).log_evidence for k in added}
-        for k in sorted(told, key=lambda k: -told[k])[: settings.RIVALS]:
-            more = rest | (np.arange(len(rest)) == k)
-            sets.append((more, np.where(rest, own.point.values, np.where(more, start, 0.0))))
+    def propose(rest: Weighed, among: Sequence[Mask], groups: Groups = model.groups) -> None:
+        there = rest.active | (allowed & np.any(among, axis=0))
+        base = Weighed(
+            scales, rest.active, rest.point.with_rows(Point.at(model, rest.point.values, there, groups), groups)
+        )
+        for added in among:
+            told = [base.ahead(rest.active | (places == k)) for k in places[allowed & ~own.active & added]]
+            for one in sorted(told, key=lambda one: -one.log_evidence)[: settings.RIVALS]:
+                begun = np.where(rest.active, rest.point.values, np.where(one.active, start, 0.0))
+                sets.append((one.active, (begun, one.point.values)))
 
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
-    for b in own.own.tolist():
+    for b, rest in zip(own.own.tolist(), _drops(scales, own), strict=True):
         alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
-        propose(without(own.active, b), [k for k in others if alike[k]])
-    for j in (*model.joints, SHARED):
-        propose(own.active, [k for k in others if joint[k] == j])
-    return scales.others(own, sets, point, own.log_evidence - settings.FAR_BELOW)
+        propose(rest, [alike], [group for group in model.groups if joint[b] in (*group, SHARED)])
+    propose(own, [joint == j for j in (*model.joints, SHARED)])
+    return scales.others(own, sets, own.log_evidence - settings.FAR_BELOW)

@@ -7,13 +7,13 @@ in sticking,
     load = Σ_k M_jk q̈_k + h_j + Σ_k (∂h_j/∂q_k (q − q̄)_k + ∂h_j/∂q̇_k (q̇ − q̄̇)_k) ,
     |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
-D a dead zone, c = 1/K, I the drive's own inertia over K, L the torque limit over K. Mass matrix M and bias torques h
-are those of a reference motion q̄ (Newton's method on waveforms: Lelarasmee, Ruehli and Sangiovanni-Vincentelli, *IEEE
-Transactions on Computer-Aided Design* 1, 1982), so that a motion near it needs no rigid-body algorithm. One step of the
-implicit midpoint rule solves a monotone inclusion for the velocities at its middle (Moreau's time stepping: Acary and
-Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), by semismooth Newton, and a joint that sticks is
-at rest at its end. A step ends where a command changes, or of a single joint averages it, so that the answer is smooth
-in the delay.
+u̇ no more than the servo's speed limit, D a dead zone, c = 1/K, I the drive's own inertia over K, L the torque limit
+over K. Mass matrix M and bias torques h are those of a reference motion q̄ (Newton's method on waveforms: Lelarasmee,
+Ruehli and Sangiovanni-Vincentelli, *IEEE Transactions on Computer-Aided Design* 1, 1982), so that a motion near it
+needs no rigid-body algorithm. One step of the implicit midpoint rule solves a monotone inclusion for the velocities at
+its middle (Moreau's time stepping: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), by
+semismooth Newton, and a joint that sticks is at rest at its end. A step ends where a command changes, or of a single
+joint averages it, so that the answer is smooth in the delay.
 
 A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
 is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
@@ -38,9 +38,9 @@ from thermal_robot.errors import EstimationError
 
 PARAMETERS = tuple(
     "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative "
-    "step hold".split()
+    "step hold slew".split()
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, and H, s², 0 if stiff."""
+"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, H, s², and s/rad."""
 CREEP_RATE = 2.0 / (0.95 * 0.02)
 """1/s: at which MuJoCo's friction brakes a joint that it holds, by its usual ``solref`` and ``solimp``."""
 SHORTEST = 1e-7
@@ -59,6 +59,17 @@ LEAST = 0.1
 """Of a sliding joint's derivative by its load what friction leaves of it at least."""
 FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
+
+
+def _led(led, command, slowness, h):  # type: ignore[no-untyped-def]
+    """Rate limiter: mean of the set point in a step h, and where it ends, led to a command at 1/``slowness`` rad/s."""
+    if slowness <= 0.0:
+        return command, command
+    most, move = h / slowness, command - led
+    if abs(move) <= most:
+        return command - 0.5 * move * abs(move) / most, command
+    most = math.copysign(most, move)
+    return led + 0.5 * most, led + most
 
 
 def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # type: ignore[no-untyped-def]
@@ -139,13 +150,14 @@ def _alone(  # type: ignore[no-untyped-def]
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
         coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:14]
+        slowness = numbers[s, 16]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
             q, v, t = start[m], 0.0, first[m] - delay
             k, last = command_begins[m], command_begins[m + 1] - 1
             while k < last and times[k + 1] <= t:
                 k += 1
-            before = integral[k] + commands[k] * (t - times[k])
+            before, led = integral[k] + commands[k] * (t - times[k]), q
             out[s, begins[m]] = q
             for n in range(begins[m] + 1, begins[m + 1]):
                 force = loads[0, n] + weights[s, 0] * loads[1, n] + weights[s, 1] * loads[2, n]
@@ -158,7 +170,8 @@ def _alone(  # type: ignore[no-untyped-def]
                     while k < last and times[k + 1] <= t:
                         k += 1
                     late = integral[k] + commands[k] * (t - times[k])
-                    u, before = (1.0 + gain) * (late - before) / h + zero, late
+                    u, led = _led(led, (late - before) / h, slowness, h)  # type: ignore[no-untyped-call]
+                    u, before = (1.0 + gain) * u + zero, late
                     load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
                     middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
@@ -233,13 +246,37 @@ def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h,
                 w[s, j] = max(min(w[s, j] + left[j], FASTEST), -FASTEST)
 
 
+def _lead(  # type: ignore[no-untyped-def]
+    s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, u
+):
+    """Lead the set points ``u`` (J,) of set s over the next time step, and return its length, s."""
+    h = rest
+    for j in range(len(u)):
+        last = command_begins[j, m + 1] - 1
+        while k[s, j] < last and times[k[s, j] + 1] <= t[s, j] + SHORTEST:
+            k[s, j] += 1
+        if numbers[s, j, 16] <= 0.0:
+            led[s, j] = commands[k[s, j]]
+        point = (1.0 + numbers[s, j, 1]) * led[s, j] + numbers[s, j, 0]
+        if k[s, j] < last:
+            h = min(h, times[k[s, j] + 1] - t[s, j])
+        if abs(point - q[s, j] - numbers[s, j, 13] * v[s, j]) > NEARLY * limits[s, j]:
+            h = min(h, step / FINER)
+    for j in range(len(u)):
+        t[s, j] += h
+        mean, led[s, j] = _led(led[s, j], commands[k[s, j]], numbers[s, j, 16], h)  # type: ignore[no-untyped-call]
+        u[j] = (1.0 + numbers[s, j, 1]) * mean + numbers[s, j, 0]
+    return h
+
+
 def _together(  # type: ignore[no-untyped-def]
     numbers, weights, begins, first, step, times, commands, command_begins, loads, masses, slopes, drags, about, pace,
     start, out,
 ):  # fmt: skip
     """Integrate all motions of several joints; a step ends where a command changes."""
     sets, joints = shape = numbers.shape[:2]
-    q, v, w, t, k = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+    q, v, w, t, led = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    k = np.zeros(shape, dtype=np.int64)
     u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
     base, left, sides, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
     joined, matrix = np.zeros((joints, joints)), np.zeros((joints, joints))
@@ -248,25 +285,17 @@ def _together(  # type: ignore[no-untyped-def]
         for s in range(sets):
             for j in range(joints):
                 q[s, j], v[s, j], w[s, j], k[s, j] = start[m, j], 0.0, 0.0, command_begins[j, m]
+                led[s, j] = q[s, j]
                 t[s, j] = first[m] - numbers[s, j, 2] + 0.5 * numbers[s, j, 14]
                 out[s, begins[m], j] = q[s, j]
         for n in range(begins[m] + 1, begins[m + 1]):
             for s in range(sets):  # all of one instant, whose matrices are then at hand
                 rest = step
                 while rest > SHORTEST:
-                    h = rest
-                    for j in range(joints):
-                        last = command_begins[j, m + 1] - 1
-                        while k[s, j] < last and times[k[s, j] + 1] <= t[s, j] + SHORTEST:
-                            k[s, j] += 1
-                        u[j] = (1.0 + numbers[s, j, 1]) * commands[k[s, j]] + numbers[s, j, 0]
-                        if k[s, j] < last:
-                            h = min(h, times[k[s, j] + 1] - t[s, j])
-                        if abs(u[j] - q[s, j] - numbers[s, j, 13] * v[s, j]) > NEARLY * limits[s, j]:
-                            h = min(h, step / FINER)
+                    h = _lead(  # type: ignore[no-untyped-call]
+                        s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, u
+                    )
                     rest -= h
-                    for j in range(joints):
-                        t[s, j] += h
                     _couple(  # type: ignore[no-untyped-call]
                         s, n, numbers, weights, loads, masses, slopes, drags, about, pace, q, v, h, base, joined, heavy,
                         drag, bend,
@@ -286,13 +315,13 @@ def _kernels() -> tuple[Any, Any]:
 
     Raises :class:`EstimationError` without numba.
     """
-    global _sliding, _middle, _solve, _couple, _velocities
+    global _led, _sliding, _middle, _solve, _lead, _couple, _velocities
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
         if not hasattr(_middle, "py_func"):
-            _sliding, _middle, _solve = compiled(_sliding), compiled(_middle), compiled(_solve)
-            _couple, _velocities = compiled(_couple), compiled(_velocities)
+            _led, _sliding, _middle, _solve = (compiled(one) for one in (_led, _sliding, _middle, _solve))
+            _lead, _couple, _velocities = (compiled(one) for one in (_lead, _couple, _velocities))
     return compiled(_alone), compiled(_together)
 
 
@@ -302,7 +331,7 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 16) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 17) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
     middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, of
     contact, and of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and

@@ -80,6 +80,8 @@ SETTLED = 1e-3
 """Of the sum of squares: a smaller gain ends the fit."""
 DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 """Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
+SHIFTS = (-1.0, 1.0, -0.25, 0.25)
+"""Of a delay's expected size, 10 ms, by which delays are tried earlier and later at the end of a fit."""
 LEAST_NOISE = 1e-5
 """rad: no encoder of a joint is finer; a simulated log may leave nothing."""
 WIDE = 10.0
@@ -88,8 +90,9 @@ SEEN = 1e-5
 """Squared length of a column at its expected size, in units of the noise, below which the data do not see it."""
 PAYLOAD = 0.3
 """Expected payload over the rated one: the mass that the weakest joint can hold with the arm stretched as it moved."""
-LEAST_STIFFNESS = 0.05
-"""Of the stated stiffness: the least that is fitted, as a servo with less does not hold its arm."""
+SOFTER = 20.0
+"""Factor by which a servo is at most softer or stiffer than stated: a softer one does not hold its arm, and the droop
+of a stiffer one cannot be seen."""
 LEAST_COMPLIANCE = 1e-3
 """rad/(N·m): of a joint whose droop is not known yet, where contact divides a force among joints."""
 FEW = 0.999
@@ -115,8 +118,6 @@ FOLDS = 5
 """Parts of the motions that are held out in turn."""
 BOOTSTRAPS, BOOTSTRAP_SEED = 400, 7
 """Draws of motions that tell the interval of a shrinkage; the same log always gets the same answer."""
-SURE = 0.9
-"""Probability from which an effect is told for itself, though another could stand in its place."""
 VISIBLE = 2.0
 """Times the encoder's noise: an effect that moves its joint by less is not shown, since nobody could see it go."""
 NOISY = 1.5

@@ -48,16 +48,15 @@ class Scales:
         return Weighed(self, active, fitted(self.model, values, active))
 
     def others(
-        self, base: Weighed, sets: Sequence[tuple[Mask, Array]], point: Point | None = None, least: float = -np.inf
+        self, base: Weighed, sets: Sequence[tuple[Mask, tuple[Array, ...]]], least: float = -np.inf
     ) -> list[Weighed]:
         """Weigh sets of parameters near one; only groups of joints whose parameters are others are fitted anew.
 
-        A fit starts from the set's values, or from where the problem that is linear at ``point`` has it, if better. It
-        is left off where the problem that is linear at its start promises a log evidence below ``least``, and motions
-        held out no gain.
+        A fit starts from the best of the set's starting values. It is left off where the problem that is linear there,
+        and again a step ahead, promises a log evidence below ``least`` and motions held out no gain, unless the second
+        one makes up for half of what the first lacks.
         """
-        point = point or base.point
-        missing = dict[tuple[bytes, ...], tuple[Groups, Mask, Array]]()
+        missing = dict[tuple[bytes, ...], tuple[Groups, Mask, tuple[Array, ...]]]()
         for active, values in sets:
             for groups in self._touched(base, active):
                 key = self._key(base, active, groups)
@@ -66,13 +65,17 @@ class Scales:
 
         def near(key: tuple[bytes, ...]) -> Point | None:
             groups, active, values = missing[key]
-            begun = self._begun(point, groups, active, values)
-            if least > -np.inf:
+            within, begun, before = self._within(groups), self._best(base, groups, values), -np.inf
+            while least > -np.inf:
                 self.far[key] = Point.at(self.model, begun, active, groups).ahead(active)
-                told = self._placed(base, np.where(self._within(groups), active, base.active))
-                if told.log_evidence < least and told.loss > base.loss:
+                told = self._placed(base, np.where(within, active, base.active))
+                there = np.where(within, self.far[key].values, begun)
+                if told.log_evidence >= least or told.loss <= base.loss:
+                    begun = there
+                    break
+                if told.log_evidence - before < least - told.log_evidence:
                     return None
-                begun = np.where(self._within(groups), self.far.pop(key).values, begun)
+                begun, before = there, told.log_evidence
             found = fitted(self.model, begun, active, groups=groups)
             # of long logs residuals would be large
             return replace(found, rows=[one.without_residual() for one in found.rows])
@@ -80,13 +83,13 @@ class Scales:
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
         found = dict(zip(alone, self.model.each(near, alone), strict=True)) if alone else {}
         found |= {key: near(key) for key in missing if key not in found}
+        self.far = {key: one for key, one in self.far.items() if key not in found or found[key] is None}
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
 
-    def _begun(self, point: Point, groups: Groups, active: Mask, values: Array) -> Array:
-        """(P,) starting values of a fit of some groups: those given, or predicted at a point, if these leave less."""
-        ahead = np.where(self._within(groups), point.ahead(active).values, values)
-        starts, left = np.stack([values, ahead]), np.zeros(2)
+    def _best(self, base: Weighed, groups: Groups, values: Sequence[Array]) -> Array:
+        """(P,) those of some starting values with which the joints of some groups leave least."""
+        starts, left = np.where(self._within(groups), values, base.point.values), np.zeros(len(values))
         for group in groups:
             for joint, one in zip(group, self.model.residuals(group, starts), strict=True):
                 left += self.worth[joint] * np.log(np.maximum((one**2).sum(axis=1), 1e-300))
@@ -116,15 +119,14 @@ class Scales:
 
     def _placed(self, base: Weighed, active: Mask) -> Weighed:
         """Return the set with the fits that are known of groups which differ, and the base's of the others."""
-        rows, values = list(base.point.rows), np.where(active, base.point.values, 0.0)
+        found, values = base.point, np.where(active, base.point.values, 0.0)
         for groups in self._touched(base, active):
             key, joints = self._key(base, active, groups), [j for group in groups for j in group]
             point = self.known[key] if key in self.known else self.far[key]
             own = np.isin(self.model.placed, (*joints, SHARED))
             values[own] = point.values[own]
-            for joint, part in zip(sorted(joints), point.rows, strict=True):
-                rows[joint] = part
-        return Weighed(self, active, Point(self.model, values, rows))
+            found = found.with_rows(point, groups)
+        return Weighed(self, active, replace(found, values=values))
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,7 @@ _CANNOT = {
     "torque_constant": "it is the torque channel's and not the robot's",
 }
 """Effects that neither an MJCF nor a URDF holds, and why."""
+_OF_THE_URDF = {"speed_limit": "no actuator limits the speed of its set point; a URDF holds it, as velocity"}
 _OF_A_JOINT = (
     ("frictionloss", "friction", "coulomb", "N·m"),
     ("damping", "damping", "lag", "N·m·s/rad"),
@@ -88,7 +89,7 @@ class Cause:
     def stiffness(self) -> float | None:
         """K of the position servo, N·m/rad: the stated one with its change, or one over the droop; ``None`` unknown."""
         if self.servo.kp:
-            return float(self.servo.kp * (1.0 + self.values.get("kp", 0.0)))
+            return float(self.servo.kp * np.exp(self.values.get("kp", 0.0)))
         droop = self.values.get("droop", 0.0)
         return 1.0 / droop if droop > 0.0 else None
 
@@ -156,7 +157,7 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
         if cause.torque("coulomb") is not None:
             stick(spec, joints[cause.name])
         _into_servo(spec, servos.get(cause.name), cause, written)
-        _tell_kept(cause, written, _CANNOT)
+        _tell_kept(cause, written, _CANNOT | _OF_THE_URDF)
     _into_masses(model, spec, found, written)
     spec.compile()
     written.text = spec.to_xml()
@@ -292,6 +293,8 @@ def motion_urdf(found: MotionDiagnosis) -> Written:
             _attribute(joints[cause.name], "dynamics", key, cause.torque(effect), cause, written, unit)
         limit = cause.limit if "torque_limit" in cause.values and cause.stiffness is not None else None
         _attribute(joints[cause.name], "limit", "effort", limit, cause, written, "N·m")
+        speed = 1.0 / cause.values["speed_limit"] if cause.values.get("speed_limit") else None
+        _attribute(joints[cause.name], "limit", "velocity", speed, cause, written, "rad/s")
         for key, stop in zip(("lower", "upper"), cause.stops, strict=True):
             _attribute(joints[cause.name], "limit", key, stop, cause, written, "rad")
         _tell_kept(cause, written, _CANNOT | _OF_THE_SERVO)

@@ -159,6 +159,7 @@ _TELLS: tuple[tuple[frozenset[str], str], ...] = (
         frozenset({"droop", "payload", "kp", "zero", "gain", "masses"}),
         "the torque of the joints, as columns tau.<joint>",
     ),
+    (frozenset({"speed_limit", "lag"}), "steps of several sizes: a lag takes the same time for each"),
     (frozenset({"torque_limit", "kp", "lag"}), "volts and current, as columns volts and current.<joint>"),
 )
 """What to record next to tell effects apart: the first line that holds two of a group."""
@@ -208,6 +209,7 @@ MEANS = {
     "stribeck": "Friction that is larger at rest than in motion: the joint sticks, then jumps.",
     "dead_zone": "An error within which the servo does nothing, or play in the gear.",
     "torque_limit": "The servo gives no more torque: beyond it the joint falls behind. forcerange in an MJCF.",
+    "speed_limit": "The servo leads its set point to the command no faster than this: its profile's speed, or a ramp.",
     "low_stop": "The joint runs against something at the lower end of its range.",
     "high_stop": "The joint runs against something at the upper end of its range.",
     "payload": "A mass at the tool that the model does not have, or has too much.",
