@@ -12,16 +12,17 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.correction.mujoco_models import mujoco_or_error
 from thermal_robot.kinematics import exp3, homogeneous, quaternion_to_rotation
 from thermal_robot.kinematics.loads import Dynamics, at_centre, pseudo_inertia, pseudo_inertia_of
-from thermal_robot.kinematics.urdf import xyz_rpy
 from thermal_robot.motion import settings
+from thermal_robot.motion.mjcf import set_mass
 from thermal_robot.motion.result import MotionDiagnosis
 from thermal_robot.motion.torque import INERTIAL
+
+_NOT_RIGID = "no rigid body has the numbers that torques tell of it alone"
 
 
 def rigid(whole: Array) -> bool:
@@ -72,7 +73,7 @@ def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> s
         return "the MJCF's link has other masses, or another frame, than the robot of the log"
     whole = of_body(model, body) + place @ added @ place.T
     if not rigid(whole):
-        return "no rigid body has the numbers that torques tell of it alone"
+        return _NOT_RIGID
     mass, centre, inertia = at_centre(whole)
     size, axes = np.linalg.eigh(inertia)
     quaternion = np.zeros(4)
@@ -86,19 +87,11 @@ def into_body(model: Any, spec: Any, joint: str, link: Array, added: Array) -> s
 def into_link(link: Any, added: Array) -> str:
     """Add a pseudo-inertia (4, 4) to the ``<inertial>`` of a URDF's link; return why not, or ""."""
     inertial = link.find("inertial")
-    before = np.zeros((4, 4)) if inertial is None else _of_inertial(inertial)
-    if not rigid(before + added):
-        return "no rigid body has the numbers that torques tell of it alone"
-    if inertial is None:
-        inertial = etree.SubElement(link, "inertial")
-    for child in list(inertial):
-        inertial.remove(child)
-    mass, centre, inertia = at_centre(before + added)
-    xyz, rpy = xyz_rpy(homogeneous(np.eye(3), centre))
-    etree.SubElement(inertial, "origin", xyz=xyz, rpy=rpy)
-    etree.SubElement(inertial, "mass", value=repr(mass))
-    names = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i in range(3) for j in range(i, 3)}
-    etree.SubElement(inertial, "inertia", names)
+    whole = added if inertial is None else added + _of_inertial(inertial)
+    if not rigid(whole):
+        return _NOT_RIGID
+    mass, centre, inertia = at_centre(whole)
+    set_mass(link, mass, homogeneous(np.eye(3), centre), inertia)
     return ""
 
 

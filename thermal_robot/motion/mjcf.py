@@ -146,20 +146,21 @@ def add_joint(robot: Any, name: str, kind: str, between: tuple[str, str], pose: 
 
 def _link(robot: Any, model: Any, body: int | None, name: str, anchor: Array) -> None:
     """Add a link to a URDF, with a body's mass and inertia unless ``body`` is ``None`` or has no mass."""
-    if body is None or not model.body_mass[body] > 0.0:
-        etree.SubElement(robot, "link", name=name)
-    else:
+    link = etree.SubElement(robot, "link", name=name)
+    if body is not None and model.body_mass[body] > 0.0:
         pose = _pose(model.body_ipos[body] - anchor, model.body_iquat[body])
-        add_mass(robot, name, model.body_mass[body], pose, model.body_inertia[body])
+        set_mass(link, model.body_mass[body], pose, np.diag(model.body_inertia[body]))
 
 
-def add_mass(robot: Any, name: str, mass: float, pose: Array, inertia: Array) -> None:
-    """Add a link to a URDF: its mass, kg, and principal moments (3,), kg·m², in the axes of a pose (4, 4)."""
-    inertial = etree.SubElement(etree.SubElement(robot, "link", name=name), "inertial")
+def set_mass(link: Any, mass: float, pose: Array, inertia: Array) -> None:
+    """Set a URDF link's mass, kg, and inertia (3, 3), kg·m², about the origin and in the axes of a pose (4, 4)."""
+    for old in link.findall("inertial"):
+        link.remove(old)
+    inertial = etree.SubElement(link, "inertial")
     _origin(inertial, pose)
     etree.SubElement(inertial, "mass", value=repr(float(mass)))
-    ixx, iyy, izz = (repr(float(value)) for value in inertia)
-    etree.SubElement(inertial, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
+    moments = {f"i{'xyz'[i]}{'xyz'[j]}": repr(float(inertia[i, j])) for i in range(3) for j in range(i, 3)}
+    etree.SubElement(inertial, "inertia", moments)
 
 
 def _origin(element: Any, pose: Array) -> None:

@@ -24,7 +24,7 @@ from thermal_robot.kinematics.urdf import text_of, tree
 from thermal_robot.motion import settings
 from thermal_robot.motion.log import Servo
 from thermal_robot.motion.masses import into_body, into_link, links
-from thermal_robot.motion.mjcf import add_joint, add_mass, position_actuators
+from thermal_robot.motion.mjcf import add_joint, position_actuators, set_mass
 from thermal_robot.motion.result import MotionDiagnosis
 
 _FAR = 1e3
@@ -157,7 +157,8 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
         if cause.torque("coulomb") is not None:
             stick(spec, joints[cause.name])
         _into_servo(spec, servos.get(cause.name), cause, written)
-        _tell_kept(cause, written, _CANNOT | _OF_THE_URDF)
+        needed = "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay"
+        _tell_kept(cause, written, _CANNOT | _OF_THE_URDF, *needed)
     _into_masses(model, spec, found, written)
     spec.compile()
     written.text = spec.to_xml()
@@ -174,22 +175,15 @@ def _said(written: Written, cause: Cause, what: str, value: float, unit: str) ->
     written.held.append(f"{what} of {cause.name}: {value:.4g} {unit}".rstrip())
 
 
-def _tell_kept(cause: Cause, written: Written, reasons: dict[str, str]) -> None:
-    for effect in cause.values:
-        if effect in reasons:
-            written.kept.append(f"{effect} of {cause.name}: {reasons[effect]}")
-
-
-def _need_stiffness(cause: Cause, written: Written, *effects: str) -> None:
-    """Record the effects that cannot be written because the joint's stiffness is unknown."""
-    for effect in effects:
-        if effect in cause.values and cause.stiffness is None and not cause.torques:
-            reason = "its stiffness is not stated, and no droop tells it, so that no torque follows"
-            written.kept.append(f"{effect} of {cause.name}: {reason}; state [servo.{cause.name}] kp")
+def _tell_kept(cause: Cause, written: Written, reasons: dict[str, str], *torques: str) -> None:
+    """Record a joint's effects that cannot be written: for ``reasons``, and ``torques`` where no stiffness is known."""
+    if cause.stiffness is None and not cause.torques:
+        unknown = "its stiffness is not stated, and no droop tells it, so that no torque follows"
+        reasons = dict.fromkeys(torques, f"{unknown}; state [servo.{cause.name}] kp") | reasons
+    written.kept += [f"{effect} of {cause.name}: {reasons[effect]}" for effect in cause.values if effect in reasons]
 
 
 def _into_joint(joint: Any, cause: Cause, written: Written) -> None:
-    _need_stiffness(cause, written, "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay")
     for what, _, effect, unit in (*_OF_A_JOINT, ("armature", "", "armature", "kg·m²")):
         value = cause.torque(effect)
         if value is not None:
@@ -288,7 +282,6 @@ def motion_urdf(found: MotionDiagnosis) -> Written:
     for cause in causes(found):
         if cause.name not in joints:
             raise CampaignError("the URDF", f"has no joint {cause.name!r}", found=", ".join(map(str, joints)))
-        _need_stiffness(cause, written, "coulomb", "lag", "torque_limit")
         for _, key, effect, unit in _OF_A_JOINT:
             _attribute(joints[cause.name], "dynamics", key, cause.torque(effect), cause, written, unit)
         limit = cause.limit if "torque_limit" in cause.values and cause.stiffness is not None else None
@@ -297,7 +290,7 @@ def motion_urdf(found: MotionDiagnosis) -> Written:
         _attribute(joints[cause.name], "limit", "velocity", speed, cause, written, "rad/s")
         for key, stop in zip(("lower", "upper"), cause.stops, strict=True):
             _attribute(joints[cause.name], "limit", key, stop, cause, written, "rad")
-        _tell_kept(cause, written, _CANNOT | _OF_THE_SERVO)
+        _tell_kept(cause, written, _CANNOT | _OF_THE_SERVO, "coulomb", "lag", "torque_limit")
     _mass_of_link(root, found, written)
     notes = ["Written by thermal_robot from a diagnosis of motions:", *written.held, "Not written:", *written.kept]
     written.text = text_of(root, found.log.robot.urdf, notes)
@@ -327,6 +320,6 @@ def _mass_of_link(root: Any, found: MotionDiagnosis, written: Written) -> None:
     if not mass:
         return
     name = f"{tool}_payload"
-    add_mass(root, name, mass, homogeneous(np.eye(3), at), np.full(3, _POINT))
+    set_mass(etree.SubElement(root, "link", name=name), mass, homogeneous(np.eye(3), at), _POINT * np.eye(3))
     add_joint(root, f"{name}_joint", "fixed", (tool, name), np.eye(4))
     written.held.append(f"payload at {tool}: {mass:.4g} kg")
