@@ -284,7 +284,7 @@ def build_motions(tables: Sequence[Table], declaration: Declaration, robot: Robo
         for q, name in FIELDS.items()
     }
     motions: list[Motion] = []
-    for label in dict.fromkeys(label for clock in clocks for label in clock.order):
+    for label in dict.fromkeys(label for clock in clocks for label in clock.kinds):
         parts = {name: channel.get(label) for name, channel in channels.items()}
         if not channels["command"] and parts["torque"] is not None:
             parts["command"] = parts["position"]
@@ -339,73 +339,55 @@ def _joints(tables: Sequence[Table], held: Sequence[Source], robot: Robot) -> tu
 
 @dataclass(frozen=True)
 class _Clock:
-    """Stamps of a table's rows, (N,) s, and to which motion each belongs: (N,) indices into ``order``."""
+    """Motion and stamp, s, of each row of a table, as the index (N,) of a data frame; and types of motions by label."""
 
     table: Table
     column: str
-    time: Array
-    order: tuple[str, ...]
-    index: NDArray[np.int64]
-    kinds: Mapping[str, str]  # of motion, by its label
-    kept: NDArray[np.bool_]  # (N,) rows whose stamp is not that of the row before
+    index: pd.MultiIndex
+    kinds: Mapping[str, str]
+    kept: NDArray[np.bool_]  # (N,) rows whose stamp is not that of the row before in the motion
     notes: tuple[str, ...]
 
     @classmethod
     def of(cls, table: Table, declaration: Declaration) -> _Clock:
-        """Read the stamps and motion labels of a table; refuse stamps that decrease within a motion."""
+        """Read a table's stamps and labels; refuse stamps that decrease in a motion, and a motion of two types."""
+        import pandas as pd
+
         stated = declaration.channels.get("time", Stated())
         column = stated.column or declaration.labels.get("time", "time")
         if column not in table.columns:
             problem = f"has no column of time{did_you_mean(column, table.columns)}"
             raise table.error(problem, column, expected="stamps of the rows; its name is [motion] time")
-        time = table.numbers(column) * (stated.scale or 1.0)
-        label = declaration.labels.get("motion", "motion")
-        labels = table.text(label) if label in table.columns else [""] * len(time)
-        order = tuple(dict.fromkeys(labels))
-        places = {name: k for k, name in enumerate(order)}
-        index = np.array([places[name] for name in labels])
-        kept, notes = _in_order(table, column, time, index)
-        return cls(table, column, time, order, index, _kinds(table, declaration, order, index), kept, notes)
-
-
-def _in_order(
-    table: Table, column: str, time: Array, motion: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return a mask of rows whose stamp is not that of the row before in the motion, and notes; refuse decreases."""
-    rows = np.argsort(motion, kind="stable")
-    step, same = np.diff(time[rows]), np.diff(motion[rows]) == 0
-    back = first_true(same & (step < 0.0))
-    if back is not None:
-        at, before = int(rows[back + 1]), int(rows[back])
-        told = {"found": f"{time[at]:.9g} s after {time[before]:.9g} s", "expected": "stamps that increase in a motion"}
-        raise table.error("rows are out of order, or two motions have one label", column, at, **told)
-    kept = np.ones(len(time), dtype=bool)
-    kept[rows[1:][same & (step == 0.0)]] = False
-    said = f"{table.file}: {listed_rows(table.rows[~kept])} left out: the stamp of the row before"
-    return kept, () if kept.all() else (said,)
-
-
-def _kinds(table: Table, declaration: Declaration, order: Sequence[str], motion: NDArray[np.int64]) -> dict[str, str]:
-    column = declaration.labels.get("kind", "kind")
-    if column not in table.columns:
-        return {}
-    texts = np.array(table.text(column), dtype=np.str_)
-    found = {}
-    for k, label in enumerate(order):
-        rows = np.flatnonzero(motion == k)
-        other = first_true(texts[rows] != texts[rows[0]])
+        time = pd.Series(table.numbers(column) * (stated.scale or 1.0))
+        names = [declaration.labels.get(key, key) for key in ("motion", "kind")]
+        motion, kind = (
+            pd.Series(table.text(name) if name in table.columns else "", index=time.index, dtype=object)
+            for name in names
+        )
+        before = time.groupby(motion, sort=False).shift()
+        back = first_true((time < before).to_numpy())
+        if back is not None:
+            told = {
+                "found": f"{time[back]:.9g} s after {before[back]:.9g} s",
+                "expected": "stamps that increase in a motion",
+            }
+            raise table.error("rows are out of order, or two motions have one label", column, back, **told)
+        usual = kind.groupby(motion, sort=False).transform("first")
+        other = first_true((kind != usual).to_numpy())
         if other is not None:
-            told = {"found": repr(str(texts[rows[other]])), "expected": repr(str(texts[rows[0]]))}
-            raise table.error("a motion has two types", column, int(rows[other]), **told)
-        found[label] = str(texts[rows[0]])
-    return found
+            told = {"found": repr(kind[other]), "expected": repr(usual[other])}
+            raise table.error("a motion has two types", names[1], other, **told)
+        kept = (time != before).to_numpy()
+        said = f"{table.file}: {listed_rows(table.rows[~kept])} left out: the stamp of the row before"
+        index = pd.MultiIndex.from_arrays([motion, time])
+        return cls(table, column, index, dict(zip(motion, kind, strict=True)), kept, () if kept.all() else (said,))
 
 
 def _require_labels(clocks: Sequence[_Clock]) -> None:
     """Refuse a table without labels of motions where any table has several motions."""
-    several = any(len(clock.order) > 1 for clock in clocks)
+    several = any(len(clock.kinds) > 1 for clock in clocks)
     for clock in clocks:
-        if several and clock.order == ("",):
+        if several and list(clock.kinds) == [""]:
             expected = "a column that says which motion each row belongs to, as in the other table"
             raise CampaignError(clock.table.file, "has no labels of motions", expected=expected)
 
@@ -413,33 +395,26 @@ def _require_labels(clocks: Sequence[_Clock]) -> None:
 def _channel(
     clocks: Sequence[_Clock], held: Sequence[Source], declaration: Declaration, robot: Robot, joints: Sequence[str]
 ) -> dict[str, Channel]:
-    """Return a quantity's samples by label of the motion, stamps unshifted; rows without any value are left out."""
-    kinds_of = joint_kinds(robot)
-    parts: dict[str, list[tuple[Array, Array]]] = {}
-    for k, clock in enumerate(clocks):
-        values = np.full((len(clock.time), len(joints)), np.nan)
-        own = [source for source in held if source.table == k]
-        for source in sorted(own, key=lambda each: bool(each.joint)):  # a joint's own column counts for more
-            if source.joint and source.joint not in joints:
-                continue
-            scale = scale_of(source, declaration.channels, declaration.units, kinds_of.get(source.joint, "revolute"))
-            cells = clock.table.numbers(source.column, gaps=True) * scale
-            chosen = joints.index(source.joint) if source.joint else slice(None)
-            values[:, chosen] = cells if source.joint else cells[:, None]
-        some = clock.kept & ~np.isnan(values).all(axis=1)
-        for m, label in enumerate(clock.order if some.any() else ()):
-            rows = np.flatnonzero(some & (clock.index == m))
-            if len(rows):
-                parts.setdefault(label, []).append((clock.time[rows], values[rows]))
-    return {label: _merged(several) for label, several in parts.items()}
+    """Return a quantity's samples by label of the motion, stamps unshifted; rows without any value are left out.
 
-
-def _merged(parts: Sequence[tuple[Array, Array]]) -> Channel:
-    """Merge samples of one or several tables by stamp; of equal stamps the last value that is not NaN counts."""
+    Samples of several tables are merged by stamp; of equal stamps the last value that is not NaN counts.
+    """
     import pandas as pd
 
-    merged = pd.concat([pd.DataFrame(values, index=stamps) for stamps, values in parts]).groupby(level=0).last()
-    return _frozen(merged.index.to_numpy(copy=True), merged.to_numpy(copy=True))
+    kinds_of, parts = joint_kinds(robot), []
+    for k, clock in enumerate(clocks):
+        values = np.full((len(clock.index), len(joints)), np.nan)
+        own = [source for source in held if source.table == k and source.joint in ("", *joints)]
+        for source in sorted(own, key=lambda each: bool(each.joint)):  # a joint's own column counts for more
+            scale = scale_of(source, declaration.channels, declaration.units, kinds_of.get(source.joint, "revolute"))
+            chosen = joints.index(source.joint) if source.joint else slice(None)
+            values.T[chosen] = clock.table.numbers(source.column, gaps=True) * scale
+        parts.append(pd.DataFrame(values, clock.index)[clock.kept].dropna(how="all"))
+    merged = pd.concat(parts).groupby(level=[0, 1]).last()
+    return {
+        str(label): _frozen(rows.index.get_level_values(1).to_numpy(copy=True), rows.to_numpy(copy=True))
+        for label, rows in merged.groupby(level=0)
+    }
 
 
 def _frozen(time: Array, values: Array) -> Channel:
