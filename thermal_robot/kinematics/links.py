@@ -9,9 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
-from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import as_rows, chain_frames
-from thermal_robot.kinematics.lanes import ChainFrames
+from thermal_robot.kinematics.frames import chain_frames
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -22,7 +20,7 @@ def growing(robot: Robot) -> tuple[int, ...]:
     return tuple(s for s, segment in enumerate(robot.segments) if np.any(segment.direction))
 
 
-def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: ChainFrames | None = None) -> Array:
+def elongation_jacobian(robot: Robot, q: ArrayLike) -> Array:
     """Jacobian of the tool's position, in root axes, by the elongation of each segment with a length (Eqs 6–11).
 
     The columns are unit vectors: the directions of the segments. They are the same for every point of the tool, and
@@ -34,29 +32,22 @@ def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: Ch
         The robot.
     q
         (N, n) rad or m; (n,) counts as one configuration.
-    rows
-        3 for the position alone, 6 for the twist (linear first; its angular rows are zero).
-    frames
-        From :func:`~thermal_robot.kinematics.chain_frames`, to save computing them again or to differentiate a
-        displaced chain.
 
     Returns
     -------
     ndarray
-        (N, rows, S) m/m; S segments as by :func:`growing`.
+        (N, 3, S) m/m; S segments as by :func:`growing`.
 
     Raises
     ------
     RobotError
-        If ``q`` does not have the shape that the robot asks for, or ``rows`` is neither 3 nor 6.
+        If ``q`` does not have the shape that the robot asks for.
     """
-    if rows not in (3, 6):
-        raise RobotError(f"an elongation Jacobian has 3 or 6 rows, not {rows}", name=robot.name)
-    frames = chain_frames(robot, as_rows(robot, q)) if frames is None else frames
+    frames = chain_frames(robot, q)
     chosen = [robot.segments[s] for s in growing(robot)]
-    out = np.zeros((len(frames.tool_position), rows, len(chosen)))
+    out = np.empty((len(frames.tool_position), 3, len(chosen)))
     for column, segment in enumerate(chosen):
-        out[:, :3, column] = frames.rotations[:, segment.index] @ segment.direction
+        out[..., column] = frames.rotations[:, segment.index] @ segment.direction
     return out
 
 
