@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from thermal_robot.campaign.names import did_you_mean, split_name
 from thermal_robot.campaign.table import Table
-from thermal_robot.campaign.units import LENGTH_UNITS, Units
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion.log import CHANNELS
 from thermal_robot.schema import Kind, MisfitError, number, record, text
@@ -23,7 +22,7 @@ from thermal_robot.schema import Kind, MisfitError, number, record, text
 FIELDS = dict(zip(("cmd", "q", "qd", "tau", "current", "volts", "temperature"), CHANNELS, strict=True))
 """Fields of a :class:`~thermal_robot.motion.Motion` by the quantity that stands before the joint's name."""
 OF_ALL = ("volts", "temperature")  # Quantities that one column may give for all joints
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "rev": 2.0 * math.pi}
+_ANGLES = ANGLE_UNITS | {"rev": 2.0 * math.pi}
 _SPEEDS = {f"{word}/s": scale for word, scale in (_ANGLES | LENGTH_UNITS).items()} | {"rpm": 2.0 * math.pi / 60.0}
 UNITS: dict[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
@@ -84,14 +83,14 @@ def channels_kind(value: Any, path: str) -> dict[str, Stated]:
     return found
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A column of one of the tables, and the quantity of a joint that it holds (joint empty: of all joints)."""
 
     table: int
     column: str
     quantity: str
     joint: str
+    scale: float  # SI value of one unit, where ``[channels]`` states it; else 0
 
 
 def sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> list[Source]:
@@ -104,18 +103,20 @@ def sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> list[Sou
     """
     found: dict[tuple[str, str], Source] = {}
     for source in _sources(tables, channels):
-        key = source.quantity, source.joint
-        if key in found and found[key].table == source.table and found[key].column != source.column:
-            problem = f"the channel has two columns, {found[key].column!r} and {source.column!r}"
-            raise CampaignError(tables[source.table].file, problem, column=".".join(key).rstrip("."), expected="one")
-        if key in found and found[key].table != source.table:
-            files = f"{tables[found[key].table].file} and {tables[source.table].file}"
-            raise CampaignError(files, "both hold this channel", column=source.column, expected="one of them")
-        found[key] = source
+        first = found.setdefault((source.quantity, source.joint), source)
+        if first != source:
+            files = " and ".join(dict.fromkeys(tables[each.table].file for each in (first, source)))
+            problem = f"two columns hold this channel, {first.column!r} and {source.column!r}"
+            channel = f"{source.quantity}.{source.joint}".rstrip(".")
+            raise CampaignError(files, problem, column=channel, expected="one of them")
     return list(found.values())
 
 
 def _sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> Iterator[Source]:
+    def source(table: int, column: str, quantity: str, joint: str) -> Source:
+        own, all_joints = (channels.get(name, Stated()).scale for name in (f"{quantity}.{joint}", quantity))
+        return Source(table, column, quantity, joint, own or all_joints)
+
     for channel, stated in channels.items():
         quantity, joint = split_name(channel)
         if not stated.column or JOINT in stated.column or quantity == "time":
@@ -126,7 +127,7 @@ def _sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> Iterato
             files = " and ".join(table.file for table in tables)
             problem = f"there is no such column{did_you_mean(stated.column, every)}"
             raise CampaignError(files, problem, column=stated.column, expected=f"a column of the channel {channel!r}")
-        yield from (Source(k, stated.column, quantity, joint) for k in holding)
+        yield from (source(k, stated.column, quantity, joint) for k in holding)
     taken = {stated.column for stated in channels.values()}
     renamed = {channel for channel, stated in channels.items() if stated.column}
     for quantity in FIELDS:
@@ -138,12 +139,4 @@ def _sources(tables: Sequence[Table], channels: Mapping[str, Stated]) -> Iterato
                 joint = m[1] if (m := pattern.fullmatch(column)) else ""
                 alone = quantity in OF_ALL and column == quantity and not stated.column
                 if (joint and f"{quantity}.{joint}" not in renamed) or alone:
-                    yield Source(k, column, quantity, joint)
-
-
-def scale_of(source: Source, channels: Mapping[str, Stated], units: Units, joint_type: str) -> float:
-    """Return the factor from a column's unit to SI: the column's stated unit, else its quantity's, else the file's."""
-    for channel in (f"{source.quantity}.{source.joint}", source.quantity):
-        if channel in channels and channels[channel].scale:
-            return channels[channel].scale
-    return units.joint_scale(joint_type) if source.quantity in ("cmd", "q", "qd") else 1.0
+                    yield source(k, column, quantity, joint)

@@ -25,7 +25,7 @@ from thermal_robot.campaign.table import Table, listed_rows, read_table, table_f
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.files import is_file, is_folder
-from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, scale_of, sources
+from thermal_robot.motion.columns import FIELDS, Source, Stated, channels_kind, sources
 from thermal_robot.motion.log import Channel, Motion, MotionLog, Servo, joint_kinds
 from thermal_robot.motion.refuse import refused
 from thermal_robot.motion.settings import FEWEST_SAMPLES, LONGEST_GAP
@@ -406,7 +406,8 @@ def _channel(
         values = np.full((len(clock.index), len(joints)), np.nan)
         own = [source for source in held if source.table == k and source.joint in ("", *joints)]
         for source in sorted(own, key=lambda each: bool(each.joint)):  # a joint's own column counts for more
-            scale = scale_of(source, declaration.channels, declaration.units, kinds_of.get(source.joint, "revolute"))
+            usual = declaration.units.joint_scale(kinds_of.get(source.joint, "revolute"))
+            scale = source.scale or (usual if source.quantity in ("cmd", "q", "qd") else 1.0)
             chosen = joints.index(source.joint) if source.joint else slice(None)
             values.T[chosen] = clock.table.numbers(source.column, gaps=True) * scale
         parts.append(pd.DataFrame(values, clock.index)[clock.kept].dropna(how="all"))
