@@ -185,12 +185,12 @@ def test_the_robot_of_an_mjcf_is_mujocos_own(tmp_path, simulated):
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo says where its bodies are")
     import pinocchio
 
-    from thermal_robot.motion.mjcf import urdf_of_mjcf
+    from thermal_robot.motion.mjcf import opened, urdf_of_mjcf
     from thermal_robot.robot import load_robot
 
     model, _ = simulated
     data = mujoco.MjData(model)
-    robot = load_robot(urdf_of_mjcf(tmp_path / "two.xml"), "tip")
+    robot = load_robot(urdf_of_mjcf(opened(tmp_path / "two.xml"), tmp_path / "two.xml"), "tip")
     assert robot.joint_names == ("lift", "bend", "slide")
     np.testing.assert_allclose(robot.lower, model.jnt_range[:, 0])
     draw = np.random.default_rng(0)

@@ -16,7 +16,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.motion.diagnose import diagnose_motion
 from thermal_robot.motion.effects import physical
 from thermal_robot.motion.log import Servo
-from thermal_robot.motion.mjcf import servos_of_mjcf
+from thermal_robot.motion.mjcf import opened, servos_of_mjcf
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.result import MotionDiagnosis, rms
 from thermal_robot.motion.rollout import Rollout, rollout, simulated
@@ -98,14 +98,14 @@ def test_a_servo_that_was_written_is_read_again_and_leaves_nothing_to_find(name,
     found = diagnose_motion(log, only=("gain", "zero", "kp"))
     assert found.values[name, log.joints[JOINT]] == pytest.approx(size, rel=0.05)
     (tmp_path / "arm.xml").write_text(motion_mjcf(found, world.mjcf()).text)
-    better = replace(log, servos=servos_of_mjcf(tmp_path / "arm.xml"))
+    better = replace(log, servos=servos_of_mjcf(opened(tmp_path / "arm.xml")))
     assert list(better.servos) == list(log.joints)
     again = diagnose_motion(better, only=("gain", "zero", "kp"))
     assert again.values == {}
     assert again.rms_after == pytest.approx(found.rms_after, rel=0.05)  # but for MuJoCo's time step, which is no cause
     more = found_of(better, {"zero": 1e-3})
     (tmp_path / "arm.xml").write_text(motion_mjcf(more, tmp_path / "arm.xml").text)
-    servo, before = (one[log.joints[JOINT]] for one in (servos_of_mjcf(tmp_path / "arm.xml"), better.servos))
+    servo, before = (one[log.joints[JOINT]] for one in (servos_of_mjcf(opened(tmp_path / "arm.xml")), better.servos))
     assert servo.zero == pytest.approx((before.zero or 0.0) + 1e-3, rel=1e-4)
     assert servo.gain == (before.gain and pytest.approx(before.gain, rel=1e-3))
 
@@ -229,7 +229,7 @@ def test_what_the_mjcf_holds_is_in_the_nominal_model_and_stays_when_more_is_writ
         spec.compile()
         file = tmp_path / f"{name}.xml"
         file.write_text(spec.to_xml())
-        servos = servos_of_mjcf(file)
+        servos = servos_of_mjcf(opened(file))
         log = replace(world.log(world.simulated(fault)), servos=servos)
         left = {}
         for told, model in (("stated", ServoModel(log)), ("not", ServoModel(replace(log, servos=world.arm.servos)))):

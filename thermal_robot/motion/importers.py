@@ -173,11 +173,11 @@ def _arrays(file: Path) -> dict[str, Array]:
 
 
 def _mujoco(files: Sequence[Path], asked: Asked) -> Taken:
-    from thermal_robot.motion.mjcf import places
+    from thermal_robot.motion.mjcf import opened, places
 
     if asked.mjcf is None:
         raise CampaignError("import", "arrays have no names", expected="--robot MODEL.xml, the MJCF that was simulated")
-    (where, step), frames, notes = places(asked.mjcf), [], []
+    (where, step), frames, notes = places(opened(asked.mjcf)), [], []
     for file in files:
         arrays = _arrays(file)
         if "qpos" not in arrays or "ctrl" not in arrays:

@@ -43,9 +43,9 @@ def position_actuators(model: Any) -> dict[str, int]:
     return found
 
 
-def servos_of_mjcf(file: Path) -> dict[str, Servo]:
+def servos_of_mjcf(model: Any) -> dict[str, Servo]:
     """Return by joint the servo that its position actuator and joint define, in joint units (times the gear)."""
-    model, found = opened(file), {}
+    found = {}
     for name, k in position_actuators(model).items():
         joint, gear = model.joint(name).id, float(model.actuator_gear[k, 0])
         gain, (offset, stiff, damp) = model.actuator_gainprm[k, 0], model.actuator_biasprm[k, :3]
@@ -63,12 +63,11 @@ def damping_of(model: Any, dof: int) -> float:
     return float(np.ravel(model.dof_damping[dof])[0])
 
 
-def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
+def places(model: Any) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
     """Return each joint's index and scale to joint units in arrays of ``mjData``, by array, and the time step, s.
 
     Arrays are qpos, qvel, qfrc_actuator and, by position actuators, ctrl.
     """
-    model = opened(file)
     ctrl = {joint: (k, 1.0 / float(model.actuator_gear[k, 0])) for joint, k in position_actuators(model).items()}
     single = [k for k in range(model.njnt) if model.jnt_type[k] in (_SLIDE, _HINGE)]
     q = {model.joint(k).name: (int(model.jnt_qposadr[k]), 1.0) for k in single}
@@ -76,15 +75,14 @@ def places(file: Path) -> tuple[dict[str, dict[str, tuple[int, float]]], float]:
     return {"ctrl": ctrl, "qpos": q, "qvel": v, "qfrc_actuator": v}, float(model.opt.timestep)
 
 
-def urdf_of_mjcf(file: Path) -> str:
-    """Return the bodies, joints and sites of an MJCF as URDF text, with all digits.
+def urdf_of_mjcf(model: Any, file: Path) -> str:
+    """Return the bodies, joints and sites of a ``mujoco.MjModel`` of a file as URDF text, with all digits.
 
     Raises
     ------
     CampaignError
-        If MuJoCo is not installed or does not take the file, or if a joint is a ball.
+        If a joint is a ball.
     """
-    model = opened(file)
     robot = etree.Element("robot", name=file.stem)
     anchors, links = {0: np.zeros(3)}, {0: "world"}
     etree.SubElement(robot, "link", name="world")

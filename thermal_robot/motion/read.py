@@ -165,9 +165,9 @@ def robot_of(
     if "mjcf" in said:
         from thermal_robot.motion.mjcf import opened, servos_of_mjcf, urdf_of_mjcf
 
-        mjcf = folder / said["mjcf"]
-        reference, servos = urdf_of_mjcf(mjcf), servos_of_mjcf(mjcf)
-        said = {"gravity": tuple(opened(mjcf).opt.gravity.tolist()), **said}
+        model = opened(folder / said["mjcf"])
+        reference, servos = urdf_of_mjcf(model, folder / said["mjcf"]), servos_of_mjcf(model)
+        said = {"gravity": tuple(model.opt.gravity.tolist()), **said}
     else:
         reference = robot_reference(said["urdf"], folder)
     ends = {"root_frame": said.get("root_frame"), "gravity": said.get("gravity")}
