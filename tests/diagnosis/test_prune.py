@@ -10,6 +10,7 @@ from helpers import NOISE, disturbed, erring, some, with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot import simulate as tr_simulate
 from thermal_robot.diagnosis import prune as word
 from thermal_robot.diagnosis.prune import (
     DensityGain,
@@ -282,6 +283,21 @@ def test_an_effect_of_twice_the_noise_helps_and_stays(rv_m2, name):
         assert 0.0 < said.blocked.share < 1.0
         assert said.hardest.chance <= said.blocked.chance
         assert pruned(known, lambda _: None) == (known, {})
+
+
+@pytest.mark.parametrize(("stand", "stays"), [(40.0, True), (-1.0, False)])
+def test_without_an_instrument_stands_decide_and_not_blocks_of_rows(monkeypatch, stand, stays):
+    """Rows held out are those of a stand: what hardly shows between two rows of one stand may show on another."""
+    robot = load_robot("example-robot-data:ur10", "tool0")
+    campaign = tr_simulate(robot, {"joint_gain": dict.fromkeys(robot.joint_names, 1e-3)}, rows=60, measures="socket")
+    known = fit(campaign, choose(("joint_gain",), (), ()))
+    said = held_out_tests(known)["joint_gain"]
+    assert [gain.scheme for gain in said.gains[:2]] == ["stand", "time"]
+    told = HeldOutTest((DensityGain("stand", 0.2, stand, 9.0, 19), DensityGain("time", 0.0, -0.6, 10.9, 19)))
+    monkeypatch.setattr(word, "held_out_tests", lambda own: {name: told for name in names(own)})
+    left, refused = pruned(known, lambda _: None)
+    assert (names(left) == ["joint_gain"]) == stays
+    assert ("joint_gain" in refused) != stays
 
 
 @pytest.mark.slow

@@ -453,14 +453,14 @@ def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
 
 
 def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
-    """Yield name and description of each scheme, and a mask (N,) of the rows that each of its folds holds out."""
+    """Yield name, description and held-out rows, a mask (N,) a fold, of each scheme; first that of :func:`held_out`."""
     campaign = fit.campaign
+    if held_out_groups(campaign)[1] == STAND:
+        yield STAND, "one stand after the other", each(held_out_groups(campaign)[0])
     yield "time", "blocks of consecutive rows", each(blocks(campaign))
     session = campaign.labels.get("session")
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
-    if held_out_groups(campaign)[1] == STAND:
-        yield STAND, "one stand after the other", each(held_out_groups(campaign)[0])
     temperature = _temperature(campaign)
     if temperature is not None and np.ptp(temperature) > 0.0:
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)

@@ -31,7 +31,7 @@ from thermal_robot.inference.generate import (
     ripple_of,
     waves,
 )
-from thermal_robot.inference.grouping import blocks
+from thermal_robot.inference.grouping import STAND, blocks
 from thermal_robot.inference.problem import generalised
 from thermal_robot.inference.scatter import RandomGap, random_gap
 from thermal_robot.inference.weights import Noise
@@ -167,15 +167,16 @@ _NOT_ASKED = DensityGain("time", 0.0, 0.0, np.inf, 1)
 class HeldOutTest:
     """Cross-validation of one effect against the refitted model without it, under each scheme.
 
-    The first scheme holds blocks of consecutive rows out, the others conditions, regions and ends of ranges.
+    The first scheme holds out stands, or else blocks of consecutive rows, as the answer does; the others conditions,
+    regions and ends of ranges.
     """
 
     gains: tuple[DensityGain, ...]
 
     @property
     def blocked(self) -> DensityGain:
-        """Gain on blocks of consecutive rows held out."""
-        return next((gained for gained in self.gains if gained.scheme == "time"), _NOT_ASKED)
+        """Gain under the scheme of the answer: on stands held out, or else on blocks of consecutive rows."""
+        return next((gained for gained in self.gains if gained.scheme in (STAND, "time")), _NOT_ASKED)
 
     @property
     def hardest(self) -> DensityGain:
@@ -189,12 +190,12 @@ class HeldOutTest:
 
     @property
     def harms(self) -> bool:
-        """Whether the held-out predictive density is lower with the effect: over blocks of rows, or :attr:`clearly`."""
+        """Whether the held-out predictive density is lower with the effect: :attr:`blocked`, or :attr:`clearly`."""
         return self.blocked.nats < 0.0 or self.clearly
 
     @property
     def helps(self) -> bool:
-        """Whether the density over blocks of rows is significantly (97.5 %) higher with the effect, and none harms."""
+        """Whether the :attr:`blocked` density is significantly (97.5 %) higher with the effect, and none harms."""
         return self.blocked.chance > settings.INTERVAL[1] and not self.harms
 
 
@@ -206,7 +207,7 @@ def held_out_tests(fit: Fit) -> dict[str, HeldOutTest]:
     standard error): robust to a few rows. The standard error is that of the sums over blocks of consecutive rows. An
     effect within a single block gains nothing, as other rows do not predict it.
 
-    Beside blocks, rows are held out by condition, by region, and at the ends of each joint's range. There, effects that
+    Rows are also held out by condition, by region, and at the ends of each joint's range. There, effects that
     compensate each other only within the measured range fail. Events are tested in blocks of consecutive rows alone,
     since a whole session held out contains all that an event did.
     """
