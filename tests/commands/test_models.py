@@ -221,6 +221,10 @@ def test_what_is_expected_of_a_file_and_worth_applying_is_told(run, tmp_path):
     assert (status, "Fitted anew" in out.read_text(encoding="utf-8")) == (0, True)
     assert "worth applying" not in alone
     assert "left out" not in run("correct", model, "--urdf", out, "--min-sigma", "0")[1]
+    poses = tmp_path / "poses.csv"
+    campaign.to_frame().to_csv(poses, index=False)
+    beside = run("correct", model, poses, "-o", tmp_path / "c.csv", "--urdf", out)[1]
+    assert beside.count("poses.csv, 0.0 % of them outside what was measured, as the model predicts it") == 1
 
 
 def test_zeros_for_lerobot_come_from_the_arms_own_file(run, rv_m2, tmp_path):

@@ -8,6 +8,7 @@ from floor import real_robot
 
 from thermal_robot import CorrectedModel, calibrate, load_robot, simulate
 from thermal_robot.correction import calibrated, calibrated_urdf, zero_offsets
+from thermal_robot.correction.holding import at_poses
 from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 
@@ -60,6 +61,23 @@ def test_beside_what_no_file_holds_a_file_that_was_fitted_alone_does_better(rv_m
         low, high = expected.shrinkage_ci95
         assert low < expected.shrinkage < high
         assert shrinks(model, fresh, expected) == pytest.approx(expected.shrinkage, abs=(high - low))
+
+
+def test_at_poses_of_another_kind_the_model_tells_what_a_file_does(rv_m2):
+    """Gears yield most where the arm is stretched; of the rows where it is not, the held-out share tells nothing."""
+    worn = {"joint_offset": {"joint_2": 8e-4, "joint_3": -6e-4}, "joint_compliance": {"joint_2": 3e-5, "joint_3": 4e-5}}
+    campaign = simulate("builtin:rv_m2", worn, tool_frame="tool0", rows=900, noise=2e-5, seed=2, base_known=False)
+    model = calibrate(campaign.take(np.arange(300)), ["joint_offset", "joint_compliance"]).model
+    far = 300 + np.argsort(np.linalg.norm(observe(campaign).position[300:], axis=1))
+    left = []
+    for rows in (far[:150], far[-150:]):
+        there = campaign.take(np.sort(rows))
+        for said, own in zip(at_poses(model, there), model.files, strict=True):
+            if own.holds != "ticks":
+                left.append([1.0 - share for share in (said.shrinkage, own.shrinkage, shrinks(model, there, own))])
+    at_these, held_out, real = np.sqrt(left).T
+    assert np.abs(at_these - real).max() < 0.05
+    assert np.abs(held_out - real).max() > 0.3
 
 
 def test_of_a_model_without_a_constant_part_nothing_is_expected(rv_m2):

@@ -88,7 +88,7 @@ def test_units_are_those_of_a_data_sheet():
 def test_what_cannot_be_told_apart_stands_in_groups():
     d = CASES["rivals"]()
     assert d.separates == (("lag", "delay", "armature"), ("coulomb", "dead_zone"))
-    assert "In this log lag, delay, armature do the same." in str(d)
+    assert "In this log lag, delay and armature do the same." in str(d)
     assert "steps and quick reversals" in d.advice
     assert d.to_dict()["next"]["separates"] == [list(group) for group in d.separates]
 

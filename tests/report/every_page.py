@@ -18,7 +18,7 @@ ABOUT = {"robot_serial": "20185500123", "instrument": "tracker 750123", "operato
 FAULT = DataFault(("metric unit",), "positions stand in mm, not in m", "correct length_unit", 413.0, 8e-5, (3,))
 EVERY = {
     **{kind: (report.html, CASES[kind]) for kind in CASES},
-    "found": (report.html, lambda: case("found", about=ABOUT)),
+    "found": (report.html, lambda: case("found", about=ABOUT, left_out=("drift", "geometric"))),
     "misfit": (report.html, lambda: case("unexplained", misfit=Misfit(FAULT))),
     "motion": (report.motion_html, lambda: motion(flagged=True, rivals=(("lag", ("delay",)),))),
     "compare_3": (report.comparison_html, lambda: comparison(3)),

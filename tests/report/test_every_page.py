@@ -1,5 +1,6 @@
 """Every kind of page on a desk, on a telephone and on paper: nothing is cut, nothing complains, nothing is heavy."""
 
+import io
 import re
 import shutil
 import subprocess
@@ -7,6 +8,7 @@ import unicodedata
 from collections import Counter
 from html import unescape
 
+import numpy as np
 import pytest
 from motion.found import found
 from report.browser import PROGRAM
@@ -34,6 +36,8 @@ CUT = """(() => {
     if (box.right > root.clientWidth + 1 || box.left < -1) found.push(`outside: ${name(e)}`);
     if (e.clientWidth && e.scrollWidth > e.clientWidth + 1 && !(small && scroller)) found.push(`cut: ${name(e)}`);
   }
+  for (const e of document.querySelectorAll("main code"))
+    if (!e.closest("footer") && e.getClientRects().length > 1) found.push(`broken: ${name(e)}`);
   for (const figure of document.querySelectorAll("svg.tr-figure")) {
     if (!seen(figure)) continue;
     const box = figure.getBoundingClientRect();
@@ -86,6 +90,30 @@ def missing(texts, pdf):
     return lost + [word for word in words if len(word) < LONG and word not in told]
 
 
+def empty(pdf, least=0.6):
+    """Sheets before the last that are used to less than a share of their height, between margins of 15 mm.
+
+    By default two fifths may be blank: a figure that does not fit, with its heading, is no higher.
+    """
+    sheets, found = list(drawn(pdf)), []
+    for number, sheet in enumerate(sheets[:-1], 1):
+        edge = round(len(sheet) * 15 / 297)
+        used = np.flatnonzero((sheet[edge:-edge] < 250).any(axis=1)).max(initial=0) / (len(sheet) - 2 * edge)
+        if used < least:
+            found.append(f"sheet {number} of {len(sheets)} is used to {100 * used:.0f} %")
+    return found
+
+
+def drawn(pdf):
+    """Sheets of a PDF in grey, 30 pixels an inch."""
+    done = subprocess.run(["pdftoppm", "-gray", "-r", "30", "-"], input=pdf, capture_output=True, check=True)
+    stream = io.BytesIO(done.stdout)
+    while stream.readline():
+        wide, high = map(int, stream.readline().split())
+        stream.readline()
+        yield np.frombuffer(stream.read(wide * high), np.uint8).reshape(high, wide)
+
+
 def looked_at(browser, shown, tmp_path):
     """What is wrong with a page at each width and on paper."""
     file, wrong = tmp_path / "page.html", {}
@@ -95,7 +123,8 @@ def looked_at(browser, shown, tmp_path):
         wrong[width] = browser.value(CUT), browser.complaints
     browser.open(file, 1400)
     browser.call("Emulation.setEmulatedMedia", media="print")
-    wrong["A4"] = missing(browser.value(TEXTS), browser.pdf()) if shutil.which("pdftotext") else [], []
+    paper = browser.pdf()
+    wrong["A4"] = [*missing(browser.value(TEXTS), paper), *empty(paper)] if shutil.which("pdftotext") else [], []
     return {where: found for where, found in wrong.items() if any(found)}
 
 
@@ -131,12 +160,13 @@ def test_nothing_is_cut_at_any_width_and_nothing_complains(browser, kind, tmp_pa
 @needs_browser
 def test_nothing_is_cut_of_a_page_with_the_arm(browser, demo, tmp_path):
     assert looked_at(browser, html(demo), tmp_path) == {}
+    assert empty(browser.pdf(), least=2 / 3) == []
 
 
 @needs_browser
 @needs_reader
 def test_what_is_cut_is_noticed(browser, tmp_path):
-    """A line that is too long for its box, a box that is too broad, a column beyond the sheet, an error."""
+    """A line too long for its box, a box too broad, a column beyond the sheet, an option that breaks, an error."""
     spoilt = {
         '<p style="width: 5rem; overflow: hidden; white-space: nowrap">a line that is far too long</p>': {
             1400,
@@ -145,6 +175,10 @@ def test_what_is_cut_is_noticed(browser, tmp_path):
         },
         '<div style="width: 3000px">broad<b style="float: right">gone_from_paper</b></div>': {1400, 400, "A4"},
         '<img src="http://127.0.0.1:9/none.png" alt="">': {1400, 400},
+        '<p style="font-family: monospace; width: 8ch"><code style="white-space: normal">--without</code></p>': {
+            1400,
+            400,
+        },
     }
     shown = page("misfit")
     for wrong, where in spoilt.items():

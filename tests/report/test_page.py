@@ -51,7 +51,7 @@ class Reader(HTMLParser):
     def __init__(self, page):
         super().__init__()
         self.open, self.tags, self.text, self.references, self.ids = [], [], [], [], []
-        self.feed(page)
+        self.feed(re.sub("</?code>", "", page))  # options stand within sentences
         self.close()
         assert self.open == []
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,10 +14,12 @@ from thermal_robot.campaign.table import TYPED
 from thermal_robot.commands.shared import Output, deliver
 from thermal_robot.console import note
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.correction.holding import FORMATS, WORTH, expectation
+from thermal_robot.correction.holding import FORMATS, WORTH, at_poses, expectation
 from thermal_robot.correction.zero_files import Motors
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import require_free, write_text
+from thermal_robot.percents import percent
+from thermal_robot.prediction import FileGap
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,12 +66,17 @@ def correct(options: argparse.Namespace) -> None:
     given = (options.model, options.poses, options.from_mjcf, options.from_pal, options.from_lerobot)
     require_free(named, [file for file in given if file])
     model = CorrectedModel.load(options.model)
+    there: tuple[tuple[FileGap, ...], str] = (), ""
 
     def filled(own: pd.DataFrame, poses: Campaign) -> pd.DataFrame:
+        nonlocal there
+        if model.spread and any(named[1:]):
+            away = sum(map(bool, model.spread.outside(poses, model.effects))) / poses.samples
+            there = at_poses(model, poses), f"{options.poses}, {percent(away)} of them outside what was measured"
         return model.commanded(own, model.corrected_commands(poses))
 
     table = [_table(options, model, options.poses, filled)] if options.poses else []
-    files, said = _robot_files(options, model) if any(named[1:]) else ([], "")
+    files, said = _robot_files(options, model, there) if any(named[1:]) else ([], "")
     deliver(options, [*table, *files], said)
 
 
@@ -115,7 +122,9 @@ def _require_of_use(options: argparse.Namespace) -> None:
             raise CampaignError(f"--{name.replace('_', '-')}", problem, expected="one of them, or this option left out")
 
 
-def _robot_files(options: argparse.Namespace, model: CorrectedModel) -> tuple[list[Output], str]:
+def _robot_files(
+    options: argparse.Namespace, model: CorrectedModel, there: tuple[Sequence[FileGap], str]
+) -> tuple[list[Output], str]:
     """Compute the requested files of the calibrated robot; returns their outputs, and the text that describes them.
 
     :class:`CampaignError` for options that exclude each other, or without the file that ``--lerobot`` needs.
@@ -145,7 +154,7 @@ def _robot_files(options: argparse.Namespace, model: CorrectedModel) -> tuple[li
     }
     texts = {name: make() for name, make in made.items() if getattr(options, name)}
     outputs: list[Output] = [(getattr(options, name), partial(write_text, text=text)) for name, text in texts.items()]
-    return outputs, "\n".join([*_of_files(options, robot, texts), *_of_parameters(robot)])
+    return outputs, "\n".join([*_of_files(options, robot, texts, there), *_of_parameters(robot)])
 
 
 def _min_sigma(options: argparse.Namespace, model: CorrectedModel) -> float | None:
@@ -160,12 +169,15 @@ def _min_sigma(options: argparse.Namespace, model: CorrectedModel) -> float | No
     return options.min_sigma or None
 
 
-def _of_files(options: argparse.Namespace, robot: to.Calibrated, names: Iterable[str]) -> Iterator[str]:
+def _of_files(
+    options: argparse.Namespace, robot: to.Calibrated, names: Iterable[str], there: tuple[Sequence[FileGap], str]
+) -> Iterator[str]:
     for name in names:
         own = FORMATS[name]
         lacks = f"; it cannot hold {own.lacks}" if own.lacks else ""
         yield f"{getattr(options, name)}: {own.title}, holds {own.holds}{lacks}"
         yield from (f"  {said}" for said in expectation(robot.gaps, name, robot.min_sigma, robot.alone))
+        yield from (f"  {said}" for said in expectation(there[0], name, robot.min_sigma, robot.alone, there[1]))
 
 
 def _of_parameters(robot: to.Calibrated) -> Iterator[str]:

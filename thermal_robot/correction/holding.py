@@ -10,15 +10,20 @@ C_D C_DD⁻¹ θ_D, the mean of the others given that these are zero.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
+from thermal_robot.campaign import Campaign
 from thermal_robot.correction.constant import constant, determined, joint_zeros
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.effects.apply import displacement
+from thermal_robot.inference.algebra import equations_of, orthonormal, rms, without
+from thermal_robot.inference.columns import frame_columns
+from thermal_robot.observations import observe
 from thermal_robot.percents import percent
 from thermal_robot.prediction import FileGap
 
@@ -93,20 +98,53 @@ def applied(model: CorrectedModel, min_sigma: float | None = None) -> dict[str, 
     }
 
 
-def expectation(gaps: Sequence[FileGap], name: str, min_sigma: float | None, alone: bool = False) -> list[str]:
-    """Sentences on the rms error of held-out rows before and after a file is applied; empty where it is unknown."""
+def at_poses(model: CorrectedModel, samples: Campaign) -> tuple[FileGap, ...]:
+    """Return the expected rms gap at given poses with each robot file alone: the model stands for the real robot.
+
+    Base and tool are registered anew in these poses; what the model leaves where rows are held out, and the
+    instrument's noise, is added. There is no interval: what the model errs by where nothing was measured is unknown.
+    """
+    if not model.files or model.spread is None:
+        return ()
+    seen = observe(samples, model.frames)
+    real = observe(samples, model.frames, displacement=displacement(seen, model.effects)[0]).position - seen.position
+    segments = seen.segment_sensitivity[:, :3].reshape(len(real), 3, -1)
+    columns = np.concatenate([seen.joint_sensitivity[:, :3], segments], axis=2)
+    frames = orthonormal(equations_of(frame_columns(seen)[0][:, :3]))
+    left = float((model.spread.beyond**2 + model.spread.noise**2).sum())
+    values = np.concatenate([values for _, values in model.effects])
+    files = {least: applied(model, least) for least in {gap.min_sigma for gap in model.files}}
+
+    def square(moved: Array) -> float:
+        return left + rms(without(moved.ravel(), frames).reshape(-1, 3)) ** 2
+
+    def told(gap: FileGap) -> FileGap:
+        own = np.asarray(gap.alone) if gap.alone else files[gap.min_sigma][gap.holds].displacement(values)
+        before, after = square(real), square(real - columns @ own)
+        return replace(gap, rms_before=before**0.5, rms_after=after**0.5, shrinkage=1.0 - after / before)
+
+    return tuple(map(told, model.files))
+
+
+def expectation(
+    gaps: Sequence[FileGap], name: str, min_sigma: float | None, alone: bool = False, poses: str = ""
+) -> list[str]:
+    """Sentences on the rms error before and after a file is applied, on held-out rows; empty where it is unknown.
+
+    ``poses`` names those that :func:`at_poses` was asked about.
+    """
     of_kind = {(gap.min_sigma, bool(gap.alone)): gap for gap in gaps if gap.holds == FORMATS[name].holds}
-    asked = (None, True) if alone else (min_sigma, False)
-    own = of_kind.pop(asked, None)
+    own = of_kind.pop((None, True) if alone else (min_sigma, False), None)
     if own is None:
         return []
-    low, high = (100.0 * end for end in own.shrinkage_ci95)
-    said = [
-        f"Expected of this file alone, on rows held out, base and tool registered anew: {1e3 * own.rms_before:.3g} mm "
-        f"→ {1e3 * own.rms_after:.3g} mm, shrinkage {percent(own.shrinkage)} (95 %: {low:.1f} to {high:.1f} %)."
-    ]
+    said = f"{1e3 * own.rms_before:.3g} mm → {1e3 * own.rms_after:.3g} mm, shrinkage {percent(own.shrinkage)}"
     others = ", ".join(f"{_OTHER[key[1], key[0] is None]} {percent(gap.shrinkage)}" for key, gap in of_kind.items())
-    return [*said, f"Otherwise: {others}."] if others else said
+    otherwise = [f"Otherwise: {others}."] if others else []
+    if poses:
+        return [f"At the poses of {poses}, as the model predicts it: {said}.", *otherwise]
+    low, high = (100.0 * end for end in own.shrinkage_ci95)
+    told = f"Expected of this file alone, on rows held out, base and tool registered anew: {said}"
+    return [f"{told} (95 %: {low:.1f} to {high:.1f} %).", *otherwise]
 
 
 _OTHER = {

@@ -355,7 +355,7 @@ def _effect(d: MotionDiagnosis, finding: Finding, status: str, wide: int) -> Ite
 
 def _cannot(d: MotionDiagnosis) -> Iterator[str]:
     for group in d.separates:
-        yield f"In this log {', '.join(group)} do the same."
+        yield f"In this log {words.listed(group)} do the same."
     yield from always(d)
 
 

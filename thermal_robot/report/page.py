@@ -30,11 +30,14 @@ if TYPE_CHECKING:
     from thermal_robot.shapes import Arm
 
 Plain = Mapping[str, Any]
+_OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")  # of the command line
 
 
 def _bound(value: Any) -> Any:
-    """Keep numbers with their units by :func:`words.bound`, in text; what is markup already stays."""
-    return words.bound(value) if type(value) is str else value
+    """Escape text, bind numbers to units (:func:`words.bound`) and mark options as code; what is markup stays."""
+    if type(value) is not str:
+        return value
+    return Markup(_OPTION.sub(r"<code>\g<0></code>", escape(words.bound(value))))
 
 
 @cache
