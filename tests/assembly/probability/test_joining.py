@@ -8,7 +8,7 @@ import pytest
 from helpers import some
 
 from thermal_robot.assembly.probability import UniformSpread, failing_probability, joining_probability
-from thermal_robot.assembly.probability.joining import planar_link_nodes
+from thermal_robot.assembly.probability.joining import link_nodes, planar_link_nodes
 
 
 def turned(angle):
@@ -220,10 +220,11 @@ def test_a_shift_adds_to_the_mean_and_each_error_may_have_its_own():
     np.testing.assert_allclose(shifted, expected, rtol=1e-14)
 
 
+@pytest.mark.parametrize("nodes", [link_nodes, planar_link_nodes])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_nodes_of_links_keep_the_moments_and_refuse_a_vanishing_normal_part_at_once(count):
+def test_nodes_of_links_keep_the_moments_and_refuse_a_vanishing_normal_part_at_once(nodes, count):
     columns = np.array([[0.5, 0.2, 1.0], [0.1, 0.6, 0.2]])[:, :count]
-    shifts, weights = planar_link_nodes(0.3 * np.eye(2), columns)
+    shifts, weights = nodes(0.3 * np.eye(2), columns)
     assert weights.sum() == pytest.approx(1.0, rel=1e-12)
     np.testing.assert_allclose(weights @ shifts, 0.0, atol=1e-13)
     # A generator with u uniform on [−1, 1] has a third of its square as variance; independent ones add.
@@ -231,7 +232,7 @@ def test_nodes_of_links_keep_the_moments_and_refuse_a_vanishing_normal_part_at_o
     # Without a limit that is known beforehand there would be 1e12 nodes: no memory holds them.
     for variance in (1e-8, 1e-10, 0.0):
         with pytest.raises(ValueError, match="so narrow a normal part need too many nodes"):
-            planar_link_nodes(variance * np.eye(2), columns)
+            nodes(variance * np.eye(2), columns)
 
 
 def test_number_of_planar_nodes_does_not_grow_with_the_number_of_generators():
@@ -239,6 +240,7 @@ def test_number_of_planar_nodes_does_not_grow_with_the_number_of_generators():
     columns = np.array([[0.15, 0.06], [0.03, 0.18]])
     counts = [len(planar_link_nodes(np.eye(2), np.tile(columns / k, k))[1]) for k in (1, 2, 4)]
     assert counts[1] == counts[2] < 3 * counts[0]
+    assert len(link_nodes(np.eye(2), np.tile(columns / 2, 2))[1]) > 10 * counts[1]
     shifts, _ = planar_link_nodes(np.eye(2), np.array([[0.5, 1.0, -0.2], [0.25, 0.5, -0.1]]))
     np.testing.assert_allclose(shifts @ np.array([1.0, -2.0]), 0.0, atol=1e-14)
 

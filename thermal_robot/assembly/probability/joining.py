@@ -145,35 +145,39 @@ _SMOOTH = 6.0
 # Longest second generator, in standard deviations of the normal part, for which a fixed sum is the cheaper way.
 
 
-def _line_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
-    """Gauss-Legendre nodes (N, 2) and weights (N,) for the mean over ``generators @ u``, one column, u in [-1, 1].
+def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
+    """Gauss-Legendre product nodes (N, d), weights (N,) for the mean over ``generators @ u``, ``u`` uniform on [-1, 1].
 
-    A function smoothed by the normal part grows along it no faster than ``exp(reach * length * u)``, with the length
-    and the reach in standard deviations; panels and nodes follow from that.
+    A function smoothed by the normal part grows along a generator no faster than ``exp(reach * length * u)``, with the
+    length and the reach in standard deviations; panels and nodes follow from that. ``ValueError`` where the normal part
+    is so narrow that there would be more than `_LARGEST` nodes.
     """
-    length = generator_lengths(covariance, generators)
-    rate = length * (_REACH + length)
-    panels = np.maximum(np.ceil(rate / 12.0), 1.0)
-    count = _node_count(rate / panels)
+    lengths = generator_lengths(covariance, generators)
+    rates = lengths * ((_REACH if len(lengths) == 1 else _REACH_MANY) + lengths)
+    panels = np.maximum(np.ceil(rates / 12.0), 1.0)
+    counts = _node_count(rates / panels)
     # Counted before any node is made: next to a vanishing normal part there would be 1e12 of them.
-    _refuse(float(np.prod(panels * count)), _LARGEST, 1)
-    points, shares = np.polynomial.legendre.leggauss(int(count[0]))
-    parts = int(panels[0])
-    centres = (2.0 * np.arange(parts) + 1.0) / parts - 1.0
-    units = (centres[:, None] + points / parts).reshape(-1, 1)
-    return units @ generators.T, np.tile(shares / (2.0 * parts), parts)
+    _refuse(float(np.prod(panels * counts)), _LARGEST, len(lengths))
+    units, weights = np.zeros((1, 0)), np.ones(1)
+    for parts, count in zip(panels.astype(int), counts.astype(int), strict=True):
+        points, shares = np.polynomial.legendre.leggauss(int(count))
+        centres = (2.0 * np.arange(parts) + 1.0) / parts - 1.0
+        rule = (centres[:, None] + points / parts).ravel()
+        units = np.column_stack([np.repeat(units, len(rule), axis=0), np.tile(rule, len(units))])
+        weights = np.outer(weights, np.tile(shares / (2.0 * parts), parts)).ravel()
+    return units @ generators.T, weights
 
 
 def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
     """Quadrature nodes (N, 2), weights (N,) for the mean over planar ``generators @ u``, ``u`` uniform on [-1, 1].
 
-    One generator has Gauss-Legendre nodes. Of more the distribution of the sum is moved, one generator after the other,
-    on a fixed product grid of Chebyshev points over the sum's bounding box, such that every polynomial up to the grid's
-    degree keeps its mean. Weights may be slightly negative. ``ValueError`` where the normal part is so narrow that
-    there would be more than `_LARGEST` nodes, or `_LARGEST_GRID` of a grid.
+    As `link_nodes`, for any number of generators: the distribution of their sum is moved, one generator after the
+    other, on a fixed product grid of Chebyshev points over the sum's bounding box, such that every polynomial up to the
+    grid's degree keeps its mean. Weights may be slightly negative. ``ValueError`` where the normal part is so narrow
+    that the grid would hold more than `_LARGEST_GRID` nodes.
     """
-    if generators.shape[1] == 1:
-        return _line_nodes(covariance, generators)
+    if generators.shape[1] < 2:
+        return link_nodes(covariance, generators)
     axes = np.linalg.svd(generators)[0]
     components = axes.T @ generators
     half = np.sum(np.abs(components), axis=1)
