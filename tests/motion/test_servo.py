@@ -9,10 +9,10 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.motion import servo
 from thermal_robot.motion.servo import PARAMETERS, simulate
 
-STEP = 0.02
+STEP, LEVER = 0.02, 0.3
 
 
-def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, joints=1, **numbers):
+def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, joints=1, plane=-np.inf, **numbers):
     """Position after a step of the command (or a table of stamps and values), and its instants; of joints alike."""
     times, values = (np.array([0.0]), np.array([command])) if np.isscalar(command) else map(np.asarray, command)
     values = values.astype(float)
@@ -23,18 +23,33 @@ def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, 
         row[PARAMETERS.index(name)] = value
     loads, none, slopes = (np.zeros((k, n, *shape)) for k, shape in ((3, (joints,)), *[(2, (joints, joints))] * 2))
     loads[0], slopes[0] = load, slope * np.eye(joints)
-    around = loads, none, slopes, none, np.zeros((n, joints)), np.zeros((n, joints))
+    loads[2, :, -1] = LEVER if joints > 1 else 0.0
+    around = loads, none, slopes, none, np.zeros((n, joints)), np.zeros((n, joints)), np.zeros(n)
     grid = np.array([0, n]), np.zeros(1)
     ends = len(times) * np.arange(joints)[:, None] + [0, len(times)]
     command = np.tile(times, joints), np.tile(values, joints), ends
     rows, begun = np.tile(row, (1, joints, 1)), np.full((1, joints), start)
-    found = simulate(rows, np.zeros((1, 2)), grid, command, around, begun, STEP, substeps)
+    weights = np.array([[0.0, plane if joints > 1 else 0.0]])
+    found = simulate(rows, weights, grid, command, around, begun, STEP, substeps)
     return found[0, :, -1], STEP * np.arange(n)
 
 
 def test_lag_follows_its_exponential():
     q, t = moved(lag=0.07)
     np.testing.assert_allclose(q, 1.0 - np.exp(-t / 0.07), atol=2e-4)
+
+
+@pytest.mark.parametrize("numbers", [{"lag": 0.05}, {"lag": 0.05, "inertia": 1e-3, "coulomb": 0.01}])
+def test_a_tool_rests_on_a_plane_and_leaves_it_when_it_is_lifted(numbers):
+    """The tool is at LEVER times the last joint's angle; lowered to −0.5 rad it is held at the plane, −0.06 m."""
+    down = np.array([0.0, 1.0]), np.array([-0.5, 0.2])
+    q, t = moved(down, joints=2, plane=-0.06, droop=0.07, **numbers)
+    free, _ = moved(down, joints=2, droop=0.07, **numbers)
+    assert LEVER * q.min() > -0.06 - 1e-6
+    assert LEVER * q[t == 0.9] == pytest.approx(-0.06, abs=1e-6)
+    assert (q[:2] == free[:2]).all()
+    assert free.min() < -0.4
+    assert q[-1] == pytest.approx(free[-1], abs=1e-3 + numbers.get("coulomb", 0.0))
 
 
 @pytest.mark.parametrize("joints", [1, 2])
@@ -143,7 +158,7 @@ def test_friction_of_joints_that_move_each_other_obeys_coulombs_law(load_frictio
         loads, still = np.zeros((3, 2, joints)), np.zeros((2, joints))
         masses = np.stack([np.stack([mass, mass]), np.zeros((2, joints, joints))])
         loads[0], none = load, np.zeros_like(masses)
-        around = loads, masses, none, none, still, still
+        around = loads, masses, none, none, still, still, still[:, 0]
         given = np.zeros(joints), command * 0.1, np.stack([np.arange(joints), np.arange(1, joints + 1)], axis=1)
         grid = np.array([0, 2]), np.zeros(1)
         found = simulate(row[None], np.zeros((1, 2)), grid, given, around, np.zeros((1, joints)), h, 1)

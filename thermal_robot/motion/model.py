@@ -244,6 +244,7 @@ class ServoModel(JointModel):
         self.measured = np.concatenate([motion.position.values for motion in log.motions])
         self.reach = np.nanmin(self.measured, axis=0), np.nanmax(self.measured, axis=0)
         self.commanded = np.stack([self._held(j) for j in self.joints], axis=1)
+        self.held = self.coupled and len(self.joints) > 1  # by a plane, in the simulation itself
         if self.coupled:
             self.groups = (tuple(self.joints),)
         self.about = self._read() if self.coupled else np.clip(self.commanded, *self.reach)
@@ -399,7 +400,8 @@ class ServoModel(JointModel):
             elif parameter.number == "payload":
                 weights[:, 0] = values[:, p]
             elif parameter.number == "contact":
-                weights[:, 1] = values[:, p] - self.touching
+                there = values[:, p] - self.touching
+                weights[:, 1] = np.where(there > 0.0, self.lowest + there, -np.inf) if self.held else there
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.minimum(np.exp(x["kp"]), settings.SOFTER)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
@@ -427,7 +429,7 @@ class ServoModel(JointModel):
             loads[0] += self.pressing[:, at]
             loads[2] = self.contact[:, at]
         matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
-        around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at]
+        around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at], self.heights
         start = np.empty((len(self.first), len(group)))
         for k, motion in enumerate(self.log.motions):
             begun = [motion.position.of(j)[1][0] for j in group]
@@ -494,14 +496,21 @@ class ServoModel(JointModel):
         }
 
     def refreshed(self, values: Array) -> None:
-        """Recompute the loads along the simulated positions; where joints are coupled, until these come to rest."""
+        """Recompute the loads along the simulated positions; where joints are coupled, until these come to rest.
+
+        These start from the measured ones, as from others far from a plane what is linear in its height does not end.
+        """
+        if self.coupled:
+            self.about = self._read()
+            self.loads = self._loads()
+            self._press(values)
         for _ in range(settings.WAVES if self.coupled else 1):
-            about = self.path(values, free=True)
+            about = self.path(values, free=not self.held)
             moved, self.about = np.sqrt(np.mean((about - self.about) ** 2, axis=0)), about
             self.loads = self._loads()
+            self._press(values)
             if (moved < [self.noise(joint) for joint in self.joints]).all():
                 break
-        self._press(values)
 
     def _loads(self) -> Loads:
         """Return the loads in the middle of the steps, and keep as ``reference`` (n, J) position and velocity there."""
@@ -515,13 +524,18 @@ class ServoModel(JointModel):
     def _press(self, values: Array) -> None:
         """Compute the frictionless force that keeps the tool on a plane, to which the joints' springs yield.
 
-        The force λ ≥ 0 along the vertical solves z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
+        Of joints that move each other the simulation itself finds it. Else the force λ ≥ 0 along the vertical solves
+        z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
         """
         p = self.index("contact")
         self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
-        if p is None or values[p] <= 0.0:
+        self.heights = np.zeros(len(self.about))
+        if p is None or (values[p] <= 0.0 and not self.held):
             return
         height, slope = self._heights(self.reference[0])
+        if self.held:
+            self.heights, self.contact = height, slope
+            return
         compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
         self.touching = float(values[p])

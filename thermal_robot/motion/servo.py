@@ -55,6 +55,9 @@ velocity, rad/s, below which they end: in a step of 4 ms a millionth of what the
 FINER, NEARLY = 8, 0.5
 """Parts of a step in which a servo may saturate, where its torque bends, and share of its limit from which it may."""
 _ONE = Lock()
+LEVEL, RISES, LIFT = 1e-7, 0.02, 1e-3
+"""m: by which a tool on a plane may stand beside it; s: in which one below rises to a third, as MuJoCo's contacts; m/N:
+by which a force is thought to lift the tool in a time step, until that is known from the step before."""
 LEAST = 0.1
 """Of a sliding joint's derivative by its load what friction leaves of it at least."""
 FASTEST = 1e3
@@ -191,7 +194,7 @@ def _couple(  # type: ignore[no-untyped-def]
     joints, half, payload = len(base), 0.5 * h, weights[s, 0]
     for j in range(joints):
         droop, lag, derivative = numbers[s, j, 5], numbers[s, j, 3], numbers[s, j, 13]
-        told = loads[0, n, j] + payload * loads[1, n, j] + weights[s, 1] * loads[2, n, j]
+        told = loads[0, n, j] + payload * loads[1, n, j]
         for i in range(joints):
             mass = masses[0, n, j, i] + payload * masses[1, n, j, i]
             slope = slopes[0, n, j, i] + payload * slopes[1, n, j, i]
@@ -246,6 +249,42 @@ def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h,
                 w[s, j] = max(min(w[s, j] + left[j], FASTEST), -FASTEST)
 
 
+def _height(s, n, plane, heights, loads, about, q, h, w):  # type: ignore[no-untyped-def]
+    """Height of the tool above a plane, m, in set s after it has turned for h."""
+    gap = heights[n] - plane
+    for j in range(q.shape[1]):
+        gap += loads[2, n, j] * max(min(q[s, j] + h * w[s, j] - about[n, j], NEAR), -NEAR)
+    return gap
+
+
+def _above(  # type: ignore[no-untyped-def]
+    s, n, plane, heights, loads, about, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, sides,
+    left, matrix, force, steep,
+):  # fmt: skip
+    """Solve a time step as :func:`_velocities`, with the least ``force`` (S,) that keeps the tool above a plane.
+
+    A unilateral constraint: the height after the step grows with the force, whose root the secant method finds. A tool
+    below the plane rises to it exponentially.
+    """
+    floor = min(_height(s, n, plane, heights, loads, about, q, 0.0, w), 0.0) * math.exp(-h / RISES)  # type: ignore[no-untyped-call]
+    more, before = force[s], 0.0
+    for number in range(STEPS):
+        for j in range(q.shape[1]):
+            base[j] -= numbers[s, j, 5] * loads[2, n, j] * more
+        _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, sides, left, matrix)  # type: ignore[no-untyped-call]
+        gap = _height(s, n, plane, heights, loads, about, q, h, w) - floor  # type: ignore[no-untyped-call]
+        if abs(gap) < LEVEL or (force[s] == 0.0 and gap > 0.0):
+            return
+        # where pushing does not lift the tool, as far from where its height was taken, nothing pushes
+        lifts = number == 0 or (gap - before) * more > 0.0
+        if number > 0 and lifts:
+            steep[s] = (gap - before) / more
+        if not lifts and force[s] == 0.0:
+            return
+        more = max(min(-gap / steep[s], force[s] if force[s] > 0.0 else 1e9), -force[s]) if lifts else -force[s]
+        force[s], before = force[s] + more, gap
+
+
 def _lead(  # type: ignore[no-untyped-def]
     s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, u
 ):
@@ -271,7 +310,7 @@ def _lead(  # type: ignore[no-untyped-def]
 
 def _together(  # type: ignore[no-untyped-def]
     numbers, weights, begins, first, step, times, commands, command_begins, loads, masses, slopes, drags, about, pace,
-    start, out,
+    heights, start, out,
 ):  # fmt: skip
     """Integrate all motions of several joints; a step ends where a command changes."""
     sets, joints = shape = numbers.shape[:2]
@@ -280,9 +319,10 @@ def _together(  # type: ignore[no-untyped-def]
     u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
     base, left, sides, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
     joined, matrix = np.zeros((joints, joints)), np.zeros((joints, joints))
-    limits = 1.0 / np.maximum(numbers[:, :, 10], 1e-9)
+    limits, force, steep = 1.0 / np.maximum(numbers[:, :, 10], 1e-9), np.zeros(sets), np.full(sets, LIFT)
     for m in range(len(begins) - 1):
         for s in range(sets):
+            force[s] = 0.0
             for j in range(joints):
                 q[s, j], v[s, j], w[s, j], k[s, j] = start[m, j], 0.0, 0.0, command_begins[j, m]
                 led[s, j] = q[s, j]
@@ -300,12 +340,15 @@ def _together(  # type: ignore[no-untyped-def]
                         s, n, numbers, weights, loads, masses, slopes, drags, about, pace, q, v, h, base, joined, heavy,
                         drag, bend,
                     )  # fmt: skip
-                    _velocities(  # type: ignore[no-untyped-call]
-                        s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h, w, stops, sides, left, matrix
-                    )
+                    _above(  # type: ignore[no-untyped-call]
+                        s, n, weights[s, 1], heights, loads, about, numbers, limits, q, v, u, base, joined, heavy, drag,
+                        bend, h, w, stops, sides, left, matrix, force, steep,
+                    )  # fmt: skip
                     for j in range(joints):
                         q[s, j] += h * w[s, j]
                         v[s, j] = 2.0 * w[s, j] - v[s, j] if w[s, j] != 0.0 and not stops[j] else 0.0
+                        if force[s] > 0.0:  # an impact leaves nothing of the speed towards the plane
+                            v[s, j] = w[s, j]
                 out[s, n] = q[s]
 
 
@@ -315,13 +358,14 @@ def _kernels() -> tuple[Any, Any]:
 
     Raises :class:`EstimationError` without numba.
     """
-    global _led, _sliding, _middle, _solve, _lead, _couple, _velocities
+    global _led, _sliding, _middle, _solve, _lead, _couple, _velocities, _height, _above
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
         if not hasattr(_middle, "py_func"):
             _led, _sliding, _middle, _solve = (compiled(one) for one in (_led, _sliding, _middle, _solve))
             _lead, _couple, _velocities = (compiled(one) for one in (_lead, _couple, _velocities))
+            _height, _above = compiled(_height), compiled(_above)
     return compiled(_alone), compiled(_together)
 
 
@@ -333,15 +377,16 @@ def simulate(
 
     ``numbers`` (S, J, 17) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
-    middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, of
-    contact, and of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and
-    velocities (n, J) at which they hold; ``start`` (M, J) rad.
+    middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, and of
+    contact, of several joints the gradient of the tool's height; of the first two mass matrices, derivatives by
+    position and by velocity (2, n, J, J); positions and velocities (n, J) at which they hold, and heights there
+    (n,), m; ``start`` (M, J) rad. The weight of contact is a plane's height, of a single joint's motion a factor.
     """
     out, (alone, together) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
     if numbers.shape[1] > 1:
         together(numbers, weights, *grid, step, *command, *around, start, out)
         return out
-    loads, masses, slopes, _, about, _ = around
+    loads, masses, slopes, _, about, _, _ = around
     times, values, begins = command
     own = (np.ascontiguousarray(one[..., 0]) for one in (loads, masses[..., 0], slopes[..., 0], about, start))
     alone(numbers[:, 0], weights, *grid, step, substeps, times, values, begins[0], *own, out[..., 0])

@@ -73,7 +73,7 @@ class Scales:
                 if told.log_evidence >= least or told.loss <= base.loss:
                     begun = there
                     break
-                if told.log_evidence - before < least - told.log_evidence:
+                if not told.log_evidence - before >= least - told.log_evidence:
                     return None
                 begun, before = there, told.log_evidence
             found = fitted(self.model, begun, active, groups=groups)
