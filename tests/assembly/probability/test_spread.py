@@ -48,13 +48,8 @@ def test_zonotope_is_the_hull_of_all_corners(dimension, count, kind):
         assert ConvexHull(body.vertices).volume == pytest.approx(hull.volume, rel=1e-11)
         assert len(ConvexHull(body.vertices).vertices) == len(body.vertices), "every vertex must be needed"
         assert body.farthest_distance == pytest.approx(np.max(np.linalg.norm(corners, axis=1)), rel=1e-14)
-        np.testing.assert_allclose(columns @ body.farthest_corner, body.farthest, rtol=1e-13, atol=1e-13)
         np.testing.assert_allclose(body.corners @ columns.T, body.vertices, rtol=1e-13, atol=1e-13)
         assert np.all((body.corners == low) | (body.corners == high))
-        directions = rng.normal(size=(20, dimension))
-        np.testing.assert_allclose(body.support(directions), np.max(directions @ corners.T, axis=1), rtol=1e-13)
-        assert np.all(body.contains(corners))
-        assert not np.any(body.contains(body.vertices + 1e-9 * (body.vertices - body.centre)))
 
 
 @pytest.mark.parametrize("kind", ["general", "parallel", "zero", "coplanar"])
@@ -91,14 +86,9 @@ def test_parallel_generators_leave_a_segment_and_none_a_point():
         body = zonotope(columns, 0.0, 1.0)
         assert (len(body.vertices), body.content, body.faces) == (2, 0.0, ())
         assert body.farthest_distance == pytest.approx(2.0 * np.sqrt(5.0), rel=1e-14)
-        middle = body.centre
-        assert body.contains(middle)
-        assert not body.contains(middle + np.eye(len(middle))[0] * 0.01)
     for dimension in (2, 3):
         body = zonotope(np.zeros((dimension, 4)), -1.0, 1.0)
         np.testing.assert_array_equal(body.vertices, np.zeros((1, dimension)))
-        assert body.contains(np.zeros(dimension))
-        assert not body.contains(np.full(dimension, 0.1))
     assert zonotope(np.empty((2, 0)), 0.0, 1.0).farthest_distance == 0.0
 
 
@@ -111,8 +101,6 @@ def test_a_turned_box_is_a_box_and_a_flat_body_its_polygon():
     columns = np.array([[1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
     body = zonotope(columns, 0.0, 1.0)
     assert (len(body.vertices), body.volume) == (6, 0.0)
-    assert body.contains([1.0, 1.0, 0.0])
-    assert not body.contains([1.0, 1.0, 0.01])
     assert body.farthest_distance == pytest.approx(np.sqrt(8.0), rel=1e-14)
 
 
@@ -122,9 +110,10 @@ def test_polygon_in_a_plane_is_the_shadow_of_the_body():
     for plane in ("xy", "zx", np.array([1.0, 2.0, -0.5]), np.array([0.0, 0.0, 2.0]), np.eye(3)[[2, 0]]):
         shadow = polygon_in_plane(columns, low, high, plane)
         flat = body.vertices @ plane_axes(plane).T
-        assert np.all(shadow.contains(flat))
-        directions = np.random.default_rng(3).normal(size=(30, 2))
-        np.testing.assert_allclose(shadow.support(directions), np.max(directions @ flat.T, axis=1), atol=1e-12)
+        outline = flat[ConvexHull(flat).vertices]
+        apart = np.linalg.norm(shadow.vertices[:, None] - outline, axis=2)
+        np.testing.assert_allclose(apart.min(axis=0), 0.0, atol=1e-12)
+        np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-12)
 
 
 def test_axes_of_a_normal_are_right_handed_and_the_first_is_level():
@@ -192,7 +181,6 @@ def test_tiles_fill_the_zonotope_once(dimension):
 def test_uniform_over_the_area_is_uniform():
     spread = UniformSpread.zonotope(COLUMNS, -1.0, 1.0, over="area")
     draws, body = spread.rvs(40_000, 1), zonotope(COLUMNS, -1.0, 1.0)
-    assert np.all(body.contains(draws))
     # Triangles between the vertices: each holds its share of the area of the draws.
     triangles = Delaunay(body.vertices)
     areas = np.array([ConvexHull(body.vertices[t]).volume for t in triangles.simplices]) / body.area
@@ -221,7 +209,6 @@ SQUARE = np.ones((2, 3))
         (lambda: zonotope(np.ones((4, 3)), 0.0, 1.0), "two or three rows"),
         (lambda: zonotope(SQUARE, np.nan, 1.0), "finite"),
         (lambda: zonotope(SQUARE, 0.0, np.inf), "finite"),
-        (lambda: zonotope(SQUARE, 0.0, 1.0).contains(np.zeros(3)), r"shape \(\.\.\., 2\)"),
         (lambda: zonotope(SQUARE, 0.0, 1.0).volume, "a polygon has an area"),
         (lambda: zonotope(np.eye(3), 0.0, 1.0).area, "in space has a volume"),
         (lambda: polygon_in_plane(SQUARE, 0.0, 1.0, "xy"), "three rows"),

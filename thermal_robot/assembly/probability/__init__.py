@@ -12,7 +12,6 @@ from thermal_robot.assembly.probability.capability import (
 from thermal_robot.assembly.probability.flat_normal import (
     FlatNormal,
     FlatNormalND,
-    eq18_printed_area,
     flat_normal,
     flat_normal_nd,
 )
@@ -43,7 +42,6 @@ __all__ = [
     "Zonotope",
     "capability",
     "capability_ratio",
-    "eq18_printed_area",
     "failing_from_capability",
     "failing_probability",
     "flat_normal",

@@ -10,7 +10,7 @@ over the interval ``eta ± sqrt(3) r`` of length ``2 sqrt(3) r``:
     PDF(eta) = 1 / (2 sqrt(3) r) * 1 / sqrt(2 pi) * integral of exp(-zeta**2 / 2)  =  1 / (2 sqrt(6 pi) r) * integral
 
 The text has ``2 sqrt(6) pi r`` in the denominator; the area is then ``sqrt(6 pi) / (sqrt(6) pi) = 1 / sqrt(pi) =
-0.5642`` (`eq18_printed_area`). The root covers ``pi`` too.
+0.5642``. The root covers ``pi`` too.
 """
 
 from __future__ import annotations
@@ -31,11 +31,6 @@ from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpre
 from thermal_robot.errors import EstimationError
 
 _ROOT_3 = np.sqrt(3.0)
-
-
-def eq18_printed_area() -> float:
-    """Area under the flat-normal density as Eq 18 prints it, for any ``r``: ``1 / sqrt(pi)``, not one."""
-    return float(1.0 / np.sqrt(np.pi))
 
 
 def _parts(r: npt.ArrayLike) -> tuple[Array, Array]:

@@ -239,11 +239,6 @@ class Zonotope:
         return int(self.generators.shape[0])
 
     @property
-    def centre(self) -> Array:
-        """Point of symmetry: the displacement at the middle of all bounds, shape ``(d,)``."""
-        return np.asarray(self.generators @ (0.5 * (self.lower + self.upper)))
-
-    @property
     def content(self) -> float:
         """Area of the polygon, or volume of the polyhedron: the sum of ``|det|`` over choices of ``d`` generators."""
         edges = self.generators * (self.upper - self.lower)
@@ -272,43 +267,9 @@ class Zonotope:
         return np.asarray(self.vertices[np.argmax(np.linalg.norm(self.vertices, axis=1))])
 
     @property
-    def farthest_corner(self) -> Array:
-        """Elongations that lead to `farthest`, shape ``(k,)``."""
-        return np.asarray(self.corners[np.argmax(np.linalg.norm(self.vertices, axis=1))])
-
-    @property
     def farthest_distance(self) -> float:
         """Distance of the farthest vertex: the largest displacement of the tool point."""
         return float(np.linalg.norm(self.farthest))
-
-    def support(self, direction: npt.ArrayLike) -> Array:
-        """Support function: the largest value of ``direction . displacement``.
-
-        Parameters
-        ----------
-        direction
-            Shape ``(..., d)``, any length.
-        """
-        rates = np.asarray(direction, dtype=float) @ self.generators
-        return np.asarray(np.sum(np.maximum(rates * self.lower, rates * self.upper), axis=-1))
-
-    def contains(self, point: npt.ArrayLike, *, tolerance: float = 1e-12) -> npt.NDArray[np.bool_]:
-        """Whether points lie in the zonotope, edge included.
-
-        Parameters
-        ----------
-        point
-            Shape ``(..., d)``.
-        tolerance
-            Allowance, as a share of the zonotope's size.
-        """
-        points = np.asarray(point, dtype=float)
-        if points.shape[-1:] != (self.dimension,):
-            raise ValueError(f"points must have shape (..., {self.dimension}), not {points.shape}")
-        normals = _facet_normals(self.generators * (self.upper - self.lower))
-        size = float(np.max(np.abs(self.vertices))) + float(np.sum(np.abs(self.generators) @ (self.upper - self.lower)))
-        outward = np.concatenate([normals, -normals])
-        return np.asarray(np.all(points @ outward.T - self.support(outward) <= tolerance * size, axis=-1))
 
 
 def zonotope(generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Zonotope:
@@ -445,19 +406,6 @@ def _directions(edges: Array) -> tuple[Array, int]:
     basis = np.array([direction for direction, _ in _groups(edges)]).reshape(-1, len(edges))
     rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if len(basis) else 0
     return np.concatenate([basis, np.linalg.svd(basis)[2][rank:] if len(basis) else np.eye(len(edges))]), rank
-
-
-def _facet_normals(edges: Array) -> Array:
-    """Facet normals ``(F, d)``, one of each opposite pair, of the zonotope of the given edges ``(d, k)``.
-
-    A direction in which it has no extent counts as an edge without length.
-    """
-    basis, _ = _directions(edges)
-    if len(edges) == 2:
-        return np.stack([-basis[:, 1], basis[:, 0]], axis=1)
-    pairs = np.array([np.cross(a, b) for a, b in combinations(basis, 2)])
-    sizes = np.linalg.norm(pairs, axis=1)
-    return np.asarray(pairs[sizes > 1e-12] / sizes[sizes > 1e-12, None])
 
 
 def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
