@@ -133,6 +133,19 @@ def _fed_forward(state, command):
     return state.assign(**{name: values + 1e-4 * np.sin(state.time) for name, values in own.items()}), command
 
 
+def _torque_off(state, command):
+    """Half a second after its command came to rest the first joint falls by a radian."""
+
+    def resting(table, names, since):
+        return table[names].where(table.time <= since).groupby(table.motion).ffill()
+
+    state, command = state.copy(), command.copy()
+    q, cmd = ([f"{kind}.{joint}" for joint in JOINTS] for kind in ("q", "cmd"))
+    state[q], command[cmd] = resting(state, q, 4.3), resting(command, cmd, 4.0)
+    state[q[0]] += np.clip(2.0 * (state.time - 4.5), 0.0, 1.0)
+    return state, command
+
+
 def _without_labels(state, command):
     command = command.drop(columns="motion")
     return state, command.assign(time=0.02 * command.index)
@@ -145,6 +158,7 @@ def _without_labels(state, command):
         (_foreign_joint, 1, "the robot has no joint 'elbo'"),
         (_no_command, 1, "no command is recorded"),
         (_by_hand, 2, "external force"),
+        (_torque_off, 2, "where the torque is off, the weight"),
         (_copied, 1, "external force"),
         (_copied_with_gaps, 1, "encoder.s own reading"),
         (_slow, 1, "sampled too slowly; found 16.6 Hz"),

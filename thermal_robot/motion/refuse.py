@@ -11,7 +11,7 @@ from thermal_robot.campaign.names import listed
 from thermal_robot.errors import CampaignError
 from thermal_robot.motion.following import Moves, at, usual_step
 from thermal_robot.motion.log import Motion, MotionLog
-from thermal_robot.motion.settings import FOREIGN, LEAST_RATE, LONGEST_LAG, NO_LAG, STILL_COMMAND
+from thermal_robot.motion.settings import FOREIGN, FROZEN, LEAST_RATE, LONGEST_LAG, NO_LAG, STILL_COMMAND, STRIDE
 
 
 def refused(log: MotionLog, files: str) -> MotionLog:
@@ -21,15 +21,18 @@ def refused(log: MotionLog, files: str) -> MotionLog:
         raise CampaignError(files, "is sampled too slowly", found=f"{rate:.3g} Hz", expected="at least 30 Hz")
     if not log.commanded:
         return log
-    guided = [motion.name for motion in log.motions if _foreign(motion) > FOREIGN]
     copied = [motion.name for motion in log.motions if _copied(motion)]
-    if len({*guided, *copied}) == len(log.motions):
+    led = [m.name for m in log.motions if m.name in copied or _foreign(m) > FOREIGN or _dropped(m)]
+    if len(led) == len(log.motions):
         how = "the command is the encoder's own reading" if copied else "the joints move while the command stands still"
-        problem = f"{how}: an external force, such as a hand that guides the arm, moved it, and no servo"
+        problem = (
+            f"{how}: an external force, such as a hand or, where the torque is off, the weight, moved it, and no servo"
+        )
         raise CampaignError(files, problem, expected="motions that follow a command")
     notes = list(log.notes)
-    if guided or copied:
-        notes.append(f"moved by an external force and not by their commands: the motions {listed([*guided, *copied])}")
+    if led:
+        notes.append(f"left out, as an external force moved them and not their commands: the motions {listed(led)}")
+        log = replace(log, motions=tuple(motion for motion in log.motions if motion.name not in led))
     if fed_forward(log):
         problem = "the joints follow their commands without the lag of a position servo: feed-forward unknown"
         if all(motion.torque is None for motion in log.motions):
@@ -47,6 +50,21 @@ def _foreign(motion: Motion) -> float:
     near = np.convolve(moving, np.ones(2 * reach + 1))[reach : reach + len(moving)] > 0.5
     energy = (moves.measured**2).sum(axis=1)
     return float(energy[~near].sum() / max(energy.sum(), 1e-12))
+
+
+def _dropped(motion: Motion) -> bool:
+    """Whether a joint leaves a command at rest, by FROZEN farther than it ever was from a moving one: no servo does."""
+    import pandas as pd
+
+    times = motion.position.time
+    command, before = (at(motion.command, times - shift) for shift in (0.0, STRIDE))
+    error = np.nan_to_num(np.abs(command - motion.position.values))
+    still = np.abs(command - before) <= STILL_COMMAND
+    began = (
+        pd.DataFrame(np.where(still, np.nan, error)).ffill().fillna(np.inf).to_numpy()
+    )  # as the command came to rest
+    largest = np.where(still, 0.0, error).max(axis=0)
+    return bool((still & (error > np.maximum(largest, began) + FROZEN)).any())
 
 
 def _copied(motion: Motion) -> bool:
