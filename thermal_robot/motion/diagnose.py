@@ -140,9 +140,9 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     total = np.sqrt(sums[0] / len(before)).tolist()
     held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
     findings, shares = _findings(choice, before, weights)
-    unexplained = _unexplained(choice)
-    most = not unexplained.flagged or shrinkage >= settings.MOST
-    verdict = tuple(one.name for one in findings if most and one.status in ("found", "confounded"))
+    unexplained = _unexplained(choice, 1.0 - float(shrinkage))
+    little = unexplained.flagged and shrinkage < settings.MOST
+    verdict = tuple(one.name for one in findings if not little and one.status in ("found", "confounded"))
     alike = [w for one, w in choice.weights if not (one.effects ^ choice.own.effects) & set(ALL)]
     probability = total_probability(alike)
     own = [p for p in np.flatnonzero(choice.active) if model.parameters[p].effect in ALL]
@@ -210,8 +210,11 @@ def _simulator(choice: Choice) -> list[str]:
     return found
 
 
-def _unexplained(choice: Choice) -> Unexplained:
-    """Test residuals above the noise for curves over position, velocity, load and time, cross-validated by motion."""
+def _unexplained(choice: Choice, left: float) -> Unexplained:
+    """Test residuals above the noise for their share of the gap, and curves over position, velocity, load and time.
+
+    Curves are cross-validated by motion; ``left`` is the share of the gap's mean square in motions held out.
+    """
     model, rows = choice.point.model, choice.point.rows
     tested = [
         (_curve_gain(rows[j].residual, values, rows[j].motion), name, j)
@@ -220,15 +223,16 @@ def _unexplained(choice: Choice) -> Unexplained:
         for name, values in model.quantities(j).items()
     ]
     flagged = sorted((one for one in tested if one[0] > settings.STRUCTURE), reverse=True)
+    remains, most = rms([rms(one.residual) for one in rows]), bool(tested) and left > 1.0 - settings.MOST
+    share = (f"{100.0 * left:.0f} % of the gap stays in motions held out, whatever is fitted",) if most else ()
     if not flagged:
-        return Unexplained(False, 0.0, 1.0)
+        return Unexplained(most, remains, 0.0, share) if most else Unexplained(False, 0.0, 1.0)
     largest = {j: gain for gain, _, j in reversed(flagged)}
     first = sorted(largest.items(), key=lambda one: -one[1])[:3]
     places = tuple(Location("joint", model.log.joints[j], gain) for j, gain in first)
     reason = f"{100.0 * places[0].share:.0f} % of what remains in {places[0].name} follows {flagged[0][1]}"
     follows = dict.fromkeys(name for _, name, _ in flagged)
-    remains = rms([rms(one.residual) for one in rows])
-    return Unexplained(True, remains, 0.0, (reason,), places, tuple(Dependence(one, 0.0) for one in follows))
+    return Unexplained(True, remains, 0.0, (*share, reason), places, tuple(Dependence(one, 0.0) for one in follows))
 
 
 def _curve_gain(left: Array, values: Array, motion: NDArray[np.int64]) -> float:

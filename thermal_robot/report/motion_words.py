@@ -144,7 +144,8 @@ def sentences(d: MotionDiagnosis) -> Iterator[str]:
     if not left.flagged:
         yield "What remains follows neither position, velocity, load nor time in motions held out."
         return
-    yield f"The effects leave {units.quantity(left.rms, d.unit)} rms with a pattern that holds in motions held out."
+    pattern = " with a pattern that holds in motions held out" if left.depends_on else ""
+    yield f"The effects leave {units.quantity(left.rms, d.unit)} rms{pattern}."
     yield from (f"{words.capitalised(reason).rstrip('.')}." for reason in left.reasons)
     if left.depends_on[1:]:
         yield f"It follows {words.listed([one.covariate for one in left.depends_on])}."
