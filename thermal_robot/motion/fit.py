@@ -218,18 +218,18 @@ def _shifted(cost: _Cost, here: Array, now: Mask, sets: list[Mask]) -> tuple[Arr
     Delays go earlier and later by SHIFTS of their expected size, lags the other way, where that betters a set's cost.
     """
     delay, lag = (now & cost.model.of_effects((name,)) for name in ("delay", "lag"))
-    found, before = here, np.zeros(len(sets))
-    if delay.any():
-        least = before = cost.of(here)
-        for share in settings.SHIFTS:
-            own = share * cost.model.sizes[delay].mean() * (delay.astype(float) - lag)
-            then = np.maximum(here + own, np.where(now, cost.model.least, here))
-            costs = cost.of(then)
-            for k in np.flatnonzero(costs < least).tolist():
-                found = np.where(sets[k], then, found)
-            least = np.minimum(costs, least)
-        return found, float((before - least).sum() / before.sum())
-    return found, 0.0
+    if not delay.any():
+        return here, 0.0
+    found, least = here, cost.of(here)
+    before = least.sum()
+    for share in settings.SHIFTS:
+        own = share * cost.model.sizes[delay].mean() * (delay.astype(float) - lag)
+        then = np.maximum(here + own, np.where(now, cost.model.least, here))
+        costs = cost.of(then)
+        for k in np.flatnonzero(costs < least).tolist():
+            found = np.where(sets[k], then, found)
+        least = np.minimum(costs, least)
+    return found, float((before - least.sum()) / before)
 
 
 def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:

@@ -60,9 +60,7 @@ def _dropped(motion: Motion) -> bool:
     command, before = (at(motion.command, times - shift) for shift in (0.0, STRIDE))
     error = np.nan_to_num(np.abs(command - motion.position.values))
     still = np.abs(command - before) <= STILL_COMMAND
-    began = (
-        pd.DataFrame(np.where(still, np.nan, error)).ffill().fillna(np.inf).to_numpy()
-    )  # as the command came to rest
+    began = pd.DataFrame(np.where(still, np.nan, error)).ffill().fillna(np.inf).to_numpy()  # where it came to rest
     largest = np.where(still, 0.0, error).max(axis=0)
     return bool((still & (error > np.maximum(largest, began) + FROZEN)).any())
 

@@ -189,10 +189,8 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
     start, places, sets = model.start(), np.arange(len(allowed)), list[tuple[Mask, tuple[Array, ...]]]()
 
     def propose(rest: Weighed, among: Sequence[Mask], groups: Groups = model.groups) -> None:
-        there = rest.active | (allowed & np.any(among, axis=0))
-        base = Weighed(
-            scales, rest.active, rest.point.with_rows(Point.at(model, rest.point.values, there, groups), groups)
-        )
+        point = Point.at(model, rest.point.values, rest.active | (allowed & np.any(among, axis=0)), groups)
+        base = Weighed(scales, rest.active, rest.point.with_rows(point, groups))
         for added in among:
             told = [base.ahead(rest.active | (places == k)) for k in places[allowed & ~own.active & added]]
             for one in sorted(told, key=lambda one: -one.log_evidence)[: settings.RIVALS]:

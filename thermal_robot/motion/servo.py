@@ -281,7 +281,7 @@ def _above(  # type: ignore[no-untyped-def]
             steep[s] = (gap - before) / more
         if not lifts and force[s] == 0.0:
             return
-        more = max(min(-gap / steep[s], force[s] if force[s] > 0.0 else 1e9), -force[s]) if lifts else -force[s]
+        more = max(min(-gap / steep[s], force[s] if force[s] > 0.0 else np.inf), -force[s]) if lifts else -force[s]
         force[s], before = force[s] + more, gap
 
 
