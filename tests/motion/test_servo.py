@@ -62,6 +62,21 @@ def test_a_set_point_of_limited_speed_is_a_ramp_that_the_lag_follows(joints):
     np.testing.assert_allclose(q, np.where(t < 1.0 / speed, ramp, after), atol=2e-3)
 
 
+@pytest.mark.parametrize("joints", [1, 2])
+@pytest.mark.parametrize("speed", [0.9, np.inf])
+def test_a_set_point_of_limited_acceleration_is_a_trapezoid_of_velocity(joints, speed):
+    """A step of 1 rad at 4 rad/s² takes v/a + 1/v at the speed v, and 2 √(1/a) where speed has no limit."""
+    q, t = moved(slew=1.0 / speed, ramp=0.25, joints=joints)
+    peak = min(speed, 2.0)
+    rises, whole = peak / 4.0, peak / 4.0 + 1.0 / peak
+    cruise = 0.5 * peak * rises + peak * (t - rises)
+    ends = np.where(t < whole, 1.0 - 2.0 * (whole - t) ** 2, 1.0)
+    exact = np.where(t < rises, 2.0 * t**2, np.where(t < whole - rises, cruise, ends))
+    np.testing.assert_allclose(q, exact, atol=peak * STEP / 5)  # way of one time step
+    assert np.abs(np.diff(q, 2)).max() <= 4.0 * (t[1] - t[0]) ** 2 * 1.01
+    assert q.max() <= 1.0 + 1e-9
+
+
 @pytest.mark.parametrize(("substeps", "error"), [(5, 2e-3), (10, 5e-4), (20, 1.3e-4)])
 def test_inertia_rings_as_an_oscillator_to_second_order_of_the_step(substeps, error):
     inertia, lag = 1e-3, 0.02

@@ -121,7 +121,8 @@ def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:
     return found
 
 
-def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
+def _answer(choice: Choice, progress: Callable[[str], None], said: Unexplained | None = None) -> MotionDiagnosis:
+    """Return the diagnosis of a choice; ``said`` is what stays of the gap, where it is of another choice than this."""
     point, model, log = choice.point, choice.point.model, choice.point.model.log
     before, held = model.all_residuals(np.zeros(len(model.parameters))), _folds(choice, progress)
     joints = {
@@ -139,10 +140,14 @@ def _answer(choice: Choice, progress: Callable[[str], None]) -> MotionDiagnosis:
     low, high = np.quantile(others, [0.025, 0.975]).tolist()
     total = np.sqrt(sums[0] / len(before)).tolist()
     held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
+    unexplained = said or _unexplained(choice, 1.0 - float(shrinkage))
+    if unexplained.flagged and shrinkage < settings.MOST and choice.active.any():
+        # an answer is what is told: of effects that explain less than what stays, nothing
+        return _answer(choice.nothing, progress, unexplained)
     findings, shares = _findings(choice, before, weights)
-    unexplained = _unexplained(choice, 1.0 - float(shrinkage))
-    little = unexplained.flagged and shrinkage < settings.MOST
-    verdict = tuple(one.name for one in findings if not little and one.status in ("found", "confounded"))
+    if said:
+        findings = tuple(replace(one, probability=None) for one in findings)
+    verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
     alike = [w for one, w in choice.weights if not (one.effects ^ choice.own.effects) & set(ALL)]
     probability = total_probability(alike)
     own = [p for p in np.flatnonzero(choice.active) if model.parameters[p].effect in ALL]
@@ -211,28 +216,33 @@ def _simulator(choice: Choice) -> list[str]:
 
 
 def _unexplained(choice: Choice, left: float) -> Unexplained:
-    """Test residuals above the noise for their share of the gap, and curves over position, velocity, load and time.
+    """Return what residuals leave above the noise: how much, and curves over position, velocity, load and time.
 
     Curves are cross-validated by motion; ``left`` is the share of the gap's mean square in motions held out.
     """
     model, rows = choice.point.model, choice.point.rows
-    tested = [
+    above = {j: rms(rows[j].residual) / max(model.noise(j), 1e-300) for j in model.joints}
+    above = {j: times for j, times in above.items() if times >= settings.NOISY}
+    if not above:
+        return Unexplained(False, 0.0, 1.0)
+    curves = [
         (_curve_gain(rows[j].residual, values, rows[j].motion), name, j)
-        for j in model.joints
-        if rms(rows[j].residual) >= settings.NOISY * model.noise(j)
+        for j in above
         for name, values in model.quantities(j).items()
     ]
-    flagged = sorted((one for one in tested if one[0] > settings.STRUCTURE), reverse=True)
-    remains, most = rms([rms(one.residual) for one in rows]), bool(tested) and left > 1.0 - settings.MOST
-    share = (f"{100.0 * left:.0f} % of the gap stays in motions held out, whatever is fitted",) if most else ()
-    if not flagged:
-        return Unexplained(most, remains, 0.0, share) if most else Unexplained(False, 0.0, 1.0)
-    largest = {j: gain for gain, _, j in reversed(flagged)}
+    curves = sorted((one for one in curves if one[0] > settings.STRUCTURE), reverse=True)
+    worst = max(above, key=above.__getitem__)
+    said = [f"{above[worst]:.2g} times the noise of its readings stays in {model.log.joints[worst]}"]
+    if left > 1.0 - settings.MOST:
+        said.insert(0, f"{100.0 * left:.0f} % of the gap stays in motions held out, whatever is fitted")
+    if curves:
+        gain, name, joint = curves[0]
+        said.append(f"{100.0 * gain:.0f} % of what remains in {model.log.joints[joint]} follows {name}")
+    largest = {j: gain for gain, _, j in reversed(curves)} or dict.fromkeys((worst,), 0.0)
     first = sorted(largest.items(), key=lambda one: -one[1])[:3]
     places = tuple(Location("joint", model.log.joints[j], gain) for j, gain in first)
-    reason = f"{100.0 * places[0].share:.0f} % of what remains in {places[0].name} follows {flagged[0][1]}"
-    follows = dict.fromkeys(name for _, name, _ in flagged)
-    return Unexplained(True, remains, 0.0, (*share, reason), places, tuple(Dependence(one, 0.0) for one in follows))
+    follows = tuple(Dependence(name, 0.0) for name in dict.fromkeys(name for _, name, _ in curves))
+    return Unexplained(True, rms([rms(one.residual) for one in rows]), 0.0, tuple(said), places, follows)
 
 
 def _curve_gain(left: Array, values: Array, motion: NDArray[np.int64]) -> float:

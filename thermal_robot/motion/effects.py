@@ -62,6 +62,8 @@ EFFECTS = (
                 "saturation", "1/rad", 5.0),
     ServoEffect("speed_limit", "speed limits of the servos", "the servo's speed limit", "inverse of the speed",
                 "slew", "s/rad", 0.2),
+    ServoEffect("acceleration_limit", "acceleration limits of the servos", "the servo's acceleration limit",
+                "inverse of the acceleration", "ramp", "s²/rad", 0.03),
     ServoEffect("low_stop", "lower end stops", "a lower end stop", "below which it stops", "low", "rad", 0.5,
                 spread=UNSOURCED),
     ServoEffect("high_stop", "upper end stops", "an upper end stop", "above which it stops", "high", "rad", 0.5,
@@ -78,7 +80,7 @@ TORQUE_EFFECTS = (
 )  # fmt: skip
 """Effects that a torque channel shows, in its units."""
 
-ABRUPT = ("contact", "torque_limit", "speed_limit", "low_stop", "high_stop")
+ABRUPT = ("contact", "torque_limit", "speed_limit", "acceleration_limit", "low_stop", "high_stop")
 """Effects that do nothing until they are reached, so that one motion alone may tell them."""
 SIMULATOR = ("step", "creep")
 """Effects of a simulator that made a log, which are told of no robot: its time step, its soft friction."""
@@ -90,6 +92,7 @@ SHARED_TITLES = {
 }
 TORQUE_TITLES = {effect.name: effect.title for effect in TORQUE_EFFECTS if effect.name not in TITLES}
 _TIMES_STIFFNESS = {(effect.name, effect.unit): effect.torque for effect in EFFECTS if effect.torque}
+_INVERSE = {"speed_limit": ("speed", "rad/s"), "acceleration_limit": ("acceleration", "rad/s²")}
 _SHARES = {"gain", "load_friction", "torque_constant", "masses"}
 
 
@@ -131,8 +134,9 @@ def physical(effect: str, estimate: Estimate, servo: Servo, commanded: Array) ->
         name, unit, factor = ("torque", "N·m", servo.kp) if servo.kp else ("error from which it saturates", "rad", 1.0)
         limit = servo.saturation(factor, value)
         return replace(estimate, name=name + place, value=limit, std=std * limit**2 / factor, unit=unit)
-    if effect == "speed_limit" and value > 0.0:
-        return replace(estimate, name=f"speed{place}", value=1.0 / value, std=std / value**2, unit="rad/s")
+    if effect in _INVERSE and value > 0.0:
+        name, unit = _INVERSE[effect]
+        return replace(estimate, name=name + place, value=1.0 / value, std=std / value**2, unit=unit)
     if effect in ("low_stop", "high_stop") and len(commanded):
         at = commanded.min() + value if effect == "low_stop" else commanded.max() - value
         return replace(estimate, name=f"stops at{place}", value=float(at))

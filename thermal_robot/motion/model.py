@@ -340,7 +340,8 @@ class ServoModel(JointModel):
             values[self.index("low_stop", joint)] = max(low - command.min(), 0.0)
             values[self.index("high_stop", joint)] = max(command.max() - high, 0.0)
             values[self.index("torque_limit", joint)] = self._limits[joint]
-            values[self.index("speed_limit", joint)] = 1.0 / self._fastest[joint]
+            values[self.index("speed_limit", joint)] = 1.0 / self._fastest[0, joint]
+            values[self.index("acceleration_limit", joint)] = 1.0 / self._fastest[1, joint]
         if (p := self.index("contact")) is not None:
             height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
@@ -373,9 +374,9 @@ class ServoModel(JointModel):
 
     @cached_property
     def _fastest(self) -> Array:
-        """(J,) largest measured speeds, rad/s, at which a limited set point would show; at least what stirs a joint."""
-        speed = np.quantile(np.abs(self._moved[1]), settings.FEW, axis=0)
-        return np.asarray(np.maximum(speed, settings.STIRRED / settings.STRIDE))
+        """(2, J) largest measured speeds, rad/s, and accelerations, rad/s²; at least what stirs a joint."""
+        most = [np.quantile(np.abs(one), settings.FEW, axis=0) for one in self._moved[1:]]
+        return np.maximum(most, settings.STIRRED / settings.STRIDE)
 
     def _heights(self, q: Array) -> tuple[Array, Array]:
         """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
@@ -389,7 +390,7 @@ class ServoModel(JointModel):
         return tool_poses(robot, whole)[:, :3, 3] @ up, slope
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 17) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
+        """(S, 18) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
         weights = np.zeros((len(values), 2))
         for p, parameter in enumerate(self.parameters):

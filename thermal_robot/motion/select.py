@@ -23,6 +23,9 @@ from thermal_robot.motion.weigh import Scales, Weighed
 PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "payload", "masses", "offset", "viscous")
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 
+PROFILE = ("speed_limit", "acceleration_limit")
+"""Limits of the profile along which a servo leads its set point."""
+
 
 @dataclass(frozen=True, eq=False)
 class Choice:
@@ -46,6 +49,13 @@ class Choice:
         """Posterior probability of each set, the choice first."""
         every = (self.own, *self.rivals)
         return list(zip(every, softmax([one.log_evidence for one in every]).tolist(), strict=True))
+
+    @property
+    def nothing(self) -> Choice:
+        """The choice of no effect at all."""
+        none = np.zeros(len(self.active))
+        own = Weighed(self.own.scales, none > 0.0, Point.at(self.point.model, none, none > 0.0))
+        return Choice(own, ())
 
     def probability(self, block: int) -> float:
         """Posterior probability that a parameter is in the model, summed over the sets weighed."""
@@ -77,7 +87,7 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     begun = np.where(allowed, model.start(), 0.0)
     if start is None:
         # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
-        limited, led = (model.of_effects((*PLAIN, limit)) for limit in ("torque_limit", "speed_limit"))
+        limited, led = (model.of_effects((*PLAIN, *limits)) for limits in (("torque_limit",), PROFILE))
         sized = np.where(model.of_effects(("torque_limit",)), model.sizes, begun)
         fits = [fit(model, first, allowed & own) for first, own in ((begun, limited), (sized, limited), (begun, led))]
         left = np.log([[rms(one) for one in model.all_residuals(values)] for values in fits])

@@ -7,13 +7,13 @@ in sticking,
     load = Σ_k M_jk q̈_k + h_j + Σ_k (∂h_j/∂q_k (q − q̄)_k + ∂h_j/∂q̇_k (q̇ − q̄̇)_k) ,
     |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
-u̇ no more than the servo's speed limit, D a dead zone, c = 1/K, I the drive's own inertia over K, L the torque limit
-over K. Mass matrix M and bias torques h are those of a reference motion q̄ (Newton's method on waveforms: Lelarasmee,
-Ruehli and Sangiovanni-Vincentelli, *IEEE Transactions on Computer-Aided Design* 1, 1982), so that a motion near it
-needs no rigid-body algorithm. One step of the implicit midpoint rule solves a monotone inclusion for the velocities at
-its middle (Moreau's time stepping: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), by
-semismooth Newton, and a joint that sticks is at rest at its end. A step ends where a command changes, or of a single
-joint averages it, so that the answer is smooth in the delay.
+u̇ and ü no more than the limits of the servo's profile, D a dead zone, c = 1/K, I the drive's own inertia over K, L the
+torque limit over K. Mass matrix M and bias torques h are those of a reference motion q̄ (Newton's method on waveforms:
+Lelarasmee, Ruehli and Sangiovanni-Vincentelli, *IEEE Transactions on Computer-Aided Design* 1, 1982), so that a motion
+near it needs no rigid-body algorithm. One step of the implicit midpoint rule solves a monotone inclusion for the
+velocities at its middle (Moreau's time stepping: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical
+Systems*, 2008), by semismooth Newton, and a joint that sticks is at rest at its end. A step ends where a command
+changes, or of a single joint averages it, so that the answer is smooth in the delay.
 
 A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
 is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
@@ -38,9 +38,9 @@ from thermal_robot.errors import EstimationError
 
 PARAMETERS = tuple(
     "zero gain delay lag inertia droop coulomb load_friction stribeck dead_zone saturation low high derivative "
-    "step hold slew".split()
+    "step hold slew ramp".split()
 )
-"""Numbers of one joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, H, s², and s/rad."""
+"""Numbers of a joint: rad, –, s, s, s², rad/(N·m), rad, –, rad, rad, 1/rad, rad, rad, s, s, H, s², s/rad, s²/rad."""
 CREEP_RATE = 2.0 / (0.95 * 0.02)
 """1/s: at which MuJoCo's friction brakes a joint that it holds, by its usual ``solref`` and ``solimp``."""
 SHORTEST = 1e-7
@@ -64,15 +64,21 @@ FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
 
-def _led(led, command, slowness, h):  # type: ignore[no-untyped-def]
-    """Rate limiter: mean of the set point in a step h, and where it ends, led to a command at 1/``slowness`` rad/s."""
-    if slowness <= 0.0:
-        return command, command
-    most, move = h / slowness, command - led
-    if abs(move) <= most:
-        return command - 0.5 * move * abs(move) / most, command
-    most = math.copysign(most, move)
-    return led + 0.5 * most, led + most
+def _led(led, rate, command, slowness, ramp, h):  # type: ignore[no-untyped-def]
+    """Trapezoidal velocity profile: mean of the set point in a step h, where it ends, and its velocity there.
+
+    ``led`` to a command at 1/``slowness`` rad/s and 1/``ramp`` rad/s² at most, as fast as lets it stop there. A step in
+    which it moves for a part only has its mean nearer to the end.
+    """
+    if slowness <= 0.0 and ramp <= 0.0:
+        return command, command, 0.0
+    far, way = abs(command - led), math.copysign(1.0, command - led)
+    then = 2.0 * far / (h + math.sqrt(h * h + 2.0 * far * ramp))
+    then = way / slowness if then * slowness > 1.0 else way * then
+    if abs(then - rate) * ramp > h:
+        then = rate + math.copysign(h / ramp, then - rate)
+    part = min((far * slowness + math.sqrt(2.0 * far * ramp)) / h, 1.0)
+    return led + h * then * (1.0 - 0.5 * part), led + h * then, then
 
 
 def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # type: ignore[no-untyped-def]
@@ -153,14 +159,14 @@ def _alone(  # type: ignore[no-untyped-def]
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
         coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:14]
-        slowness = numbers[s, 16]
+        slowness, ramp = numbers[s, 16], numbers[s, 17]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
             q, v, t = start[m], 0.0, first[m] - delay
             k, last = command_begins[m], command_begins[m + 1] - 1
             while k < last and times[k + 1] <= t:
                 k += 1
-            before, led = integral[k] + commands[k] * (t - times[k]), q
+            before, led, rate = integral[k] + commands[k] * (t - times[k]), q, 0.0
             out[s, begins[m]] = q
             for n in range(begins[m] + 1, begins[m + 1]):
                 force = loads[0, n] + weights[s, 0] * loads[1, n] + weights[s, 1] * loads[2, n]
@@ -173,7 +179,7 @@ def _alone(  # type: ignore[no-untyped-def]
                     while k < last and times[k + 1] <= t:
                         k += 1
                     late = integral[k] + commands[k] * (t - times[k])
-                    u, led = _led(led, (late - before) / h, slowness, h)  # type: ignore[no-untyped-call]
+                    u, led, rate = _led(led, rate, (late - before) / h, slowness, ramp, h)  # type: ignore[no-untyped-call]
                     u, before = (1.0 + gain) * u + zero, late
                     load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
@@ -286,7 +292,7 @@ def _above(  # type: ignore[no-untyped-def]
 
 
 def _lead(  # type: ignore[no-untyped-def]
-    s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, u
+    s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, rate, u
 ):
     """Lead the set points ``u`` (J,) of set s over the next time step, and return its length, s."""
     h = rest
@@ -294,7 +300,7 @@ def _lead(  # type: ignore[no-untyped-def]
         last = command_begins[j, m + 1] - 1
         while k[s, j] < last and times[k[s, j] + 1] <= t[s, j] + SHORTEST:
             k[s, j] += 1
-        if numbers[s, j, 16] <= 0.0:
+        if numbers[s, j, 16] <= 0.0 and numbers[s, j, 17] <= 0.0:
             led[s, j] = commands[k[s, j]]
         point = (1.0 + numbers[s, j, 1]) * led[s, j] + numbers[s, j, 0]
         if k[s, j] < last:
@@ -303,7 +309,9 @@ def _lead(  # type: ignore[no-untyped-def]
             h = min(h, step / FINER)
     for j in range(len(u)):
         t[s, j] += h
-        mean, led[s, j] = _led(led[s, j], commands[k[s, j]], numbers[s, j, 16], h)  # type: ignore[no-untyped-call]
+        mean, led[s, j], rate[s, j] = _led(  # type: ignore[no-untyped-call]
+            led[s, j], rate[s, j], commands[k[s, j]], numbers[s, j, 16], numbers[s, j, 17], h
+        )
         u[j] = (1.0 + numbers[s, j, 1]) * mean + numbers[s, j, 0]
     return h
 
@@ -314,7 +322,8 @@ def _together(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Integrate all motions of several joints; a step ends where a command changes."""
     sets, joints = shape = numbers.shape[:2]
-    q, v, w, t, led = np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    q, v, w = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    t, led, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     k = np.zeros(shape, dtype=np.int64)
     u, heavy, drag, bend = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints)
     base, left, sides, stops = np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints, dtype=np.bool_)
@@ -325,7 +334,7 @@ def _together(  # type: ignore[no-untyped-def]
             force[s] = 0.0
             for j in range(joints):
                 q[s, j], v[s, j], w[s, j], k[s, j] = start[m, j], 0.0, 0.0, command_begins[j, m]
-                led[s, j] = q[s, j]
+                led[s, j], rate[s, j] = q[s, j], 0.0
                 t[s, j] = first[m] - numbers[s, j, 2] + 0.5 * numbers[s, j, 14]
                 out[s, begins[m], j] = q[s, j]
         for n in range(begins[m] + 1, begins[m + 1]):
@@ -333,7 +342,7 @@ def _together(  # type: ignore[no-untyped-def]
                 rest = step
                 while rest > SHORTEST:
                     h = _lead(  # type: ignore[no-untyped-call]
-                        s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, u
+                        s, m, numbers, limits, times, commands, command_begins, q, v, rest, step, t, k, led, rate, u
                     )
                     rest -= h
                     _couple(  # type: ignore[no-untyped-call]
@@ -375,7 +384,7 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 17) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
     middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, and of
     contact, of several joints the gradient of the tool's height; of the first two mass matrices, derivatives by

@@ -35,6 +35,7 @@ _CANNOT = {
     "dead_zone": "no joint and no actuator has a dead zone",
     "load_friction": "its friction does not grow with load",
     "stribeck": "its friction does not fall with speed",
+    "acceleration_limit": "no joint and no actuator limits the acceleration of its set point",
     "contact": "it is the surroundings' and not the robot's",
     "offset": "it is the torque channel's and not the robot's",
     "torque_constant": "it is the torque channel's and not the robot's",

@@ -160,7 +160,10 @@ _TELLS: tuple[tuple[frozenset[str], str], ...] = (
         frozenset({"droop", "payload", "kp", "zero", "gain", "masses"}),
         "the torque of the joints, as columns tau.<joint>",
     ),
-    (frozenset({"speed_limit", "lag"}), "steps of several sizes: a lag takes the same time for each"),
+    (
+        frozenset({"speed_limit", "acceleration_limit", "lag"}),
+        "steps of several sizes: a lag takes the same time for each",
+    ),
     (frozenset({"torque_limit", "kp", "lag"}), "volts and current, as columns volts and current.<joint>"),
 )
 """What to record next to tell effects apart: the first line that holds two of a group."""
@@ -211,6 +214,7 @@ MEANS = {
     "dead_zone": "An error within which the servo does nothing, or play in the gear.",
     "torque_limit": "The servo gives no more torque: beyond it the joint falls behind. forcerange in an MJCF.",
     "speed_limit": "The servo leads its set point to the command no faster than this: its profile's speed, or a ramp.",
+    "acceleration_limit": "The servo leads its set point with no more acceleration than this: its profile's.",
     "low_stop": "The joint runs against something at the lower end of its range.",
     "high_stop": "The joint runs against something at the upper end of its range.",
     "payload": "A mass at the tool that the model does not have, or has too much.",

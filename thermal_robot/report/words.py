@@ -433,9 +433,11 @@ def turned(diagnosis: Diagnosis) -> list[str]:
 
 
 def verdict(diagnosis: Diagnosis | MotionDiagnosis, names: str) -> str:
-    """Explanation and its posterior probability in words."""
-    said = f"{names or 'no effect'}; probability of exactly this explanation {units.probability(diagnosis.probability)}"
-    return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
+    """Explanation and its posterior probability in words; nothing has one where a remainder stays unexplained."""
+    left = diagnosis.unexplained.flagged
+    sure = f"; probability of exactly this explanation {units.probability(diagnosis.probability)}"
+    said = f"{names or 'no effect'}{sure if names or not left else ''}"
+    return said + ("; a remainder stays unexplained" if left else "")
 
 
 def noise(diagnosis: Diagnosis, floor: str = "") -> str:
