@@ -30,9 +30,9 @@ def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset
     compiler: Any = numba.njit
     fastmath = loosened if isinstance(loosened, bool) else set(loosened)
     try:
-        return compiler(cache=True, nogil=True, fastmath=fastmath)(function)
+        return compiler(cache=True, nogil=True, fastmath=fastmath, error_model="numpy")(function)
     except RuntimeError:  # numba finds no folder for its cache
-        return compiler(nogil=True, fastmath=fastmath)(function)
+        return compiler(nogil=True, fastmath=fastmath, error_model="numpy")(function)
 
 
 @cache

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from threading import current_thread
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 T = TypeVar("T")
+_POOL = "joints"
+"""Name of the threads of a model's pool, in which it asks for no more of them."""
 SHARED = -1
 """Joint of a parameter that all joints share."""
 
@@ -80,7 +83,7 @@ class JointModel(ABC):
     @cached_property
     def _pool(self) -> ThreadPoolExecutor:
         """Pool of threads, the same in all calls: each new thread would take memory of its own and keep it."""
-        return ThreadPoolExecutor(threads())
+        return ThreadPoolExecutor(threads(), _POOL)
 
     @cached_property
     def sizes(self) -> Array:
@@ -213,8 +216,9 @@ class JointModel(ABC):
         return found
 
     def each(self, function: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
-        """Apply a function to every item in parallel threads, to a single one at once; return the results in order."""
-        return [function(items[0])] if len(items) == 1 else list(self._pool.map(function, items))
+        """Apply a function to every item in parallel threads, within one of these in turn; return results in order."""
+        alone = len(items) == 1 or current_thread().name.startswith(_POOL)
+        return [*map(function, items)] if alone else list(self._pool.map(function, items))
 
     def by_joint(
         self, function: Callable[[Sequence[int]], list[T]], groups: Sequence[Sequence[int]] | None = None
@@ -453,8 +457,7 @@ class ServoModel(JointModel):
 
     def residuals(self, group: Sequence[int], values: Array) -> list[Array]:
         """Residual (S, N) of each joint of a group, rad, measured minus simulated positions at the encoder's stamps."""
-        size = settings.TOGETHER if len(self.groups) == 1 else len(values)
-        parts = [slice(k, k + size) for k in range(0, len(values), size)]
+        parts = [slice(k, k + settings.TOGETHER) for k in range(0, len(values), settings.TOGETHER)]
         found = [np.empty((len(values), len(self._samples[joint][0]))) for joint in group]
 
         def simulated(part: slice) -> None:

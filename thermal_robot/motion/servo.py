@@ -81,6 +81,12 @@ def _led(led, rate, command, slowness, ramp, h):  # type: ignore[no-untyped-def]
     return led + h * then * (1.0 - 0.5 * part), led + h * then, then
 
 
+def _breakaway(stribeck, v):  # type: ignore[no-untyped-def]
+    """Stribeck friction at a velocity; an exponential is slow, and its tail below a rounding error is nothing."""
+    square = (v / STRIBECK_VELOCITY) ** 2
+    return stribeck * math.exp(-square) if stribeck != 0.0 and square < 36.0 else 0.0
+
+
 def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # type: ignore[no-untyped-def]
     """Root of a servo's monotone equation of motion in the velocity, and its slope: unclipped, or else at the limit."""
     slope = damping + derivative * (1.0 + early)
@@ -147,25 +153,39 @@ def _solve(matrix, right):  # type: ignore[no-untyped-def]
         right[k] /= matrix[k, k]
 
 
+def _latest(times, k, last, t):  # type: ignore[no-untyped-def]
+    """Index from k to ``last`` of the latest stamp at an instant t."""
+    while k < last and times[k + 1] <= t:
+        k += 1
+    return k
+
+
+def _held(times, commands, command_begins):  # type: ignore[no-untyped-def]
+    """Integral of a command that is held (M,) up to each stamp, rad s, and the instants at which it changes then, s."""
+    integral, until = np.zeros(len(times)), np.full(len(times), np.inf)
+    for k in range(1, len(times)):
+        integral[k] = integral[k - 1] + commands[k - 1] * (times[k] - times[k - 1])
+    for m in range(len(command_begins) - 1):
+        for k in range(command_begins[m + 1] - 2, command_begins[m] - 1, -1):
+            until[k] = until[k + 1] if commands[k + 1] == commands[k] else times[k + 1]
+    return integral, until
+
+
 def _alone(  # type: ignore[no-untyped-def]
     numbers, weights, begins, first, step, substeps, times, commands, command_begins, loads, masses, slopes, about,
     start, out,
 ):  # fmt: skip
     """Integrate all motions of a single joint; a command is averaged over a step, in which it may change."""
     h, half = step / substeps, 0.5 * step / substeps
-    integral = np.zeros(len(times))
-    for k in range(1, len(times)):
-        integral[k] = integral[k - 1] + commands[k - 1] * (times[k] - times[k - 1])
+    integral, until = _held(times, commands, command_begins)  # type: ignore[no-untyped-call]
     for s in range(numbers.shape[0]):
         zero, gain, delay, lag, inertia, droop = numbers[s, :6]
         coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:14]
-        slowness, ramp = numbers[s, 16], numbers[s, 17]
         limit = 1.0 / saturation if saturation > 0.0 else 1e9
         for m in range(len(begins) - 1):
             q, v, t = start[m], 0.0, first[m] - delay
             k, last = command_begins[m], command_begins[m + 1] - 1
-            while k < last and times[k + 1] <= t:
-                k += 1
+            k = _latest(times, k, last, t)  # type: ignore[no-untyped-call]
             before, led, rate = integral[k] + commands[k] * (t - times[k]), q, 0.0
             out[s, begins[m]] = q
             for n in range(begins[m] + 1, begins[m + 1]):
@@ -176,20 +196,24 @@ def _alone(  # type: ignore[no-untyped-def]
                 drag = max(lag, half - derivative) if heavy < half else lag
                 for _ in range(substeps):
                     t += h
-                    while k < last and times[k + 1] <= t:
-                        k += 1
+                    k = _latest(times, k, last, t)  # type: ignore[no-untyped-call]
                     late = integral[k] + commands[k] * (t - times[k])
-                    u, led, rate = _led(led, rate, (late - before) / h, slowness, ramp, h)  # type: ignore[no-untyped-call]
+                    u, led, rate = _led(led, rate, (late - before) / h, numbers[s, 16], numbers[s, 17], h)  # type: ignore[no-untyped-call]
                     u, before = (1.0 + gain) * u + zero, late
                     load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
-                    most = coulomb + load_friction * abs(load) + stribeck * math.exp(-((v / STRIBECK_VELOCITY) ** 2))
+                    most = coulomb + load_friction * abs(load) + _breakaway(stribeck, v)  # type: ignore[no-untyped-call]
                     middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
                         q, v, u, load, most, 0.0, 0.0, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
                     )
                     then = q + h * middle
                     if then < low or then > high:
                         then, middle = max(min(then, high), low), 0.0
+                    still = v == 0.0 and middle == 0.0 and abs(led - commands[k]) < EXACT
                     v, q = 2.0 * middle - v if middle != 0.0 else 0.0, then
+                    end = first[m] - delay + step * (n - begins[m])
+                    if still and until[k] >= end:  # nothing changes until then
+                        before, t = late + commands[k] * (end - t), end
+                        break
                 out[s, n] = q
 
 
@@ -229,8 +253,7 @@ def _velocities(s, numbers, limits, q, v, u, base, joined, heavy, drag, bend, h,
             for i in range(joints):
                 load += joined[j, i] * w[s, i]
             most = numbers[s, j, 6] + numbers[s, j, 7] * abs(load)
-            if numbers[s, j, 8] != 0.0:
-                most += numbers[s, j, 8] * math.exp(-((v[s, j] / STRIBECK_VELOCITY) ** 2))
+            most += _breakaway(numbers[s, j, 8], v[s, j])  # type: ignore[no-untyped-call]
             more = numbers[s, j, 7] if load > 0.0 else -numbers[s, j, 7]
             middle, slope, sides[j] = _middle(  # type: ignore[no-untyped-call]
                 q[s, j], v[s, j], u[j], load, most, more, sides[j], heavy[j], drag[j], numbers[s, j, 13],
@@ -298,8 +321,7 @@ def _lead(  # type: ignore[no-untyped-def]
     h = rest
     for j in range(len(u)):
         last = command_begins[j, m + 1] - 1
-        while k[s, j] < last and times[k[s, j] + 1] <= t[s, j] + SHORTEST:
-            k[s, j] += 1
+        k[s, j] = _latest(times, k[s, j], last, t[s, j] + SHORTEST)  # type: ignore[no-untyped-call]
         if numbers[s, j, 16] <= 0.0 and numbers[s, j, 17] <= 0.0:
             led[s, j] = commands[k[s, j]]
         point = (1.0 + numbers[s, j, 1]) * led[s, j] + numbers[s, j, 0]
@@ -367,12 +389,13 @@ def _kernels() -> tuple[Any, Any]:
 
     Raises :class:`EstimationError` without numba.
     """
-    global _led, _sliding, _middle, _solve, _lead, _couple, _velocities, _height, _above
+    global _latest, _led, _breakaway, _held, _sliding, _middle, _solve, _lead, _couple, _velocities, _height, _above
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
         if not hasattr(_middle, "py_func"):
-            _led, _sliding, _middle, _solve = (compiled(one) for one in (_led, _sliding, _middle, _solve))
+            _led, _breakaway, _sliding = (compiled(one) for one in (_led, _breakaway, _sliding))
+            _middle, _solve, _held, _latest = (compiled(one) for one in (_middle, _solve, _held, _latest))
             _lead, _couple, _velocities = (compiled(one) for one in (_lead, _couple, _velocities))
             _height, _above = compiled(_height), compiled(_above)
     return compiled(_alone), compiled(_together)
