@@ -133,6 +133,21 @@ def test_friction_that_is_written_sticks_as_the_servo_models_does():
     assert soft.simulated[JOINT] > 5.0 * did.simulated[JOINT]
 
 
+@pytest.mark.slow
+def test_friction_that_creeps_in_the_log_creeps_in_the_model_that_is_written():
+    """MuJoCo's friction holds nine tenths by default; in a tenth too much the joint is elsewhere."""
+    world = replace(strong(a_world(rows=300, motions=5)), sticks=False)
+    log = world.log(world.simulated(Fault("coulomb", JOINT, 0.15)))
+    own = {("coulomb", log.joints[JOINT]): 0.15 / stiffness(log)}
+    sticking, creeping, soft = (
+        rollout(found, motion_mjcf(found, world.mjcf()).text, log)
+        for found in (found_of(log, own | more) for more in ({}, {("creep", ""): 0.1}, {("creep", ""): 0.2}))
+    )
+    assert creeping.agrees
+    assert creeping.simulated[JOINT] < 1e-5
+    assert min(sticking.simulated[JOINT], soft.simulated[JOINT]) > 10.0 * creeping.simulated[JOINT]
+
+
 def test_an_end_stop_becomes_a_range():
     world = a_world()
     sound = world.simulated(Fault(NOTHING)).position[:, JOINT]

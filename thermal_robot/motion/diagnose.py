@@ -150,8 +150,7 @@ def _answer(choice: Choice, progress: Callable[[str], None], said: Unexplained |
     verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
     alike = [w for one, w in choice.weights if not (one.effects ^ choice.own.effects) & set(ALL)]
     probability = total_probability(alike)
-    own = [p for p in np.flatnonzero(choice.active) if model.parameters[p].effect in ALL]
-    values = {model.keys[p]: float(point.values[p]) for p in own}
+    values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
     curves = model.curves(point.values)
     return MotionDiagnosis(
         log, joints, held_out, findings, verdict, probability, unexplained, values, curves,

@@ -63,7 +63,7 @@ class MotionDiagnosis(RenderedPage):
         Sentences about the log's own faults.
     values
         By effect and joint the value that was fitted, SI; of all joints by ``""`` or, of the links' masses, by the name
-        that the parameter has in the finding.
+        that the parameter has in the finding; of a simulator that made the log also its step and its friction's creep.
     curves
         By joint: time, command, measured and simulated position, before and after, load and number of the motion.
     shares

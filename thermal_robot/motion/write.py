@@ -156,7 +156,7 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
             raise CampaignError(name, f"has no joint {cause.name!r}", found=", ".join(joints) or "no joint")
         _into_joint(joints[cause.name], cause, written)
         if cause.torque("coulomb") is not None:
-            stick(spec, joints[cause.name])
+            stick(spec, joints[cause.name], found.values.get(("creep", ""), 0.0))
         _into_servo(spec, servos.get(cause.name), cause, written)
         needed = "coulomb", "armature", "lag", "torque_limit", "zero", "gain", "delay"
         _tell_kept(cause, written, _CANNOT | _OF_THE_URDF, *needed)
@@ -166,8 +166,11 @@ def motion_mjcf(found: MotionDiagnosis, mjcf: str | Path) -> Written:
     return written
 
 
-def stick(spec: Any, joint: Any) -> None:
-    """Stiffen the friction of a ``mujoco.MjsJoint`` so that it holds at rest, where MuJoCo's default creeps."""
+def stick(spec: Any, joint: Any, creep: float = 0.0) -> None:
+    """Stiffen the friction of a ``mujoco.MjsJoint`` so that it holds at rest, or gives way by the share ``creep``."""
+    if creep > 0.0:
+        joint.solimp_friction[0] = 1.0 - creep
+        return
     joint.solref_friction = [settings.STIFFEST * float(spec.option.timestep), 1.0]
     joint.solimp_friction = list(settings.STICKING)
 
