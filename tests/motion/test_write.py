@@ -111,6 +111,21 @@ def test_a_servo_that_was_written_is_read_again_and_leaves_nothing_to_find(name,
     assert servo.gain == (before.gain and pytest.approx(before.gain, rel=1e-3))
 
 
+def test_where_nothing_is_told_nothing_is_drawn_or_written():
+    """A zero stands for the mean of what a soft servo droops: most of the gap stays, and that is no answer."""
+    world = strong(a_world(motions=4))
+    log = world.log(world.simulated(Fault("kp", JOINT, -0.4)))
+    found = diagnose_motion(log, only=("zero",))
+    assert found.verdict == ()
+    assert found.unexplained.flagged
+    assert found.values == {}
+    assert not [one for one in found.effects if one.parameters or one.probability]
+    assert found.held_out.shrinkage == 0.0
+    assert found.rms_after == found.rms_before == pytest.approx(found.unexplained.rms)
+    for curve in found.curves.values():
+        assert (curve["simulated"] == curve["nominal"]).all()
+
+
 def test_a_delay_of_every_joint_is_held_by_the_actuators():
     world = a_world()
     late = 0.0305  # between two steps, so that rounding of the clock does not choose one

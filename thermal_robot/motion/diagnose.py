@@ -140,7 +140,7 @@ def _answer(choice: Choice, progress: Callable[[str], None], said: Unexplained |
     low, high = np.quantile(others, [0.025, 0.975]).tolist()
     total = np.sqrt(sums[0] / len(before)).tolist()
     held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
-    unexplained = said or _unexplained(choice, 1.0 - float(shrinkage))
+    unexplained = replace(said, rms=rms(list(map(rms, before)))) if said else _unexplained(choice, 1.0 - shrinkage)
     if unexplained.flagged and shrinkage < settings.MOST and choice.active.any():
         # an answer is what is told: of effects that explain less than what stays, nothing
         return _answer(choice.nothing, progress, unexplained)
@@ -233,7 +233,8 @@ def _unexplained(choice: Choice, left: float) -> Unexplained:
     worst = max(above, key=above.__getitem__)
     said = [f"{above[worst]:.2g} times the noise of its readings stays in {model.log.joints[worst]}"]
     if left > 1.0 - settings.MOST:
-        said.insert(0, f"{100.0 * left:.0f} % of the gap stays in motions held out, whatever is fitted")
+        stays = f"{100.0 * left:.0f} %" if left < 1.0 else "all"
+        said.insert(0, f"{stays} of the gap stays in motions held out, whatever is fitted")
     if curves:
         gain, name, joint = curves[0]
         said.append(f"{100.0 * gain:.0f} % of what remains in {model.log.joints[joint]} follows {name}")

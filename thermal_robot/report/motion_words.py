@@ -145,7 +145,8 @@ def sentences(d: MotionDiagnosis) -> Iterator[str]:
         yield "What remains follows neither position, velocity, load nor time in motions held out."
         return
     pattern = " with a pattern that holds in motions held out" if left.depends_on else ""
-    yield f"The effects leave {units.quantity(left.rms, d.unit)} rms{pattern}."
+    stays = "The effects leave" if d.verdict else "No effect is told, and what stays is"
+    yield f"{stays} {units.quantity(left.rms, d.unit)} rms{pattern}."
     yield from (f"{words.capitalised(reason).rstrip('.')}." for reason in left.reasons)
     if left.depends_on[1:]:
         yield f"It follows {words.listed([one.covariate for one in left.depends_on])}."
