@@ -120,7 +120,7 @@ def test_where_nothing_is_told_nothing_is_drawn_or_written():
     assert found.unexplained.flagged
     assert found.values == {}
     assert not [one for one in found.effects if one.parameters or one.probability]
-    assert found.held_out.shrinkage == 0.0
+    assert found.held_out.shrinkage == found.probability == 0.0
     assert found.rms_after == found.rms_before == pytest.approx(found.unexplained.rms)
     for curve in found.curves.values():
         assert (curve["simulated"] == curve["nominal"]).all()

@@ -141,7 +141,7 @@ def _answer(choice: Choice, progress: Callable[[str], None], said: Unexplained |
     total = np.sqrt(sums[0] / len(before)).tolist()
     held_out = HeldOut("motion", settings.FOLDS, total[0], total[1], float(shrinkage), (low, high))
     unexplained = replace(said, rms=rms(list(map(rms, before)))) if said else _unexplained(choice, 1.0 - shrinkage)
-    if unexplained.flagged and shrinkage < settings.MOST and choice.active.any():
+    if unexplained.flagged and shrinkage < settings.MOST and choice.own.effects & set(ALL):
         # an answer is what is told: of effects that explain less than what stays, nothing
         return _answer(choice.nothing, progress, unexplained)
     findings, shares = _findings(choice, before, weights)
@@ -149,7 +149,7 @@ def _answer(choice: Choice, progress: Callable[[str], None], said: Unexplained |
         findings = tuple(replace(one, probability=None) for one in findings)
     verdict = tuple(one.name for one in findings if one.status in ("found", "confounded"))
     alike = [w for one, w in choice.weights if not (one.effects ^ choice.own.effects) & set(ALL)]
-    probability = total_probability(alike)
+    probability = 0.0 if said else total_probability(alike)
     values = {model.keys[p]: float(point.values[p]) for p in np.flatnonzero(choice.active)}
     curves = model.curves(point.values)
     return MotionDiagnosis(
