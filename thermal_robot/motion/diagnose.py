@@ -238,7 +238,7 @@ def _unexplained(choice: Choice, left: float) -> Unexplained:
     if curves:
         gain, name, joint = curves[0]
         said.append(f"{100.0 * gain:.0f} % of what remains in {model.log.joints[joint]} follows {name}")
-    largest = {j: gain for gain, _, j in reversed(curves)} or dict.fromkeys((worst,), 0.0)
+    largest = {j: gain for gain, _, j in reversed(curves)} or {worst: 0.0}
     first = sorted(largest.items(), key=lambda one: -one[1])[:3]
     places = tuple(Location("joint", model.log.joints[j], gain) for j, gain in first)
     follows = tuple(Dependence(name, 0.0) for name in dict.fromkeys(name for _, name, _ in curves))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -146,22 +146,15 @@ def fit(
     return _fit(model, values, active, motions, groups, known)[0]
 
 
-def fitted(
-    model: JointModel, values: Array, active: Mask, groups: Groups | None = None,
-    hopeless: Callable[[Point, float], bool] = lambda point, gain: False,
-) -> Point:  # fmt: skip
-    """Maximum a posteriori fit of the active parameters, as :func:`fit`, and the model linearised there by these.
-
-    It ends where a point, and the relative gain of the round before, are ``hopeless``.
-    """
-    values, point = _fit(model, values, active, None, groups, None, hopeless)
+def fitted(model: JointModel, values: Array, active: Mask, groups: Groups | None = None) -> Point:
+    """Maximum a posteriori fit of the active parameters, as :func:`fit`, and the model linearised there by these."""
+    values, point = _fit(model, values, active, None, groups, None)
     return point or Point.at(model, values, active, groups)
 
 
 def _fit(
-    model: JointModel, values: Array, active: Mask, motions: Mask | None, groups: Groups | None, known: Mask | None,
-    hopeless: Callable[[Point, float], bool] = lambda point, gain: False,
-) -> tuple[Array, Point | None]:  # fmt: skip
+    model: JointModel, values: Array, active: Mask, motions: Mask | None, groups: Groups | None, known: Mask | None
+) -> tuple[Array, Point | None]:
     """Return the fit's values (P,), and if the last round moved nothing, the model as it was linearised there."""
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
     values, every = np.where(active, values, 0.0), active
@@ -170,7 +163,7 @@ def _fit(
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
     common = active & (joint_of == SHARED) & (not some)
     inside = active & np.isin(joint_of, [j for group in groups for j in group])
-    quiet, alone, gain = 0, len(groups) == 1, np.inf
+    quiet, alone = 0, len(groups) == 1
     for number in range(settings.ROUNDS):
         # joints go their own ways first; what they share moves in every second round
         shared = alone or (bool(common.any()) and number % 2 == 1)
@@ -178,10 +171,7 @@ def _fit(
         own = np.flatnonzero(now)
         if not len(own):
             continue
-        whole = some or bool((now == every).all())
         point = Point.at(model, values, every if some else now, groups)
-        if whole and hopeless(point, gain):
-            return values, point
         matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
         problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, model.least[own]
         # as one where a shared parameter moves, else each group by itself
@@ -192,7 +182,7 @@ def _fit(
         if gain < settings.SETTLED:
             values, more = _shifted(cost, values, now, sets)
             gain += more
-        if gain == 0.0 and whole:
+        if gain == 0.0 and (some or (now == every).all()):
             return values, point
         quiet = quiet + 1 if gain < settings.SETTLED else 0
         if quiet > (common.any() and not alone):

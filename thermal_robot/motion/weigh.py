@@ -7,7 +7,7 @@ independent readings, costs n_j ln σ_j.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,7 +18,6 @@ from scipy.special import ndtr, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
-from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Groups, Point, deflated, fitted, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
@@ -77,7 +76,7 @@ class Scales:
                 if not told.log_evidence - before >= least - told.log_evidence:
                     return None
                 begun, before = there, told.log_evidence
-            found = fitted(self.model, begun, active, groups, self._hopeless(base, groups, least))
+            found = fitted(self.model, begun, active, groups=groups)
             # of long logs residuals would be large
             return replace(found, rows=[one.without_residual() for one in found.rows])
 
@@ -87,17 +86,6 @@ class Scales:
         self.far = {key: one for key, one in self.far.items() if key not in found or found[key] is None}
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
-
-    def _hopeless(self, base: Weighed, groups: Groups, least: float) -> Callable[[Point, float], bool]:
-        """Return whether a fit of some groups that goes on gaining as much in each round ends far below ``least``."""
-        joints = sorted(j for group in groups for j in group)
-        worth, noise = self.worth[joints], np.log(base.point.noise[joints])
-
-        def told(point: Point, gain: float) -> bool:
-            promised = base.log_evidence + 0.5 * settings.ROUNDS * worth.sum() * gain
-            return bool(promised - worth @ (np.log(point.noise) - noise) < least - settings.FAR_BELOW)
-
-        return told
 
     def _best(self, base: Weighed, groups: Groups, values: Sequence[Array]) -> Array:
         """(P,) those of some starting values with which the joints of some groups leave least."""
