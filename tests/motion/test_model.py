@@ -116,7 +116,7 @@ def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it()
     log, _ = driven({("lag", 0): 0.06, ("coulomb", 0): 0.006, ("torque_limit", 0): 20.0}, 6, 6.0, joints=("joint_1",))
     model = ServoModel(log)
     allowed = ~model.of_effects(("dead_zone",))  # at its limit a servo with a dead zone is one with friction
-    found = everything(model, allowed, None, lambda _: None).values
+    found = everything(model, allowed, lambda _: None).values
     assert found[model.index("torque_limit", 0)] == pytest.approx(20.0, rel=0.1)
     assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
 
@@ -134,7 +134,9 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     found = np.linalg.lstsq(white.matrix, white.vector, rcond=1e-13)[0]
     near = 1e-3 * np.abs(gram.vector).max()
     np.testing.assert_allclose(gram.matrix @ found, gram.vector, atol=near)
-    assert [one.effect for one in model.parameters if one.joint == SHARED] == ["payload", "contact"]
+    assert [one.label for one in model.parameters if one.joint == SHARED] == [
+        "mass", "height in the root frame", "friction"
+    ]  # fmt: skip
 
 
 def test_few_motions_are_cut_into_as_many_pieces_for_the_fit_as_for_faults():
@@ -277,7 +279,7 @@ def test_what_is_asked_of_a_choice_changes_no_probability():
     model = ServoModel(short("coulomb", size=0.05))
     names = np.array([one.effect for one in model.parameters])
     allowed = names != "dead_zone"
-    choice = settled(searched(model, allowed, print), allowed, print)
+    choice = settled(searched(everything(model, allowed, print), allowed, print), allowed, print)
     told = [choice.probability(p) for p in range(len(names))]
     own = np.flatnonzero(choice.active).tolist()
     rivals = {names[k] for p in own for k in choice.alternatives(p)}

@@ -22,7 +22,7 @@ from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
-from thermal_robot.motion.select import Choice, searched, settled
+from thermal_robot.motion.select import Choice, everything, searched, settled
 from thermal_robot.motion.torque import TorqueModel
 
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
@@ -69,14 +69,14 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = model.of_effects((*kept, *SIMULATOR))
-    found = searched(model, allowed, progress)
-    refused = _gate(found.point)
+    point = everything(model, allowed, progress)
+    refused = _gate(point)
     if refused:
         progress("without the motions that nothing explains")
-        motions, values = tuple(m for m in log.motions if (m.kind or m.name) not in refused), found.point.values
-        del model, found  # of a long log each is large
-        found = searched(kind(replace(log, motions=motions)), allowed, progress, values)
-    choice = settled(found, allowed, progress)
+        motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
+        del model, point  # of a long log each is large; what was fitted to such motions is no place to start from
+        point = everything(kind(replace(log, motions=motions)), allowed, progress)
+    choice = settled(searched(point, allowed, progress), allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
@@ -188,7 +188,7 @@ def _finding(choice: Choice, name: str, share: Mapping[int, Array], deviations: 
     places, estimates = dict[str, float](), []
     for p, one, joint in ((p, model.parameters[p], model.joint_of(model.parameters[p])) for p in active):
         called = f"{one.label}, {joint}" if joint else one.label
-        value = float(choice.point.values[p]) + (model.lowest if name == "contact" else 0.0)
+        value = float(choice.point.values[p]) + (model.lowest if one.number == "contact" else 0.0)
         estimates.append(Estimate(called, value, float(deviations[p]), one.unit, True))
         if joint:
             places[joint] = places.get(joint, 0.0) + float(share[p].sum())

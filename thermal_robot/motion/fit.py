@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,10 +92,9 @@ class Point:
 
         With ``groups`` it has the rows of these joints alone.
         """
-        count = model.clusters
 
         def parts(group: Sequence[int]) -> list[Part]:
-            return [Part.of(one, values, count) for one in model.rows(group, values, wanted)]
+            return [Part.of(one, values, model.clusters) for one in model.rows(group, values, wanted)]
 
         return cls(model, values, model.by_joint(parts, groups))
 
@@ -104,6 +103,10 @@ class Point:
         joints = sorted(j for group in groups for j in group)
         own = dict(enumerate(self.rows)) | dict(zip(joints, other.rows, strict=True))
         return replace(self, rows=[own[j] for j in range(len(self.rows))])
+
+    def without_residuals(self) -> Point:
+        """Return the sums alone: of long logs residuals would be large."""
+        return replace(self, rows=[one.without_residual() for one in self.rows])
 
     @property
     def noise(self) -> Array:
@@ -155,81 +158,109 @@ def fitted(model: JointModel, values: Array, active: Mask, groups: Groups | None
 def _fit(
     model: JointModel, values: Array, active: Mask, motions: Mask | None, groups: Groups | None, known: Mask | None
 ) -> tuple[Array, Point | None]:
-    """Return the fit's values (P,), and if the last round moved nothing, the model as it was linearised there."""
+    """Return the fit's values (P,), and if it ended where the model was linearised by all that is active, that."""
     some, groups = groups is not None and len(groups) < len(model.groups), groups or model.groups
-    values, every = np.where(active, values, 0.0), active
-    joint_of = model.placed
-    active = active if known is None else active & ~known
+    values, placed, alone = np.where(active, values, 0.0), model.placed, len(groups) == 1
+    moving = active if known is None else active & ~known
     motions = np.ones(model.clusters, dtype=bool) if motions is None else motions
-    common = active & (joint_of == SHARED) & (not some)
-    inside = active & np.isin(joint_of, [j for group in groups for j in group])
-    quiet, alone = 0, len(groups) == 1
-    for number in range(settings.ROUNDS):
-        # joints go their own ways first; what they share moves in every second round
-        shared = alone or (bool(common.any()) and number % 2 == 1)
-        now = inside | common if shared else inside
-        own = np.flatnonzero(now)
-        if not len(own):
-            continue
-        point = Point.at(model, values, every if some else now, groups)
-        matrix, vector = (one[:, motions].sum(axis=(0, 1)) for one in point.products[:2])
-        problem = matrix[np.ix_(own, own)], vector[own], model.sizes[own] ** -2.0, model.least[own]
-        # as one where a shared parameter moves, else each group by itself
-        sets = [np.ones(len(joint_of), dtype=bool)] if shared else [np.isin(joint_of, group) for group in groups]
-        parts = np.ones((1, len(groups))) if shared else np.eye(len(groups))
-        cost = _Cost(model, groups, point, motions, parts)
-        values, gain = _line_search(cost, problem, own, sets)
-        if gain < settings.SETTLED:
-            values, more = _shifted(cost, values, now, sets)
-            gain += more
-        if gain == 0.0 and (some or (now == every).all()):
-            return values, point
-        quiet = quiet + 1 if gain < settings.SETTLED else 0
-        if quiet > (common.any() and not alone):
-            break
+    common = moving & (placed == SHARED) & (not some)
+    inside = common | (moving & np.isin(placed, [j for group in groups for j in group]))
+
+    def descended(group: Sequence[int]) -> tuple[Array, Point | None]:
+        own = moving & np.isin(placed, group) | common & alone
+        return _Descent(model, [group], own, active if some else own, motions).run(values, settings.ROUNDS)
+
+    for _ in range(settings.ROUNDS):  # joints go their own ways, then move with what they share
+        each = model.each(descended, groups)
+        values = np.where(common & alone, each[0][0], values)
+        for group, (there, _) in zip(groups, each, strict=True):
+            values = np.where(np.isin(placed, group), there, values)
+        if alone or not common.any():
+            points = [point for _, point in each if point is not None and (some or (moving == active).all())]
+            return values, _joined(values, groups, points) if len(points) == len(groups) else None
+        values, point = _Descent(model, groups, inside, inside, motions).run(values, 1)
+        if point is not None:
+            return values, point if (inside == active).all() else None
     return values, None
 
 
-def _line_search(cost: _Cost, problem: Problem, own: NDArray[np.int64], sets: list[Mask]) -> tuple[Array, float]:
-    """Take for each set of parameters the step of least damping that betters its cost; return also the relative gain.
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """Gauss-Newton descent of −2 log posterior by the parameters ``own`` (P,), of some groups' joints and motions.
 
-    Nothing moves where the undamped step promises less than SETTLED of the cost.
+    The model is linearised by all that are ``wanted`` (P,).
     """
-    here = cost.point.values
-    least = before = cost.of(here)
-    found, better = here.copy(), np.zeros(len(sets), dtype=bool)
-    for damping in settings.DAMPINGS:
-        then = here.copy()
-        then[own], promised = _ahead(problem, here[own], damping)
-        if damping == 0.0 and promised < settings.SETTLED * before.sum():
-            break
-        costs = cost.of(then)
-        for k in np.flatnonzero(~better & (costs < least)).tolist():
-            found[sets[k]], better[k] = then[sets[k]], True
-        least = np.where(better, np.minimum(least, costs), least)
-        if better.all():
-            break
-    return found, float((before - least).sum() / max(before.sum(), 1e-300))
+
+    model: JointModel
+    groups: Groups
+    own: Mask
+    wanted: Mask
+    motions: Mask
+
+    def run(self, values: Array, rounds: int) -> tuple[Array, Point | None]:
+        """Return the values (P,) where it ends, and the model linearised there unless ``rounds`` were too few."""
+        for _ in range(rounds):
+            point = Point.at(self.model, values, self.wanted, self.groups)
+            then = self._stepped(point)
+            then = self._shifted(point) if then is None else then
+            if then is None:
+                return values, point
+            values = then
+        return values, None
+
+    def _left(self, values: Array) -> list[Array]:
+        at = values[None]
+        return self.model.by_joint(lambda group: [one[0] for one in self.model.residuals(group, at)], self.groups)
+
+    def _cost(self, point: Point, values: Array, left: Sequence[Array]) -> float:
+        """Squares of what is ``left`` over the noise at a point, of the motions, and the prior's squares."""
+        used = (
+            x if self.motions.all() else x[self.motions[row.motion]] for x, row in zip(left, point.rows, strict=True)
+        )
+        found = sum(float(x @ x) / row.noise**2 for x, row in zip(used, point.rows, strict=True))
+        return found + float(np.sum((values / self.model.sizes)[self.own] ** 2))
+
+    def _better(self, point: Point, tried: Iterable[Array]) -> Array | None:
+        """Return the first of some values (P,) that lowers the cost at a point by SETTLED, if any."""
+        least = (1.0 - settings.SETTLED) * self._cost(point, point.values, [one.residual for one in point.rows])
+        return next((then for then in tried if self._cost(point, then, self._left(then)) < least), None)
+
+    def _stepped(self, point: Point) -> Array | None:
+        """Take the step of least damping that betters the cost; none where the undamped one promises too little."""
+        own, here, sizes = np.flatnonzero(self.own), point.values, self.model.sizes
+        if not len(own):
+            return None
+        matrix, vector = (one[:, self.motions].sum(axis=(0, 1)) for one in point.products[:2])
+        problem = matrix[np.ix_(own, own)], vector[own], sizes[own] ** -2.0, self.model.least[own]
+        steps = (_ahead(problem, here[own], damping) for damping in settings.DAMPINGS)
+        first, promised = next(steps)
+        if promised < settings.SETTLED * self._cost(point, here, [one.residual for one in point.rows]):
+            return None
+        return self._better(point, (_with(here, own, then) for then in chain([first], (then for then, _ in steps))))
+
+    def _shifted(self, point: Point) -> Array | None:
+        """Pattern search along the valley of delay and lag, where kinks stop Newton's steps.
+
+        Delays go earlier and later by SHIFTS of their expected size, lags the other way or not at all.
+        """
+        delay, lag = (self.own & self.model.of_effects((name,)) for name in ("delay", "lag"))
+        if not delay.any():
+            return None
+        size, least = self.model.sizes[delay].mean(), np.where(self.own, self.model.least, -np.inf)
+        ways = [share * size * (delay - with_lag * lag) for share in settings.SHIFTS for with_lag in (1.0, 0.0)]
+        return self._better(point, (np.maximum(point.values + way, least) for way in ways))
 
 
-def _shifted(cost: _Cost, here: Array, now: Mask, sets: list[Mask]) -> tuple[Array, float]:
-    """Pattern search along the valley of delay and lag, where kinks stop Newton's steps; return the relative gain too.
+def _joined(values: Array, groups: Groups, points: Sequence[Point]) -> Point:
+    """Join the rows of groups of joints, each linearised by itself, in the joints' order."""
+    rows = {j: row for group, at in zip(groups, points, strict=True) for j, row in zip(group, at.rows, strict=True)}
+    return Point(points[0].model, values, [rows[j] for j in sorted(rows)])
 
-    Delays go earlier and later by SHIFTS of their expected size, lags the other way, where that betters a set's cost.
-    """
-    delay, lag = (now & cost.model.of_effects((name,)) for name in ("delay", "lag"))
-    if not delay.any():
-        return here, 0.0
-    found, least = here, cost.of(here)
-    before = least.sum()
-    for share in settings.SHIFTS:
-        own = share * cost.model.sizes[delay].mean() * (delay.astype(float) - lag)
-        then = np.maximum(here + own, np.where(now, cost.model.least, here))
-        costs = cost.of(then)
-        for k in np.flatnonzero(costs < least).tolist():
-            found = np.where(sets[k], then, found)
-        least = np.minimum(costs, least)
-    return found, float((before - least.sum()) / before)
+
+def _with(values: Array, own: NDArray[np.int64], some: Array) -> Array:
+    found = values.copy()
+    found[own] = some
+    return found
 
 
 def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:
@@ -246,41 +277,6 @@ def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]
     found = np.asarray(lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x)
     cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
     return found, float(cost[0] - cost[1])
-
-
-@dataclass(frozen=True, eq=False)
-class _Cost:
-    """−2 log posterior by group of joints: squares over the noise at a point, of some motions, and the prior's squares.
-
-    A parameter's prior counts in its joint's group, that of a shared parameter in the last one. ``parts`` (K, G) of the
-    groups are added.
-    """
-
-    model: JointModel
-    groups: Groups
-    point: Point
-    motions: Mask
-    parts: Array
-
-    def of(self, values: Array) -> Array:
-        """(K,) costs at values (P,)."""
-        order = sorted(j for group in self.groups for j in group)
-        noise, model = dict(zip(order, self.point.noise, strict=True)), self.model
-
-        def of_group(group: Sequence[int]) -> float:
-            if values is self.point.values:
-                left = [self.point.rows[order.index(j)].residual for j in group]
-            else:
-                left = [one[0] for one in model.residuals(group, values[None])]
-            used = (one[self.motions[model.motion_of(j)]] for j, one in zip(group, left, strict=True))
-            return float(sum((one**2).sum() / noise[j] ** 2 for j, one in zip(group, used, strict=True)))
-
-        found = np.array(model.each(of_group, self.groups))
-        place = {j: k for k, group in enumerate(self.groups) for j in group} | {SHARED: len(found) - 1}
-        for value, one in zip(values, model.parameters, strict=True):
-            if one.joint in place:
-                found[place[one.joint]] += (value / one.size) ** 2
-        return np.asarray(self.parts @ found)
 
 
 def ratios(point: Point) -> Array:

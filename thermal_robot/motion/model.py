@@ -19,6 +19,7 @@ from thermal_robot.compiling import threads
 from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
+from thermal_robot.motion.contact import contact_loads
 from thermal_robot.motion.effects import EFFECTS, SIMULATOR, size
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
@@ -33,6 +34,8 @@ _POOL = "joints"
 """Name of the threads of a model's pool, in which it asks for no more of them."""
 SHARED = -1
 """Joint of a parameter that all joints share."""
+RUBBING = "contact", "friction"
+"""Key of the parameter of friction on a plane that the tool touches."""
 
 
 @dataclass(frozen=True)
@@ -253,7 +256,7 @@ class ServoModel(JointModel):
             self.groups = (tuple(self.joints),)
         self.about = self._read() if self.coupled else np.clip(self.commanded, *self.reach)
         self.loads = self._loads()
-        self.lowest = float(self._heights(self.commanded)[0].min())
+        self.lowest = float(self._heights(self.commanded).min())
         self.motions = [samples[3] for samples in self._samples]
         self.parameters = self._parameters()
         self._press(np.zeros(len(self.parameters)))
@@ -334,6 +337,9 @@ class ServoModel(JointModel):
         if self.log.robot.has_masses:
             found.append(self.payload(self.loads.torque[1]))
             found.append(Parameter("contact", SHARED, "height in the root frame", "m", 0.1, 1.5, 0.0, "contact"))
+            if not self.held:
+                effect, of = RUBBING
+                found.append(Parameter(effect, SHARED, of, "", settings.RUBBING, 1.0, 0.0, "rubbing", of))
         return tuple(found)
 
     def start(self) -> Array:
@@ -347,7 +353,7 @@ class ServoModel(JointModel):
             values[self.index("speed_limit", joint)] = 1.0 / self._fastest[0, joint]
             values[self.index("acceleration_limit", joint)] = 1.0 / self._fastest[1, joint]
         if (p := self.index("contact")) is not None:
-            height, _ = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
+            height = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
             values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
         return values
 
@@ -382,21 +388,39 @@ class ServoModel(JointModel):
         most = [np.quantile(np.abs(one), settings.FEW, axis=0) for one in self._moved[1:]]
         return np.maximum(most, settings.STIRRED / settings.STRIDE)
 
-    def _heights(self, q: Array) -> tuple[Array, Array]:
-        """Height of the tool (n,), m, against gravity, and its gradient (n, J) by joints; others are held at zero."""
-        robot, names = self.log.robot, self.log.joints
-        own = [j for j, name in enumerate(names) if name in robot.joint_names]
-        at = [robot.joint_names.index(names[j]) for j in own]
-        whole, slope = np.zeros((len(q), robot.n)), np.zeros(q.shape)
-        whole[:, at] = q[:, own]
-        up = -robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-12)
-        slope[:, own] = (up @ frame_jacobians(robot, whole)[:, :3])[:, at]
-        return tool_poses(robot, whole)[:, :3, 3] @ up, slope
+    @cached_property
+    def _up(self) -> Array:
+        """(3,) direction against gravity."""
+        gravity = self.log.robot.gravity
+        return np.asarray(-gravity / max(float(np.linalg.norm(gravity)), 1e-12))
+
+    @cached_property
+    def _chain(self) -> tuple[list[int], list[int]]:
+        """Joints of the log that move the tool, and their places in the chain."""
+        names, chain = self.log.joints, self.log.robot.joint_names
+        own = [j for j, name in enumerate(names) if name in chain]
+        return own, [chain.index(names[j]) for j in own]
+
+    def _whole(self, q: Array) -> Array:
+        """Positions of the tool's chain from those of the log's joints (n, J); others are held at zero."""
+        found, (own, at) = np.zeros((len(q), self.log.robot.n)), self._chain
+        found[:, at] = q[:, own]
+        return found
+
+    def _heights(self, q: Array) -> Array:
+        """Height of the tool (n,), m, against gravity, at positions (n, J)."""
+        return tool_poses(self.log.robot, self._whole(q))[:, :3, 3] @ self._up
+
+    def _tool(self, q: Array) -> Array:
+        """(n, 3, J) Jacobian of the tool's position by the log's joints, at positions (n, J)."""
+        found, (own, at) = np.zeros((len(q), 3, q.shape[1])), self._chain
+        found[:, :, own] = frame_jacobians(self.log.robot, self._whole(q))[:, :3, at]
+        return found
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 18) inputs of the simulation and (S, 2) weights of payload and contact, for S sets (S, P)."""
+        """(S, 18) inputs of the simulation and (S, 3) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
-        weights = np.zeros((len(values), 2))
+        weights = np.zeros((len(values), 3))
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
                 x[parameter.number] = values[:, p]
@@ -407,6 +431,8 @@ class ServoModel(JointModel):
             elif parameter.number == "contact":
                 there = values[:, p] - self.touching
                 weights[:, 1] = np.where(there > 0.0, self.lowest + there, -np.inf) if self.held else there
+            elif parameter.number == "rubbing":
+                weights[:, 2] = values[:, p] - self.rubbing
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.minimum(np.exp(x["kp"]), settings.SOFTER)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
@@ -428,11 +454,11 @@ class ServoModel(JointModel):
         """(S, n, J') simulated positions of a group's joints on the grid, S sets (S, P); ``free``: out of contact."""
         at = list(group)
         each = [self.numbers(j, values) for j in group]
-        loads, parts = np.zeros((3, len(self.grid), len(group))), self.loads
+        loads, parts = np.zeros((4, len(self.grid), len(group))), self.loads
         loads[:2] = parts.torque[:, :, at]
         if not free:
-            loads[0] += self.pressing[:, at]
-            loads[2] = self.contact[:, at]
+            loads[0] += self.contact[0][:, at]
+            loads[2:] = self.contact[1:, :, at]
         matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
         around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at], self.heights
         start = np.empty((len(self.first), len(group)))
@@ -526,25 +552,24 @@ class ServoModel(JointModel):
         return self.dynamics.along(q, v) if self.coupled else self.dynamics.at_rest(q)
 
     def _press(self, values: Array) -> None:
-        """Compute the frictionless force that keeps the tool on a plane, to which the joints' springs yield.
+        """Compute the loads by contact of the tool with a plane, to which the joints' springs yield.
 
-        Of joints that move each other the simulation itself finds it. Else the force λ ≥ 0 along the vertical solves
-        z(q) + λ Σ c_j (∂z/∂q_j)² = z₀; the torque of each joint is λ ∂z/∂q_j.
+        Of joints that move each other the simulation itself finds the plane's force.
         """
-        p = self.index("contact")
-        self.touching, self.pressing, self.contact = 0.0, np.zeros_like(self.about), np.zeros_like(self.about)
-        self.heights = np.zeros(len(self.about))
+        p, (q, _) = self.index("contact"), self.reference
+        self.touching, self.rubbing, self.contact = 0.0, 0.0, np.zeros((3, *q.shape))
+        self.heights = np.zeros(len(q))
         if p is None or (values[p] <= 0.0 and not self.held):
             return
-        height, slope = self._heights(self.reference[0])
         if self.held:
-            self.heights, self.contact = height, slope
+            self.heights, self.contact[1] = self._heights(q), self._up @ self._tool(q)
             return
-        compliance = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
-        yields = np.maximum((np.maximum(compliance, settings.LEAST_COMPLIANCE) * slope**2).sum(axis=1), 1e-12)
-        self.touching = float(values[p])
-        into = self.lowest + self.touching - height
-        most = np.array([servo.limit or np.inf for servo in self.servos]) / np.maximum(np.abs(slope), 1e-12)
-        force = np.clip(into / yields, 0.0, most.min(axis=1))
-        self.contact = np.where(into / yields == force, 1.0, 0.0)[:, None] * -slope / yields[:, None]
-        self.pressing = -slope * force[:, None]
+        self.touching, self.rubbing = values[p].item(), values[self.keys.index(RUBBING)].item()
+        deep = self.lowest + self.touching - self._heights(q)
+        at = np.flatnonzero(deep > 0.0)
+        first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)
+        soft = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
+        limits = np.array([servo.limit or np.inf for servo in self.servos])
+        told = q[at], self._tool(q[at]), self._up, deep[at], first, np.maximum(soft, settings.LEAST_COMPLIANCE), limits
+        for whole, part in zip(self.contact, contact_loads(*told, self.rubbing), strict=True):
+            whole[at] = part

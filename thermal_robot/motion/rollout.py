@@ -104,7 +104,7 @@ def values_in(found: MotionDiagnosis, model: ServoModel) -> Array:
             value = max(value + first.commanded[:, j].min() - model.commanded[:, j].min(), 0.0)
         elif effect == "high_stop":
             value = max(value - first.commanded[:, j].max() + model.commanded[:, j].max(), 0.0)
-        elif effect == "contact":
+        elif model.parameters[p].number == "contact":
             value = max(value + first.lowest - model.lowest, 0.0)
         values[p] = value
     return values

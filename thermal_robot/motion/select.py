@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
 from scipy.special import softmax
@@ -17,7 +18,6 @@ from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Groups, Point, deflated, fit, fitted
 from thermal_robot.motion.model import SHARED, JointModel, Mask
-from thermal_robot.motion.result import rms
 from thermal_robot.motion.weigh import Scales, Weighed
 
 PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "payload", "masses", "offset", "viscous")
@@ -78,25 +78,24 @@ def without(active: Mask, block: int) -> Mask:
     return np.asarray(active & (np.arange(len(active)) != block))
 
 
-def everything(model: JointModel, allowed: Mask, start: Array | None, progress: Callable[[str], None]) -> Point:
+def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Point:
     """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
 
-    From ``start``, by default from fits of plain servos with torque limits at the largest errors and of the expected
-    size, and with speed limits, the best of each group of joints; effects that are abrupt start where the joints end.
+    From fits of plain servos with torque limits at the largest errors and of the expected size, and with speed limits,
+    the best of each group of joints; effects that are abrupt start where the joints end.
     """
     begun = np.where(allowed, model.start(), 0.0)
-    if start is None:
-        # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
-        limited, led = (model.of_effects((*PLAIN, *limits)) for limits in (("torque_limit",), PROFILE))
-        sized = np.where(model.of_effects(("torque_limit",)), model.sizes, begun)
-        fits = [fit(model, first, allowed & own) for first, own in ((begun, limited), (sized, limited), (begun, led))]
-        left = np.log([[rms(one) for one in model.all_residuals(values)] for values in fits])
-        start = fits[int(left.sum(axis=1).argmin())].copy()
-        for group in model.groups:
-            own = np.isin(model.placed, group)
-            start[own] = fits[int(left[:, list(group)].sum(axis=1).argmin())][own]
-    abrupt = allowed & (start == 0.0) & model.of_effects(ABRUPT)
-    values = np.where(abrupt, begun, start)  # of what does nothing until it is reached a slope at zero tells nothing
+    # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
+    limited, led = (model.of_effects((*PLAIN, *limits)) for limits in (("torque_limit",), PROFILE))
+    sized = np.where(model.of_effects(("torque_limit",)), model.sizes, begun)
+    fits = [fit(model, first, allowed & own) for first, own in ((begun, limited), (sized, limited), (begun, led))]
+    left = np.stack([_of_motions(model, values) for values in fits])
+    values = fits[int(left.sum(axis=1).argmin())].copy()
+    for group in model.groups:
+        own = np.isin(model.placed, group)
+        values[own] = fits[int(left[:, list(group)].sum(axis=1).argmin())][own]
+    # of what does nothing until it is reached a slope at zero tells nothing
+    values = np.where(allowed & (values == 0.0) & model.of_effects(ABRUPT), begun, values)
     for number in range(1, settings.REFRESHES + 1):
         progress(f"all effects of the servos, round {number}")
         model.refreshed(values)
@@ -105,10 +104,19 @@ def everything(model: JointModel, allowed: Mask, start: Array | None, progress: 
     return point
 
 
-def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None], start: Array | None = None) -> Weighed:
+def _of_motions(model: JointModel, values: Array) -> Array:
+    """(J,) mean over motions of the logarithm of what is left: each has its own noise, so that none alone decides."""
+    found, count = np.empty(len(model.joints)), model.clusters
+    for j, one in enumerate(model.all_residuals(values)):
+        motion = model.motion_of(j)
+        square = np.bincount(motion, one**2, count) / np.maximum(np.bincount(motion, minlength=count), 1)
+        found[j] = 0.5 * np.log(square + model.noise(j) ** 2).mean()
+    return found
+
+
+def searched(point: Point, allowed: Mask, progress: Callable[[str], None]) -> Weighed:
     """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
-    point = everything(model, allowed, start, progress)
-    scales, found = Scales.of(point), list[Weighed]()
+    model, scales, found = point.model, Scales.of(point), list[Weighed]()
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
         if found:
@@ -131,7 +139,7 @@ def _search(point: Point, scales: Scales, allowed: Mask) -> Search:
 
 
 def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Choice:
-    """Drop, exchange and add parameters, one at a time, until no set beside the choice is better.
+    """Drop, exchange and add parameters, one at a time in each group, until no set beside the choice is better.
 
     A parameter goes at odds below nine to one, where motions held out are no worse without it, or if nobody could see
     it; another comes in its place, or beside it, where the evidence is better, by nine to one of one more.
@@ -141,8 +149,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         progress(f"sets of effects fitted, round {number}")
         if number == 1 or len(scales.model.groups) == 1:  # a weight alone hardly changes with a joint's parameters
             scales.model.refreshed(own.point.values)
-            scales.known.clear()
-            scales.far.clear()
+            scales.forget()
             own = scales.fitted(own.active, own.point.values)
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
@@ -150,7 +157,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         better = [one for one in rivals if _gain(own, one) > 0.0 and one.seen[one.active & ~own.active].all()]
         if not better or number == settings.MOVES:
             break
-        own = max(better, key=lambda one: _gain(own, one))
+        own = _together(scales, own, sorted(better, key=lambda one: -_gain(own, one)))
     # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
     least = own.log_evidence - settings.FAR_BELOW
     near = [one for one in rivals if least < one.log_evidence and one.loss < own.loss + settings.ALIKE]
@@ -175,18 +182,40 @@ def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
 
 
 def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
-    """Backward elimination: return the first set found without a parameter that is not needed, if any.
+    """Backward elimination: return the set without a parameter that is not needed, of each group of joints, if any.
 
-    The linear problem tells the order.
+    The linear problem tells the order; what joints share comes last, as then all are fitted anew. Motions held out
+    decide once the evidence has: with parameters to spare, what the linear problem says of them scatters.
     """
     ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
-    for b in sorted(ahead, key=lambda b: -ahead[b].log_evidence):
-        seen, least = own.seen[b], own.log_evidence - settings.FAR_BELOW
-        starts = own.point.values, ahead[b].point.values
-        (one,) = scales.others(own, [(ahead[b].active, starts)], least if seen else -np.inf)
-        if not seen or one.log_evidence > own.log_evidence - np.log(settings.ODDS) or one.loss <= own.loss:
+    order, placed = sorted(ahead, key=lambda b: -ahead[b].log_evidence), scales.model.placed
+    queues = [[b for b in order if placed[b] in group] for group in scales.model.groups]
+    turns = [[b for b in turn if b is not None] for turn in zip_longest(*queues)]
+    doubtful = list[Weighed]()
+    for turn in (*turns, *([b] for b in order if placed[b] == SHARED)):
+        found = list[Weighed]()
+        for seen, least in ((True, own.log_evidence - settings.FAR_BELOW), (False, -np.inf)):
+            some = [b for b in turn if own.seen[b] == seen]
+            sets = [(ahead[b].active, (own.point.values, ahead[b].point.values)) for b in some]
+            each = scales.others(own, sets, least)
+            found += [one for one in each if not seen or one.log_evidence > own.log_evidence - np.log(settings.ODDS)]
+            doubtful += [one for one in each if one.loss <= own.loss]
+        if found:
+            return _together(scales, own, found)
+    return _together(scales, own, doubtful) if doubtful else None
+
+
+def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weighed:
+    """Return the set with the first change of each group of joints; with one of what all share, that alone."""
+    placed, active, taken = scales.model.placed, own.active, set[int]()
+    for one in changed:
+        other = one.active ^ own.active
+        groups = {k for k, group in enumerate(scales.model.groups) if np.isin(placed[other], group).any()}
+        if SHARED in placed[other] and not taken:
             return one
-    return None
+        if SHARED not in placed[other] and not groups & taken:
+            active, taken = active ^ other, taken | groups
+    return scales.others(own, [(active, (own.point.values,))])[0]
 
 
 def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
@@ -199,8 +228,7 @@ def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
     start, places, sets = model.start(), np.arange(len(allowed)), list[tuple[Mask, tuple[Array, ...]]]()
 
     def propose(rest: Weighed, among: Sequence[Mask], groups: Groups = model.groups) -> None:
-        point = Point.at(model, rest.point.values, rest.active | (allowed & np.any(among, axis=0)), groups)
-        base = Weighed(scales, rest.active, rest.point.with_rows(point, groups))
+        base = scales.linearised(rest, allowed & np.any(among, axis=0), groups)
         for added in among:
             told = [base.ahead(rest.active | (places == k)) for k in places[allowed & ~own.active & added]]
             for one in sorted(told, key=lambda one: -one.log_evidence)[: settings.RIVALS]:

@@ -189,7 +189,8 @@ def _alone(  # type: ignore[no-untyped-def]
             before, led, rate = integral[k] + commands[k] * (t - times[k]), q, 0.0
             out[s, begins[m]] = q
             for n in range(begins[m] + 1, begins[m + 1]):
-                force = loads[0, n] + weights[s, 0] * loads[1, n] + weights[s, 1] * loads[2, n]
+                force = loads[0, n] + weights[s, 0] * loads[1, n]
+                force += weights[s, 1] * loads[2, n] + weights[s, 2] * loads[3, n]
                 mass, slope = masses[0, n] + weights[s, 0] * masses[1, n], slopes[0, n] + weights[s, 0] * slopes[1, n]
                 heavy, bend = 2.0 * max(droop * mass + inertia, 0.0) / h, droop * slope
                 # without inertia the midpoint rule would ring about a command that is followed at once
@@ -407,12 +408,12 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 2) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 3) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
-    middle of the step that ends at each grid point: ``loads`` (3, n, J), N·m, of the model, of 1 kg of payload, and of
-    contact, of several joints the gradient of the tool's height; of the first two mass matrices, derivatives by
-    position and by velocity (2, n, J, J); positions and velocities (n, J) at which they hold, and heights there
-    (n,), m; ``start`` (M, J) rad. The weight of contact is a plane's height, of a single joint's motion a factor.
+    middle of the step that ends at each grid point: ``loads`` (4, n, J), N·m, of the model, of 1 kg of payload, and of
+    contact by height and friction, of several joints the gradient of the tool's height; of the first two mass matrices,
+    derivatives by position and by velocity (2, n, J, J); positions and velocities (n, J) at which they hold, and
+    heights there (n,), m; ``start`` (M, J) rad. The weight of contact is a plane's height, of single joints factors.
     """
     out, (alone, together) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
     if numbers.shape[1] > 1:

@@ -28,7 +28,7 @@ class Scales:
     """What all sets of parameters of a model are weighed by: ``deflation`` (P,) of their information, ``worth`` (J,).
 
     ``known`` keeps the fit of each group of joints, whose parameters may be those of several sets; ``far`` what the
-    linear problem at its start predicts of a fit that was left off.
+    linear problem at its start predicts of a fit that was left off; ``linear`` that problem with more parameters.
     """
 
     model: JointModel
@@ -36,6 +36,12 @@ class Scales:
     worth: Array
     known: dict[tuple[bytes, ...], Point] = field(default_factory=dict)
     far: dict[tuple[bytes, ...], Point] = field(default_factory=dict)
+    linear: dict[tuple[bytes, ...], Point] = field(default_factory=dict)
+
+    def forget(self) -> None:
+        """Forget all fits, which no longer hold where the model's loads are others."""
+        for one in (self.known, self.far, self.linear):
+            one.clear()
 
     @classmethod
     def of(cls, point: Point) -> Scales:
@@ -76,9 +82,7 @@ class Scales:
                 if not told.log_evidence - before >= least - told.log_evidence:
                     return None
                 begun, before = there, told.log_evidence
-            found = fitted(self.model, begun, active, groups=groups)
-            # of long logs residuals would be large
-            return replace(found, rows=[one.without_residual() for one in found.rows])
+            return fitted(self.model, begun, active, groups=groups).without_residuals()
 
         alone = [key for key, (groups, _, _) in missing.items() if len(groups) < len(self.model.groups)]
         found = dict(zip(alone, self.model.each(near, alone), strict=True)) if alone else {}
@@ -86,6 +90,17 @@ class Scales:
         self.far = {key: one for key, one in self.far.items() if key not in found or found[key] is None}
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
+
+    def linearised(self, base: Weighed, more: Mask, groups: Groups) -> Weighed:
+        """Linearise some groups of joints at a set's fit by ``more`` (P,) parameters besides its own."""
+        found, wanted = base.point, base.active | more
+        for group in groups:
+            own = self.model.own(group)
+            key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes()
+            if key not in self.linear:
+                self.linear[key] = Point.at(self.model, base.point.values, wanted, [group]).without_residuals()
+            found = found.with_rows(self.linear[key], [group])
+        return Weighed(self, base.active, found)
 
     def _best(self, base: Weighed, groups: Groups, values: Sequence[Array]) -> Array:
         """(P,) those of some starting values with which the joints of some groups leave least."""
