@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.motion.contact import contact_loads
+from thermal_robot.motion.contact import contact_yields
 
 UP, SOFT = np.array([0.0, 0.0, 1.0]), np.array([1e-3, 2e-3, 5e-4])
 
@@ -12,7 +12,7 @@ def pressed(path, deep, friction, soft=SOFT, limits=(np.inf,) * 3):
     """Loads (n, 3) of a gantry on a path (n, 3) whose tool is pressed ``deep`` (n,) into a floor, and derivatives."""
     first = np.arange(len(path)) == 0
     tool = np.broadcast_to(np.eye(3), (len(path), 3, 3))
-    return contact_loads(path, tool, UP, deep, first, soft, np.array(limits), friction)
+    return [one / soft for one in contact_yields(path, tool, UP, deep, first, soft, np.array(limits), friction)]
 
 
 def test_a_floor_pushes_as_the_spring_above_it_and_drags_by_coulombs_law():
@@ -44,6 +44,14 @@ def test_a_path_that_comes_back_leaves_work_behind():
     force = 0.5 * 1e-3 / SOFT[2]
     slid = 2.0 * (0.02 - 2.0 * force * SOFT[0])  # twice it turns, and springs back from one side to the other
     assert work == pytest.approx(force * slid, rel=0.02)
+
+
+def test_what_friction_would_do_is_told_where_there_is_none():
+    path = np.linspace(0.0, 0.1, 50)[:, None] * [0.6, 0.8, 0.0]
+    _, _, by_friction = pressed(path, np.full(50, 2e-3), 0.0)
+    np.testing.assert_allclose(np.hypot(*by_friction[1:, :2].T), 2e-3 / SOFT[2], rtol=1e-9)
+    rougher = pressed(path, np.full(50, 2e-3), 1e-6)[0]
+    np.testing.assert_allclose(1e-6 * by_friction[1:, :2], rougher[1:, :2], rtol=0.05)
 
 
 def test_servos_give_no_more_than_their_limit():

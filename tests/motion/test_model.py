@@ -139,6 +139,24 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     ]  # fmt: skip
 
 
+def test_a_plane_is_felt_in_sets_that_have_it_and_in_no_other():
+    """Its loads hold for the height at which they were taken; of a set without a plane nothing of them is left."""
+    log = arms.log(*arms.tables(3, 8.0)).with_joints(arms.JOINTS[:3])
+    model, none = ServoModel(log), np.zeros(len(ServoModel(log).parameters))
+    before = model.all_residuals(none)
+    values = none.copy()
+    for joint in range(1, 3):
+        values[model.index("droop", joint)] = 0.02
+    values[model.index("contact")] = 0.05
+    values[model.keys.index(("contact", "friction"))] = 0.3
+    model.refreshed(values)
+    for one, other in zip(before, model.all_residuals(none), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    rubbed = model.moved(values, np.array([model.index("contact"), model.keys.index(("contact", "friction"))]))
+    assert (rubbed[0] > 1e-3).all()  # a swivelling joint is dragged, though nothing presses it
+    assert 0.5 * rubbed[0, 0] < rubbed[1, 0] < 1.1 * rubbed[0, 0]
+
+
 def test_few_motions_are_cut_into_as_many_pieces_for_the_fit_as_for_faults():
     whole = arms.log(*arms.tables(9, 8.0, 3)).with_joints(("joint_1",))
     for count, independent in ((1, 8), (3, 9), (7, 14), (8, 8), (9, 9)):

@@ -80,14 +80,15 @@ class Dynamics:
     def at_rest(self, q: Array) -> Loads:
         """Return what loads the joints at rest along configurations (n, J), of matrices the diagonals.
 
-        They are computed a small turn apart, and linear between.
+        They are computed a small turn apart, and linear between. In memory a joint's follow each other.
         """
         way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
         apart = np.flatnonzero(np.diff(np.floor(way / settings.LOAD_STEP), prepend=-1.0, append=np.inf)[:-1])
         apart = np.union1d(np.union1d(apart, np.maximum(apart - 1, 0)), [len(q) - 1])
         few = self.along(q[apart], np.zeros((len(apart), q.shape[1])))
-        own = (np.diagonal(one, axis1=2, axis2=3) for one in (few.inertia, few.slope, few.drag))
-        return Loads(*(_between(way, way[apart], one) for one in (few.torque, *own)))
+        own = (few.torque, *(np.diagonal(one, axis1=2, axis2=3) for one in (few.inertia, few.slope)))
+        torque, inertia, slope = (_between(way, way[apart], one) for one in own)
+        return Loads(torque, inertia, slope, np.zeros(slope.shape))
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """(2, n, J) torques, N·m, of the model and of 1 kg of payload, at positions, velocities and accelerations."""
@@ -117,11 +118,12 @@ class Dynamics:
 
 
 def _between(way: Array, at: Array, values: Array) -> Array:
-    """Linear interpolation of values (…, n', J) known at places ``at`` of a way (n,), rising."""
-    right = np.clip(np.searchsorted(at, way), 1, len(at) - 1)
-    width = at[right] - at[right - 1]
-    part = np.clip((way - at[right - 1]) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)[:, None]
-    return np.asarray((1.0 - part) * values[..., right - 1, :] + part * values[..., right, :])
+    """Linear interpolation of values (k, n', J) known at places ``at`` of a way (n,), rising."""
+    found = np.empty((len(values), values.shape[2], len(way)))
+    for row, known in zip(found, values, strict=True):
+        for one, column in zip(row, known.T, strict=True):
+            one[:] = np.interp(way, at, column)
+    return found.transpose(0, 2, 1)
 
 
 def pseudo_inertia(mass: float, centre: Array, inertia: Array) -> Array:

@@ -3,11 +3,12 @@
 Joints are springs of the servos' compliances C = diag(c). Where their motion q would pass the plane by d, the force
 λ ≥ 0 along its normal n solves d = λ nᵀJ C Jᵀn. Friction f in the plane, |f| ≤ μ λ, grows as the tool's compliance
 along the plane lets it, T C Tᵀ Δf = T Δ(q + C Jᵀn λ) with T = (1 − n nᵀ) J, and returns to its circle where it would
-leave it (radial return: Simo and Hughes, *Computational Inelasticity*, 1998). The joints feel λ Jᵀn − Tᵀf.
+leave it (radial return: Simo and Hughes, *Computational Inelasticity*, 1998). The joints yield by C (λ Jᵀn − Tᵀf).
 """
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
@@ -18,16 +19,21 @@ from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
 
 
-def _returned(grown, most, first, found, last):  # type: ignore[no-untyped-def]
-    """Radial return: sum what friction has ``grown`` (n, 2) within circles (n,); ``last`` (n,) rows where it slid."""
+def _returned(grown, most, first, found, way, last):  # type: ignore[no-untyped-def]
+    """Radial return: sum what friction has ``grown`` (n, 2) within circles (n,), and tell where it slid ``last`` (n,).
+
+    And which ``way`` (n, 2) there.
+    """
     for k in range(len(most)):
-        x, y, slid = 0.0, 0.0, -1
+        x, y = grown[k, 0], grown[k, 1]
         if not first[k]:
-            x, y, slid = found[k - 1, 0] + grown[k, 0], found[k - 1, 1] + grown[k, 1], last[k - 1]
-        size = np.hypot(x, y)
+            x, y, last[k] = x + found[k - 1, 0], y + found[k - 1, 1], last[k - 1]
+            way[k, 0], way[k, 1] = way[k - 1, 0], way[k - 1, 1]
+        size = math.hypot(x, y)
         if size > most[k]:
-            x, y, slid = x * most[k] / size, y * most[k] / size, k
-        found[k, 0], found[k, 1], last[k] = x, y, slid
+            way[k, 0], way[k, 1], last[k] = x / size, y / size, k
+            x, y = most[k] * way[k, 0], most[k] * way[k, 1]
+        found[k, 0], found[k, 1] = x, y
 
 
 @cache
@@ -35,11 +41,11 @@ def _kernel() -> Any:
     return compiled(_returned)
 
 
-def contact_loads(
+def contact_yields(
     q: Array, tool: Array, up: Array, deep: Array, first: NDArray[np.bool_], soft: Array, limits: Array,
     friction: float,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Return loads of J joints by contact in n instants, N·m, and their derivatives by the plane's height and friction.
+    """Return what J joints yield to contact in n instants, rad, and its derivatives by plane's height and friction.
 
     Parameters
     ----------
@@ -68,15 +74,15 @@ def contact_loads(
     yielding = turned @ np.swapaxes(turned, 1, 2) + 1e-12 * np.eye(2)
     rested = q + soft * slope * force[:, None]
     step = np.einsum("nij,nj->ni", along, np.diff(rested, axis=0, prepend=rested[:1]))
-    rubbed, last = np.zeros_like(step), np.zeros(len(deep), dtype=np.int64)
-    _kernel()(np.linalg.solve(yielding, step[:, :, None])[:, :, 0], friction * force, first, rubbed, last)
-    way = np.where(last[:, None] < 0, 0.0, rubbed[last] / np.maximum(friction * force[last], 1e-12)[:, None])
+    step[first] = 0.0
+    rubbed, way, last = np.zeros_like(step), np.zeros_like(step), np.zeros(len(deep), dtype=np.int64)
+    _kernel()(np.linalg.solve(yielding, step[:, :, None])[:, :, 0], friction * force, first, rubbed, way, last)
 
-    def turning(push: Array, drag: Array) -> Array:
-        return np.asarray(np.einsum("ni,nij->nj", drag, along) - push[:, None] * slope)
+    def yielded(push: Array, drag: Array) -> Array:
+        return np.asarray(soft * (np.einsum("ni,nij->nj", drag, along) - push[:, None] * slope))
 
     return (
-        turning(force, rubbed),
-        turning(stiff, friction * stiff[last, None] * way),
-        turning(np.zeros_like(force), force[last, None] * way),
+        yielded(force, rubbed),
+        yielded(stiff, friction * stiff[last, None] * way),
+        yielded(np.zeros_like(force), force[last, None] * way),
     )

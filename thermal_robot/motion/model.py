@@ -19,7 +19,7 @@ from thermal_robot.compiling import threads
 from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
-from thermal_robot.motion.contact import contact_loads
+from thermal_robot.motion.contact import contact_yields
 from thermal_robot.motion.effects import EFFECTS, SIMULATOR, size
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
@@ -418,9 +418,9 @@ class ServoModel(JointModel):
         return found
 
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 18) inputs of the simulation and (S, 3) weights of payload and contact, for S sets (S, P)."""
+        """(S, 18) inputs of the simulation and (S, 4) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
-        weights = np.zeros((len(values), 3))
+        weights = np.zeros((len(values), 4))
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
                 x[parameter.number] = values[:, p]
@@ -429,10 +429,13 @@ class ServoModel(JointModel):
             elif parameter.number == "payload":
                 weights[:, 0] = values[:, p]
             elif parameter.number == "contact":
-                there = values[:, p] - self.touching
-                weights[:, 1] = np.where(there > 0.0, self.lowest + there, -np.inf) if self.held else there
+                there = values[:, p]
+                if self.held:
+                    weights[:, 1] = np.where(there > 0.0, self.lowest + there, -np.inf)
+                else:
+                    weights[:, 1:3] = np.stack([there > 0.0, (there > 0.0) * (there - self.touching)], axis=1)
             elif parameter.number == "rubbing":
-                weights[:, 2] = values[:, p] - self.rubbing
+                weights[:, 3] = weights[:, 1] * (values[:, p] - self.rubbing)
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.minimum(np.exp(x["kp"]), settings.SOFTER)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
@@ -452,13 +455,11 @@ class ServoModel(JointModel):
 
     def positions(self, group: Sequence[int], values: Array, free: bool = False) -> Array:
         """(S, n, J') simulated positions of a group's joints on the grid, S sets (S, P); ``free``: out of contact."""
-        at = list(group)
+        at = slice(group[0], group[-1] + 1)
         each = [self.numbers(j, values) for j in group]
-        loads, parts = np.zeros((4, len(self.grid), len(group))), self.loads
-        loads[:2] = parts.torque[:, :, at]
-        if not free:
-            loads[0] += self.contact[0][:, at]
-            loads[2:] = self.contact[1:, :, at]
+        loads, parts = self.given[:, :, at], self.loads
+        if free:
+            loads = np.concatenate([parts.torque[:, :, at], np.zeros_like(loads[2:])])
         matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
         around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at], self.heights
         start = np.empty((len(self.first), len(group)))
@@ -544,7 +545,8 @@ class ServoModel(JointModel):
 
     def _loads(self) -> Loads:
         """Return the loads in the middle of the steps, and keep as ``reference`` (n, J) position and velocity there."""
-        q, v = self.about.copy(), np.zeros_like(self.about)
+        q, v = (np.zeros_like(self.about, order="C" if self.coupled else "F") for _ in range(2))
+        q[:] = self.about
         for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
             q[a + 1 : b] = 0.5 * (self.about[a : b - 1] + self.about[a + 1 : b])
             v[a + 1 : b] = np.diff(self.about[a:b], axis=0) / self.step
@@ -557,12 +559,14 @@ class ServoModel(JointModel):
         Of joints that move each other the simulation itself finds the plane's force.
         """
         p, (q, _) = self.index("contact"), self.reference
-        self.touching, self.rubbing, self.contact = 0.0, 0.0, np.zeros((3, *q.shape))
-        self.heights = np.zeros(len(q))
+        self.touching, self.rubbing, self.heights = 0.0, 0.0, np.zeros(len(q))
+        # in memory a joint's follow each other
+        self.given = np.zeros((5, *q.shape)) if self.coupled else np.zeros((5, *q.shape[::-1])).transpose(0, 2, 1)
+        self.given[:2] = self.loads.torque
         if p is None or (values[p] <= 0.0 and not self.held):
             return
         if self.held:
-            self.heights, self.contact[1] = self._heights(q), self._up @ self._tool(q)
+            self.heights, self.given[2] = self._heights(q), self._up @ self._tool(q)
             return
         self.touching, self.rubbing = values[p].item(), values[self.keys.index(RUBBING)].item()
         deep = self.lowest + self.touching - self._heights(q)
@@ -570,6 +574,8 @@ class ServoModel(JointModel):
         first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)
         soft = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
         limits = np.array([servo.limit or np.inf for servo in self.servos])
-        told = q[at], self._tool(q[at]), self._up, deep[at], first, np.maximum(soft, settings.LEAST_COMPLIANCE), limits
-        for whole, part in zip(self.contact, contact_loads(*told, self.rubbing), strict=True):
-            whole[at] = part
+        # the compliance of a joint that gravity does not load is thought to be the others'
+        usual = float(np.median(soft[soft > 0.0])) if (soft > 0.0).any() else 1.0 / settings.STIFFNESS
+        told = q[at], self._tool(q[at]), self._up, deep[at], first, np.where(soft > 0.0, soft, usual), limits
+        for k, part in zip((2, 3, 4), contact_yields(*told, self.rubbing), strict=True):
+            self.given[k][at] = part

@@ -190,7 +190,7 @@ def _alone(  # type: ignore[no-untyped-def]
             out[s, begins[m]] = q
             for n in range(begins[m] + 1, begins[m + 1]):
                 force = loads[0, n] + weights[s, 0] * loads[1, n]
-                force += weights[s, 1] * loads[2, n] + weights[s, 2] * loads[3, n]
+                push = weights[s, 1] * loads[2, n] + weights[s, 2] * loads[3, n] + weights[s, 3] * loads[4, n]
                 mass, slope = masses[0, n] + weights[s, 0] * masses[1, n], slopes[0, n] + weights[s, 0] * slopes[1, n]
                 heavy, bend = 2.0 * max(droop * mass + inertia, 0.0) / h, droop * slope
                 # without inertia the midpoint rule would ring about a command that is followed at once
@@ -201,7 +201,7 @@ def _alone(  # type: ignore[no-untyped-def]
                     late = integral[k] + commands[k] * (t - times[k])
                     u, led, rate = _led(led, rate, (late - before) / h, numbers[s, 16], numbers[s, 17], h)  # type: ignore[no-untyped-call]
                     u, before = (1.0 + gain) * u + zero, late
-                    load = droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
+                    load = push + droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
                     most = coulomb + load_friction * abs(load) + _breakaway(stribeck, v)  # type: ignore[no-untyped-call]
                     middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
                         q, v, u, load, most, 0.0, 0.0, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
@@ -408,12 +408,13 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 3) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 4) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
-    middle of the step that ends at each grid point: ``loads`` (4, n, J), N·m, of the model, of 1 kg of payload, and of
-    contact by height and friction, of several joints the gradient of the tool's height; of the first two mass matrices,
-    derivatives by position and by velocity (2, n, J, J); positions and velocities (n, J) at which they hold, and
-    heights there (n,), m; ``start`` (M, J) rad. The weight of contact is a plane's height, of single joints factors.
+    middle of the step that ends at each grid point: ``loads`` (5, n, J), N·m, of the model and of 1 kg of payload, then
+    what a joint yields to contact, rad, and by height and friction, of several joints first the gradient of the tool's
+    height; of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and
+    velocities (n, J) at which they hold, and heights there (n,), m; ``start`` (M, J) rad. Of contact several joints
+    have a plane's height, single ones a factor and changes of height and friction.
     """
     out, (alone, together) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
     if numbers.shape[1] > 1:

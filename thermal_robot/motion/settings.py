@@ -93,8 +93,6 @@ PAYLOAD = 0.3
 SOFTER = 20.0
 """Factor by which a servo is at most softer or stiffer than stated: a softer one does not hold its arm, and the droop
 of a stiffer one cannot be seen."""
-LEAST_COMPLIANCE = 1e-3
-"""rad/(N·m): of a joint whose droop is not known yet, where contact divides a force among joints."""
 RUBBING = 0.3
 """Expected coefficient of friction of a tool on a table: plastics and rubber on wood and metal have 0.2 to 0.5."""
 FEW = 0.999

@@ -220,7 +220,7 @@ MEANS = {
     "high_stop": "The joint runs against something at the upper end of its range.",
     "payload": "A mass at the tool that the model does not have, or has too much.",
     "masses": "Links are heavier or lighter than in the model.",
-    "contact": "The tool touches a plane and cannot go where it is commanded.",
+    "contact": "The tool touches a plane, which keeps it from where it is commanded, and drags at it.",
     "offset": "The torque channel reads this where there is no torque.",
     "viscous": "Friction in proportion to velocity: damping in an MJCF.",
     "torque_constant": "The torque channel reads too much or too little, in proportion.",
