@@ -297,7 +297,7 @@ def test_what_is_asked_of_a_choice_changes_no_probability():
     model = ServoModel(short("coulomb", size=0.05))
     names = np.array([one.effect for one in model.parameters])
     allowed = names != "dead_zone"
-    choice = settled(searched(everything(model, allowed, print), allowed, print), allowed, print)
+    choice = settled(searched(model, allowed, print), allowed, print)
     told = [choice.probability(p) for p in range(len(names))]
     own = np.flatnonzero(choice.active).tolist()
     rivals = {names[k] for p in own for k in choice.alternatives(p)}

@@ -22,7 +22,7 @@ from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
 from thermal_robot.motion.refuse import explains_torques
 from thermal_robot.motion.result import JointGap, MotionDiagnosis, rms
-from thermal_robot.motion.select import Choice, everything, searched, settled
+from thermal_robot.motion.select import Choice, searched, settled
 from thermal_robot.motion.torque import TorqueModel
 
 ALL = (*TITLES, *SHARED_TITLES, *TORQUE_TITLES)
@@ -69,14 +69,14 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = model.of_effects((*kept, *SIMULATOR))
-    point = everything(model, allowed, progress)
-    refused = _gate(point)
+    found = searched(model, allowed, progress)
+    refused = _gate(found.point)
     if refused:
         progress("without the motions that nothing explains")
         motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
-        del model, point  # of a long log each is large; what was fitted to such motions is no place to start from
-        point = everything(kind(replace(log, motions=motions)), allowed, progress)
-    choice = settled(searched(point, allowed, progress), allowed, progress)
+        del model, found  # of a long log each is large; what was fitted to such motions is no place to start from
+        found = searched(kind(replace(log, motions=motions)), allowed, progress)
+    choice = settled(found, allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)

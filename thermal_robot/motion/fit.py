@@ -220,10 +220,17 @@ class _Descent:
         found = sum(float(x @ x) / row.noise**2 for x, row in zip(used, point.rows, strict=True))
         return found + float(np.sum((values / self.model.sizes)[self.own] ** 2))
 
-    def _better(self, point: Point, tried: Iterable[Array]) -> Array | None:
-        """Return the first of some values (P,) that lowers the cost at a point by SETTLED, if any."""
-        least = (1.0 - settings.SETTLED) * self._cost(point, point.values, [one.residual for one in point.rows])
-        return next((then for then in tried if self._cost(point, then, self._left(then)) < least), None)
+    def _better(self, point: Point, tried: Iterable[Array], descending: bool = False) -> Array | None:
+        """Return the first of some values (P,) that lowers the cost at a point by SETTLED, if any.
+
+        Of steps ``descending`` from too long ones to short ones none lowers it much after the first that lowers it.
+        """
+        before = self._cost(point, point.values, [one.residual for one in point.rows])
+        for then in tried:
+            cost = self._cost(point, then, self._left(then))
+            if cost < (1.0 if descending else 1.0 - settings.SETTLED) * before:
+                return then if cost < (1.0 - settings.SETTLED) * before else None
+        return None
 
     def _stepped(self, point: Point) -> Array | None:
         """Take the step of least damping that betters the cost; none where the undamped one promises too little."""
@@ -236,7 +243,8 @@ class _Descent:
         first, promised = next(steps)
         if promised < settings.SETTLED * self._cost(point, here, [one.residual for one in point.rows]):
             return None
-        return self._better(point, (_with(here, own, then) for then in chain([first], (then for then, _ in steps))))
+        ahead = chain([first], (then for then, _ in steps))
+        return self._better(point, (_with(here, own, then) for then in ahead), True)
 
     def _shifted(self, point: Point) -> Array | None:
         """Pattern search along the valley of delay and lag, where kinks stop Newton's steps.

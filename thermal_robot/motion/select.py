@@ -114,9 +114,10 @@ def _of_motions(model: JointModel, values: Array) -> Array:
     return found
 
 
-def searched(point: Point, allowed: Mask, progress: Callable[[str], None]) -> Weighed:
+def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Weighed:
     """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
-    model, scales, found = point.model, Scales.of(point), list[Weighed]()
+    point = everything(model, allowed, progress)
+    scales, found = Scales.of(point), list[Weighed]()
     for number in range(1, settings.SELECTIONS + 1):
         progress(f"which effects, round {number}")
         if found:
