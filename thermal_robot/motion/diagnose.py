@@ -16,7 +16,7 @@ from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SHARED_TITLES, SIMULATOR, TITLES, TORQUE_TITLES
 from thermal_robot.motion.faults import find_faults
-from thermal_robot.motion.fit import Point, fit
+from thermal_robot.motion.fit import Point, fit, mean_squares
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
 from thermal_robot.motion.model import ServoModel
@@ -92,8 +92,7 @@ def _gate(point: Point) -> dict[str, float]:
     kinds = np.array([m.kind or m.name for m in point.model.log.motions])
     each = np.zeros((len(kinds), len(point.rows)))
     for j, (one, noise) in enumerate(zip(point.rows, point.noise, strict=True)):
-        count = np.maximum(np.bincount(one.motion, minlength=len(kinds)), 1)
-        each[:, j] = np.bincount(one.motion, (one.residual / noise) ** 2, len(kinds)) / count
+        each[:, j] = mean_squares(one.residual / noise, one.motion, len(kinds))
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
     usual = float(np.median(list(square.values())))
     far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}

@@ -172,12 +172,12 @@ def _fit(
 
     for _ in range(settings.ROUNDS):  # joints go their own ways, then move with what they share
         each = model.each(descended, groups)
-        values = np.where(common & alone, each[0][0], values)
         for group, (there, _) in zip(groups, each, strict=True):
-            values = np.where(np.isin(placed, group), there, values)
+            values = np.where(np.isin(placed, group) | common & alone, there, values)
         if alone or not common.any():
             points = [point for _, point in each if point is not None and (some or (moving == active).all())]
-            return values, _joined(values, groups, points) if len(points) == len(groups) else None
+            rows = [row for point in points for row in point.rows]
+            return values, Point(model, values, rows) if len(points) == len(groups) else None
         values, point = _Descent(model, groups, inside, inside, motions).run(values, 1)
         if point is not None:
             return values, point if (inside == active).all() else None
@@ -201,8 +201,9 @@ class _Descent:
         """Return the values (P,) where it ends, and the model linearised there unless ``rounds`` were too few."""
         for _ in range(rounds):
             point = Point.at(self.model, values, self.wanted, self.groups)
-            then = self._stepped(point)
-            then = self._shifted(point) if then is None else then
+            before = self._cost(point, values, [one.residual for one in point.rows])
+            then = self._stepped(point, before)
+            then = self._shifted(point, before) if then is None else then
             if then is None:
                 return values, point
             values = then
@@ -220,19 +221,18 @@ class _Descent:
         found = sum(float(x @ x) / row.noise**2 for x, row in zip(used, point.rows, strict=True))
         return found + float(np.sum((values / self.model.sizes)[self.own] ** 2))
 
-    def _better(self, point: Point, tried: Iterable[Array], descending: bool = False) -> Array | None:
-        """Return the first of some values (P,) that lowers the cost at a point by SETTLED, if any.
+    def _better(self, point: Point, before: float, tried: Iterable[Array], descending: bool = False) -> Array | None:
+        """Return the first of some values (P,) that lowers the cost ``before``, at a point, by SETTLED, if any.
 
         Of steps ``descending`` from too long ones to short ones none lowers it much after the first that lowers it.
         """
-        before = self._cost(point, point.values, [one.residual for one in point.rows])
         for then in tried:
             cost = self._cost(point, then, self._left(then))
             if cost < (1.0 if descending else 1.0 - settings.SETTLED) * before:
                 return then if cost < (1.0 - settings.SETTLED) * before else None
         return None
 
-    def _stepped(self, point: Point) -> Array | None:
+    def _stepped(self, point: Point, before: float) -> Array | None:
         """Take the step of least damping that betters the cost; none where the undamped one promises too little."""
         own, here, sizes = np.flatnonzero(self.own), point.values, self.model.sizes
         if not len(own):
@@ -241,12 +241,12 @@ class _Descent:
         problem = matrix[np.ix_(own, own)], vector[own], sizes[own] ** -2.0, self.model.least[own]
         steps = (_ahead(problem, here[own], damping) for damping in settings.DAMPINGS)
         first, promised = next(steps)
-        if promised < settings.SETTLED * self._cost(point, here, [one.residual for one in point.rows]):
+        if promised < settings.SETTLED * before:
             return None
         ahead = chain([first], (then for then, _ in steps))
-        return self._better(point, (_with(here, own, then) for then in ahead), True)
+        return self._better(point, before, (_with(here, own, then) for then in ahead), True)
 
-    def _shifted(self, point: Point) -> Array | None:
+    def _shifted(self, point: Point, before: float) -> Array | None:
         """Pattern search along the valley of delay and lag, where kinks stop Newton's steps.
 
         Delays go earlier and later by SHIFTS of their expected size, lags the other way or not at all.
@@ -256,13 +256,7 @@ class _Descent:
             return None
         size, least = self.model.sizes[delay].mean(), np.where(self.own, self.model.least, -np.inf)
         ways = [share * size * (delay - with_lag * lag) for share in settings.SHIFTS for with_lag in (1.0, 0.0)]
-        return self._better(point, (np.maximum(point.values + way, least) for way in ways))
-
-
-def _joined(values: Array, groups: Groups, points: Sequence[Point]) -> Point:
-    """Join the rows of groups of joints, each linearised by itself, in the joints' order."""
-    rows = {j: row for group, at in zip(groups, points, strict=True) for j, row in zip(group, at.rows, strict=True)}
-    return Point(points[0].model, values, [rows[j] for j in sorted(rows)])
+        return self._better(point, before, (np.maximum(point.values + way, least) for way in ways))
 
 
 def _with(values: Array, own: NDArray[np.int64], some: Array) -> Array:
@@ -285,6 +279,11 @@ def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]
     found = np.asarray(lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x)
     cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
     return found, float(cost[0] - cost[1])
+
+
+def mean_squares(residual: Array, motion: NDArray[np.int64], count: int) -> Array:
+    """(M,) mean square of a joint's residual (N,) in each of ``count`` clusters, by its readings' indices (N,)."""
+    return np.bincount(motion, residual**2, count) / np.maximum(np.bincount(motion, minlength=count), 1)
 
 
 def ratios(point: Point) -> Array:

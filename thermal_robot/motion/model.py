@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import current_thread
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -339,7 +339,7 @@ class ServoModel(JointModel):
             found.append(Parameter("contact", SHARED, "height in the root frame", "m", 0.1, 1.5, 0.0, "contact"))
             if not self.held:
                 effect, of = RUBBING
-                found.append(Parameter(effect, SHARED, of, "", settings.RUBBING, 1.0, 0.0, "rubbing", of))
+                found.append(Parameter(effect, SHARED, of, "", settings.PLANE_FRICTION, 1.0, 0.0, "rubbing", of))
         return tuple(found)
 
     def start(self) -> Array:
@@ -457,9 +457,9 @@ class ServoModel(JointModel):
         """(S, n, J') simulated positions of a group's joints on the grid, S sets (S, P); ``free``: out of contact."""
         at = slice(group[0], group[-1] + 1)
         each = [self.numbers(j, values) for j in group]
-        loads, parts = self.given[:, :, at], self.loads
+        loads, parts, weights = self.given[:, :, at], self.loads, each[0][1]
         if free:
-            loads = np.concatenate([parts.torque[:, :, at], np.zeros_like(loads[2:])])
+            weights[:, 1:] = 0.0
         matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
         around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at], self.heights
         start = np.empty((len(self.first), len(group)))
@@ -475,7 +475,7 @@ class ServoModel(JointModel):
         )
         numbers = np.ascontiguousarray(np.stack([one for one, _ in each], axis=1))
         grid = self.begins, self.first
-        return simulate(numbers, each[0][1], grid, command, around, start, self.step, self.substeps)
+        return simulate(numbers, weights, grid, command, around, start, self.step, self.substeps)
 
     def path(self, values: Array, free: bool = False) -> Array:
         """(n, J) simulated positions of all joints on the grid at the parameters (P,); ``free``: without contact."""
@@ -563,6 +563,7 @@ class ServoModel(JointModel):
         # in memory a joint's follow each other
         self.given = np.zeros((5, *q.shape)) if self.coupled else np.zeros((5, *q.shape[::-1])).transpose(0, 2, 1)
         self.given[:2] = self.loads.torque
+        self.loads = replace(self.loads, torque=self.given[:2])  # of a long log one copy is large
         if p is None or (values[p] <= 0.0 and not self.held):
             return
         if self.held:

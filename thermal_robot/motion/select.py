@@ -16,7 +16,7 @@ from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, deflated, fit, fitted
+from thermal_robot.motion.fit import Groups, Point, deflated, fit, fitted, mean_squares
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
@@ -106,12 +106,10 @@ def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]
 
 def _of_motions(model: JointModel, values: Array) -> Array:
     """(J,) mean over motions of the logarithm of what is left: each has its own noise, so that none alone decides."""
-    found, count = np.empty(len(model.joints)), model.clusters
-    for j, one in enumerate(model.all_residuals(values)):
-        motion = model.motion_of(j)
-        square = np.bincount(motion, one**2, count) / np.maximum(np.bincount(motion, minlength=count), 1)
-        found[j] = 0.5 * np.log(square + model.noise(j) ** 2).mean()
-    return found
+    squares = (
+        mean_squares(one, model.motion_of(j), model.clusters) for j, one in enumerate(model.all_residuals(values))
+    )
+    return np.array([0.5 * np.log(one + model.noise(j) ** 2).mean() for j, one in enumerate(squares)])
 
 
 def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Weighed:

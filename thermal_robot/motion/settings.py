@@ -93,7 +93,7 @@ PAYLOAD = 0.3
 SOFTER = 20.0
 """Factor by which a servo is at most softer or stiffer than stated: a softer one does not hold its arm, and the droop
 of a stiffer one cannot be seen."""
-RUBBING = 0.3
+PLANE_FRICTION = 0.3
 """Expected coefficient of friction of a tool on a table: plastics and rubber on wood and metal have 0.2 to 0.5."""
 FEW = 0.999
 """Quantile of the tracking error from which a saturation is looked for."""
