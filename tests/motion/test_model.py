@@ -17,7 +17,7 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import everything, searched, settled, without
+from thermal_robot.motion.select import searched, settled, without
 from thermal_robot.motion.weigh import Scales
 
 
@@ -116,7 +116,7 @@ def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it()
     log, _ = driven({("lag", 0): 0.06, ("coulomb", 0): 0.006, ("torque_limit", 0): 20.0}, 6, 6.0, joints=("joint_1",))
     model = ServoModel(log)
     allowed = ~model.of_effects(("dead_zone",))  # at its limit a servo with a dead zone is one with friction
-    found = everything(model, allowed, lambda _: None).values
+    found = settled(searched(model, allowed, print), allowed, print).point.values
     assert found[model.index("torque_limit", 0)] == pytest.approx(20.0, rel=0.1)
     assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
 

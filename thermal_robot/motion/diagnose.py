@@ -69,23 +69,25 @@ def diagnose_motion(
     kind = TorqueModel if explains_torques(log) else ServoModel
     model = kind(log)
     allowed = model.of_effects((*kept, *SIMULATOR))
-    found = searched(model, allowed, progress)
-    refused = _gate(found.point)
-    if refused:
+    found, refused, motions = searched(model, allowed, progress), dict[str, float](), log.motions
+    # one kind at a time: another may only look bad for what a fit to the worst one has spoilt
+    while worst := _gate(found.point, len(log.motions) // 2):
         progress("without the motions that nothing explains")
-        motions = tuple(m for m in log.motions if (m.kind or m.name) not in refused)
+        refused |= worst
+        motions = tuple(m for m in motions if (m.kind or m.name) not in refused)
         del model, found  # of a long log each is large; what was fitted to such motions is no place to start from
-        found = searched(kind(replace(log, motions=motions)), allowed, progress)
+        model = kind(replace(log, motions=motions))
+        found = searched(model, allowed, progress)
     choice = settled(found, allowed, progress)
     left_out = tuple(name for name in ALL if name not in kept)
     faults = tuple(fault.told for fault in sound.faults)
     return replace(_answer(choice, progress), refused=refused, left_out=left_out, faults=faults)
 
 
-def _gate(point: Point) -> dict[str, float]:
-    """Return kinds of motion whose rms residual over noise exceeds GATE times the kinds' median, with that ratio.
+def _gate(point: Point, least: int) -> dict[str, float]:
+    """Return the kind of motion whose rms residual over noise exceeds GATE times the kinds' median, with that ratio.
 
-    Figures are rms over the joints' noise; nothing is refused where it would leave fewer than half of the motions.
+    The worst one, if any; figures are rms over the joints' noise. More than ``least`` motions must remain.
     """
     if parts(point.model.log) > 1:  # what one motion leaves has no others to be compared with
         return {}
@@ -94,9 +96,9 @@ def _gate(point: Point) -> dict[str, float]:
     for j, (one, noise) in enumerate(zip(point.rows, point.noise, strict=True)):
         each[:, j] = mean_squares(one.residual / noise, one.motion, len(kinds))
     square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
-    usual = float(np.median(list(square.values())))
-    far = {kind: float(np.sqrt(value / usual)) for kind, value in square.items() if value > settings.GATE**2 * usual}
-    return far if 2 * np.isin(kinds, list(far)).sum() < len(kinds) else {}
+    usual, worst = float(np.median(list(square.values()))), max(square, key=square.__getitem__)
+    far, remain = square[worst] > settings.GATE**2 * usual, int((kinds != worst).sum())
+    return {worst: float(np.sqrt(square[worst] / usual))} if far and remain > least else {}
 
 
 def _folds(choice: Choice, progress: Callable[[str], None]) -> list[Array]:

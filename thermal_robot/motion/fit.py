@@ -286,6 +286,14 @@ def mean_squares(residual: Array, motion: NDArray[np.int64], count: int) -> Arra
     return np.bincount(motion, residual**2, count) / np.maximum(np.bincount(motion, minlength=count), 1)
 
 
+def mean_log(squares: Array, noise: float) -> float:
+    """Mean over motions of the logarithm of rms residuals: minus log likelihood a reading, each motion's noise its own.
+
+    ``squares`` (M,) are mean squares by motion; no motion is more exact than the readings' ``noise``.
+    """
+    return 0.5 * float(np.log(np.maximum(squares, 0.0) + noise**2).mean())
+
+
 def ratios(point: Point) -> Array:
     """(P,) variance of each score clustered by motion over that of independent rows; at least 1 and the joint's median.
 

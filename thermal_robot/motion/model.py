@@ -164,6 +164,11 @@ class JointModel(ABC):
     def noise(self, joint: int) -> float:
         """Return the standard deviation of the readings of a joint."""
 
+    @cached_property
+    def noises(self) -> Array:
+        """(J,) standard deviation of the readings of each joint."""
+        return np.array([self.noise(joint) for joint in self.joints])
+
     @abstractmethod
     def readings(self, joint: int) -> dict[str, Array]:
         """(N,) time, s, command and what was measured, and position, velocity and load there, of a joint, by name."""
@@ -171,6 +176,11 @@ class JointModel(ABC):
     def motion_of(self, joint: int) -> NDArray[np.int64]:
         """(N,) index of the cluster of each reading of a joint."""
         return self.cluster_of(self.motions[joint])
+
+    @cached_property
+    def counts(self) -> list[NDArray[np.int64]]:
+        """Number of each joint's readings in every cluster (M,)."""
+        return [np.bincount(self.motion_of(j), minlength=self.clusters) for j in self.joints]
 
     def quantities(self, joint: int) -> dict[str, Array]:
         """(N,) position, velocity, load and time by name, on which the residual of a joint may depend."""
@@ -266,7 +276,7 @@ class ServoModel(JointModel):
         self.step = float(np.median(np.concatenate([np.diff(m.position.time) for m in motions])))
         if self.coupled:
             self.step /= max(1, int(np.ceil(self.step / settings.STEP)))
-        self.substeps = max(1, int(np.ceil(self.step / settings.STEP)))
+        self.substeps = 1 if self.coupled else max(1, int(np.ceil(self.step / settings.STEP_ALONE)))
         counts = [int(np.ceil((m.position.time[-1] - m.position.time[0]) / self.step - 1e-9)) + 1 for m in motions]
         self.begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.first = np.array([m.position.time[0] for m in motions])
@@ -353,9 +363,14 @@ class ServoModel(JointModel):
             values[self.index("speed_limit", joint)] = 1.0 / self._fastest[0, joint]
             values[self.index("acceleration_limit", joint)] = 1.0 / self._fastest[1, joint]
         if (p := self.index("contact")) is not None:
-            height = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
-            values[p] = max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
+            values[p] = self._raised
         return values
+
+    @cached_property
+    def _raised(self) -> float:
+        """Height, m, above its lowest command to which the tool comes down."""
+        height = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
+        return max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
 
     @cached_property
     def _limits(self) -> Array:
@@ -540,7 +555,7 @@ class ServoModel(JointModel):
             moved, self.about = np.sqrt(np.mean((about - self.about) ** 2, axis=0)), about
             self.loads = self._loads()
             self._press(values)
-            if (moved < [self.noise(joint) for joint in self.joints]).all():
+            if (moved < self.noises).all():
                 break
 
     def _loads(self) -> Loads:
@@ -564,12 +579,13 @@ class ServoModel(JointModel):
         self.given = np.zeros((5, *q.shape)) if self.coupled else np.zeros((5, *q.shape[::-1])).transpose(0, 2, 1)
         self.given[:2] = self.loads.torque
         self.loads = replace(self.loads, torque=self.given[:2])  # of a long log one copy is large
-        if p is None or (values[p] <= 0.0 and not self.held):
+        if p is None:
             return
         if self.held:
             self.heights, self.given[2] = self._heights(q), self._up @ self._tool(q)
             return
-        self.touching, self.rubbing = values[p].item(), values[self.keys.index(RUBBING)].item()
+        # of a tool that touches nothing it tells what a plane would do where it is looked for
+        self.touching, self.rubbing = values[p].item() or self._raised, values[self.keys.index(RUBBING)].item()
         deep = self.lowest + self.touching - self._heights(q)
         at = np.flatnonzero(deep > 0.0)
         first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)

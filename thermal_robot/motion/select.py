@@ -12,19 +12,21 @@ from scipy.special import softmax
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import total_probability
-from thermal_robot.inference.explain import log_odds
-from thermal_robot.inference.search import Search
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, deflated, fit, fitted, mean_squares
+from thermal_robot.motion.fit import Groups, Point, fit, mean_log, mean_squares
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
-PLAIN = (*SIMULATOR, "zero", "lag", "droop", "coulomb", "load_friction", "payload", "masses", "offset", "viscous")
+_COMMON = "zero lag droop coulomb load_friction payload masses offset viscous contact".split()
+PLAIN = (*SIMULATOR, *_COMMON)
 """Effects from which a fit starts: what every servo has, and little that does the same."""
 
 PROFILE = ("speed_limit", "acceleration_limit")
 """Limits of the profile along which a servo leads its set point."""
+
+
+Proposed = tuple[Mask, tuple[Array, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,96 +75,104 @@ class Choice:
         return [one[0] for one in added if len(one) == 1]
 
 
-def without(active: Mask, block: int) -> Mask:
-    """(P,) mask of the parameters without one."""
-    return np.asarray(active & (np.arange(len(active)) != block))
+def without(active: Mask, block: int | Sequence[int]) -> Mask:
+    """(P,) mask of the parameters without one, or some."""
+    return np.asarray(active & ~np.isin(np.arange(len(active)), block))
 
 
-def everything(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Point:
-    """Fit all allowed effects by maximum a posteriori, recomputing the loads before each of REFRESHES rounds.
+def plain(model: JointModel, allowed: Mask) -> Array:
+    """Fit plain servos by maximum a posteriori: (P,) values; the loads are recomputed before each of REFRESHES rounds.
 
-    From fits of plain servos with torque limits at the largest errors and of the expected size, and with speed limits,
-    the best of each group of joints; effects that are abrupt start where the joints end.
+    From fits with torque limits and with limits of a profile the best of each group of joints.
     """
-    begun = np.where(allowed, model.start(), 0.0)
-    # of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit
-    limited, led = (model.of_effects((*PLAIN, *limits)) for limits in (("torque_limit",), PROFILE))
-    sized = np.where(model.of_effects(("torque_limit",)), model.sizes, begun)
-    fits = [fit(model, first, allowed & own) for first, own in ((begun, limited), (sized, limited), (begun, led))]
+    begun = _scanned(model, np.where(allowed, model.start(), 0.0), allowed & model.of_effects(("torque_limit",)))
+    starts = [(begun, allowed & model.of_effects((*PLAIN, *limits))) for limits in (("torque_limit",), PROFILE)]
+    fits = [fit(model, *start) for start in starts]
     left = np.stack([_of_motions(model, values) for values in fits])
-    values = fits[int(left.sum(axis=1).argmin())].copy()
+    best = np.full(len(begun), left.sum(axis=1).argmin())
     for group in model.groups:
-        own = np.isin(model.placed, group)
-        values[own] = fits[int(left[:, list(group)].sum(axis=1).argmin())][own]
-    # of what does nothing until it is reached a slope at zero tells nothing
-    values = np.where(allowed & (values == 0.0) & model.of_effects(ABRUPT), begun, values)
-    for number in range(1, settings.REFRESHES + 1):
-        progress(f"all effects of the servos, round {number}")
+        best[np.isin(model.placed, group)] = left[:, list(group)].sum(axis=1).argmin()
+    values, active = np.array(fits), np.array([own for _, own in starts])
+    values, active = (one[best, np.arange(len(best))] for one in (values, active))
+    for _ in range(settings.REFRESHES):  # what was at zero with other loads may not be there with these
         model.refreshed(values)
-        point = fitted(model, values, allowed)
-        values = point.values
-    return point
+        values = fit(model, values, active)
+    return values
+
+
+def _scanned(model: JointModel, values: Array, wanted: Mask) -> Array:
+    """Grid search: start a parameter of each joint where it leaves least, of SCAN times its expected size, or stay.
+
+    Of a servo that saturates, a softer one that does not is a local minimum, where nothing tells a limit.
+    """
+    sets = np.stack([values, *(np.where(wanted, times * model.sizes, values) for times in settings.SCAN)])
+    left = model.by_joint(lambda group: [(one**2).sum(axis=1) for one in model.residuals(group, sets)])
+    best = np.array([one.argmin() for one in left])
+    return np.where(wanted, sets[best[np.maximum(model.placed, 0)], np.arange(len(values))], values)
 
 
 def _of_motions(model: JointModel, values: Array) -> Array:
-    """(J,) mean over motions of the logarithm of what is left: each has its own noise, so that none alone decides."""
+    """(J,) mean over motions of the logarithm of what is left in each joint."""
     squares = (
         mean_squares(one, model.motion_of(j), model.clusters) for j, one in enumerate(model.all_residuals(values))
     )
-    return np.array([0.5 * np.log(one + model.noise(j) ** 2).mean() for j, one in enumerate(squares)])
+    return np.array([mean_log(one, model.noises[j]) for j, one in enumerate(squares)])
 
 
 def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Weighed:
-    """Search effects by evidence at the fit of all, then at the fit of what was chosen; each search is linear."""
-    point = everything(model, allowed, progress)
-    scales, found = Scales.of(point), list[Weighed]()
-    for number in range(1, settings.SELECTIONS + 1):
-        progress(f"which effects, round {number}")
-        if found:
-            point = Point.at(model, found[-1].point.values)
-        first = found[-1].own.tolist() if found else []
-        known = np.isin(np.arange(len(allowed)), _search(point, scales, allowed).run(first).blocks)
-        if found and (known == found[-1].active).all():
+    """Forward selection: to the fit of plain servos, add one effect of each group of joints at a time.
+
+    While the evidence is better by nine to one, and motions held out are better, too.
+    """
+    progress("plain servos")
+    values = plain(model, allowed)
+    scales = Scales.of(Point.at(model, values))
+    own = scales.fitted(values != 0.0, values)
+    for number in range(1, settings.MOVES + 1):
+        progress(f"effects added, round {number}")
+        better = _better(own, scales.others(own, _more(scales, own, allowed), own.log_evidence - settings.FAR_BELOW))
+        if not better:
             break
-        values = fit(model, point.values, known)
-        model.refreshed(values)
-        found.append(scales.fitted(known, values))
-    # a search that left the neighbourhood of its point may have chosen worse than the round before
-    return min(found, key=lambda one: one.loss)
-
-
-def _search(point: Point, scales: Scales, allowed: Mask) -> Search:
-    """Return the search among parameters by the evidence of the problem that is linear at a point."""
-    barred = frozenset(np.flatnonzero(~allowed).tolist())
-    return Search(deflated(point, scales.deflation, scales.worth), [log_odds()] * len(allowed), out=barred)
+        own = _together(scales, own, better)
+    return scales.fitted(own.active, own.point.values)
 
 
 def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Choice:
     """Drop, exchange and add parameters, one at a time in each group, until no set beside the choice is better.
 
-    A parameter goes at odds below nine to one, where motions held out are no worse without it, or if nobody could see
-    it; another comes in its place, or beside it, where the evidence is better, by nine to one of one more.
+    A parameter goes at odds below nine to one, or if nobody could see it; another comes in its place, or beside it,
+    where motions held out and the evidence are better, by nine to one of one more.
     """
-    scales = own.scales
+    scales, shared, held = own.scales, own.scales.model.placed == SHARED, None
     for number in range(1, settings.MOVES + 1):
         progress(f"sets of effects fitted, round {number}")
-        if number == 1 or len(scales.model.groups) == 1:  # a weight alone hardly changes with a joint's parameters
+        if own.active[shared].tobytes() != held or len(scales.model.groups) == 1:  # loads change little with the rest
             scales.model.refreshed(own.point.values)
             scales.forget()
-            own = scales.fitted(own.active, own.point.values)
+            own, held = scales.fitted(own.active, own.point.values), own.active[shared].tobytes()
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
-        rivals = _rivals(scales, own, allowed)
-        better = [one for one in rivals if _gain(own, one) > 0.0 and one.seen[one.active & ~own.active].all()]
+        rivals = scales.others(own, _more(scales, own, allowed), own.log_evidence - settings.FAR_BELOW)
+        if not (better := _better(own, rivals)):  # what the linear problem held to be needed may not be
+            better = [one for one in _drops(scales, own) if one.log_evidence > own.log_evidence - np.log(settings.ODDS)]
+        if not better:
+            rivals += scales.others(own, _exchanged(scales, own, allowed), own.log_evidence - settings.FAR_BELOW)
+            better = _better(own, rivals)
         if not better or number == settings.MOVES:
             break
-        own = _together(scales, own, sorted(better, key=lambda one: -_gain(own, one)))
+        own = _together(scales, own, better)
     # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
     least = own.log_evidence - settings.FAR_BELOW
     near = [one for one in rivals if least < one.log_evidence and one.loss < own.loss + settings.ALIKE]
     near = [one for one in near if _gain(own, one) <= 0.0 and one.seen[one.own].all()]
     whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
     return Choice(whole, (*_drops(scales, own), *near))
+
+
+def _better(own: Weighed, every: Sequence[Weighed]) -> list[Weighed]:
+    """Return those of some sets that are better than one, the best first, and whose new effects somebody could see."""
+    better = [one for one in every if _gain(own, one) > 0.0 and one.seen[one.active & ~own.active].all()]
+    return sorted(better, key=lambda one: -_gain(own, one))
 
 
 def _gain(own: Weighed, one: Weighed) -> float:
@@ -181,27 +191,33 @@ def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
 
 
 def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
-    """Backward elimination: return the set without a parameter that is not needed, of each group of joints, if any.
+    """Backward elimination: return the set without what is not needed in each group of joints, if there is any.
 
-    The linear problem tells the order; what joints share comes last, as then all are fitted anew. Motions held out
-    decide once the evidence has: with parameters to spare, what the linear problem says of them scatters.
+    The linear problem tells the order, and of which several at once it promises so; what joints share comes last, as
+    then all are fitted anew.
     """
-    ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
-    order, placed = sorted(ahead, key=lambda b: -ahead[b].log_evidence), scales.model.placed
-    queues = [[b for b in order if placed[b] in group] for group in scales.model.groups]
-    turns = [[b for b in turn if b is not None] for turn in zip_longest(*queues)]
-    doubtful = list[Weighed]()
-    for turn in (*turns, *([b] for b in order if placed[b] == SHARED)):
+    placed, least = scales.model.placed, own.log_evidence - np.log(settings.ODDS)
+    ahead = {b: own.ahead(without(own.active, b)).log_evidence for b in own.own.tolist()}
+    hopeless = own.log_evidence - settings.HOPELESS
+    order = [b for b in sorted(ahead, key=lambda b: -ahead[b]) if ahead[b] > hopeless or not own.seen[b]]
+
+    def queue(joints: Sequence[int]) -> list[list[int]]:
+        every = [b for b in order if placed[b] in joints]
+        many = [every[:n] for n in settings.AT_ONCE if n <= len(every) and SHARED not in joints]
+        many = [some for some in many if own.ahead(without(own.active, some)).log_evidence > least]
+        return many + [[b] for b in every]
+
+    turns = zip_longest(*(queue(group) for group in scales.model.groups))
+    for turn in (*turns, *([drop] for drop in queue((SHARED,)))):
         found = list[Weighed]()
-        for seen, least in ((True, own.log_evidence - settings.FAR_BELOW), (False, -np.inf)):
-            some = [b for b in turn if own.seen[b] == seen]
-            sets = [(ahead[b].active, (own.point.values, ahead[b].point.values)) for b in some]
-            each = scales.others(own, sets, least)
-            found += [one for one in each if not seen or one.log_evidence > own.log_evidence - np.log(settings.ODDS)]
-            doubtful += [one for one in each if one.loss <= own.loss]
+        for hidden, far in ((False, own.log_evidence - settings.FAR_BELOW), (True, -np.inf)):
+            drops = [drop for drop in turn if drop and own.seen[drop].any() != hidden]
+            rests = [without(own.active, drop) for drop in drops]
+            sets = [(rest, (own.point.values, own.ahead(rest).point.values)) for rest in rests]
+            found += [one for one in scales.others(own, sets, far) if hidden or one.log_evidence > least]
         if found:
             return _together(scales, own, found)
-    return _together(scales, own, doubtful) if doubtful else None
+    return None
 
 
 def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weighed:
@@ -217,27 +233,49 @@ def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weigh
     return scales.others(own, [(active, (own.point.values,))])[0]
 
 
-def _rivals(scales: Scales, own: Weighed, allowed: Mask) -> list[Weighed]:
-    """Weigh the sets with one parameter exchanged, or one more, that the linear problem finds likeliest.
+def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
+    """Propose sets with one parameter exchanged for another one of the same joint.
 
-    Of each parameter of the choice so many, of each joint so many more; what may come in the place of a parameter tells
-    the problem that is linear at the fit without it, and not where another effect stands in for it.
+    What may come in the place of a parameter tells the problem that is linear at the fit without it, and not where
+    another effect stands in for it.
     """
-    model, joint = scales.model, scales.model.placed
-    start, places, sets = model.start(), np.arange(len(allowed)), list[tuple[Mask, tuple[Array, ...]]]()
-
-    def propose(rest: Weighed, among: Sequence[Mask], groups: Groups = model.groups) -> None:
-        base = scales.linearised(rest, allowed & np.any(among, axis=0), groups)
-        for added in among:
-            told = [base.ahead(rest.active | (places == k)) for k in places[allowed & ~own.active & added]]
-            for one in sorted(told, key=lambda one: -one.log_evidence)[: settings.RIVALS]:
-                begun = np.where(rest.active, rest.point.values, np.where(one.active, start, 0.0))
-                sets.append((one.active, (begun, one.point.values)))
-
+    model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
+    free, abrupt, least = allowed & ~own.active, model.of_effects(ABRUPT), own.log_evidence - settings.FAR_BELOW
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
     for b, rest in zip(own.own.tolist(), _drops(scales, own), strict=True):
         alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
-        propose(rest, [alike], [group for group in model.groups if joint[b] in (*group, SHARED)])
-    propose(own, [joint == j for j in (*model.joints, SHARED)])
-    return scales.others(own, sets, own.log_evidence - settings.FAR_BELOW)
+        groups = [group for group in model.groups if joint[b] in (*group, SHARED)]
+        sets += _added(scales, rest, [free & alike], groups, abrupt & abrupt[b], least)
+    return sets
+
+
+def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
+    """Propose sets with one parameter more, of each joint and of what all share; all that are abrupt."""
+    model, free = scales.model, allowed & ~own.active
+    among = [free & (model.placed == j) for j in (*model.joints, SHARED)]
+    return _added(scales, own, among, model.groups, model.of_effects(ABRUPT), -np.inf)
+
+
+def _added(
+    scales: Scales, rest: Weighed, among: Sequence[Mask], groups: Groups, always: Mask, least: float
+) -> list[Proposed]:
+    """Propose sets with one parameter more of each mask ``among``, and start values of their fits.
+
+    The RIVALS likeliest by the problem that is linear at a fit, if no less than ``least``, and those of which it tells
+    nothing, ``always`` (P,).
+    """
+    places, start, sets = np.arange(len(rest.active)), scales.model.start(), list[Proposed]()
+    base = scales.linearised(rest, np.any(among, axis=0), groups)
+    for added in among:
+        told = [base.ahead(rest.active | (places == k)) for k in places[added]]
+        told.sort(key=lambda one: -one.log_evidence)
+        told = [
+            one
+            for number, one in enumerate(told)
+            if (number < settings.RIVALS and one.log_evidence >= least) or (always & one.active & ~rest.active).any()
+        ]
+        for one in told:
+            begun = np.where(rest.active, rest.point.values, np.where(one.active, start, 0.0))
+            sets.append((one.active, (begun, one.point.values)))
+    return sets

@@ -68,6 +68,10 @@ TORQUE_LIMIT = 3.0
 """N·m: of a servo of which nobody states it, that of a hobby servo's data sheet."""
 STEP = 4e-3
 """s: longest time step, a tenth of the shortest lag that is found."""
+STEP_ALONE = 5.5e-3
+"""s: longest time step of joints that go their own ways, whose servos nobody states: a tenth of a hobby servo's lag. Of
+an SO-101 paths then err by 0.8 to 1.6 mrad rms, and in steps of 4 ms by as much but a seventh; 4 to 8 stay unexplained.
+"""
 DIFFERENCE = 0.05
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint."""
 CLUSTERS = 8
@@ -97,19 +101,25 @@ PLANE_FRICTION = 0.3
 """Expected coefficient of friction of a tool on a table: plastics and rubber on wood and metal have 0.2 to 0.5."""
 FEW = 0.999
 """Quantile of the tracking error from which a saturation is looked for."""
+SCAN = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""Times the expected size at which a torque limit is looked for first: from 0.8 rad of error to 25 mrad."""
 REFRESHES = 2
 """Times that loads are taken anew where the joints go, and all effects fitted: a third moves a residual by 1 %."""
-SELECTIONS = 2
-"""Choices among all effects: at the fit of all, then at the exact fit of what was chosen."""
 ODDS = 9.0
 """Against nothing in its place, from which an effect is kept: nine to one, as for poses."""
+AT_ONCE = (32, 16, 8, 4, 2)
+"""Parameters of a group of joints that elimination drops at once, if linear problem and evidence agree: plain servos
+have twice as many as are needed."""
 RIVALS = 2
 """Effects that are fitted in the place of each that is chosen, and beside those of each joint: the likeliest of the
 linear problem, which orders what is near and not what is far."""
-MOVES = 6
+MOVES = 12
 """Exchanges and additions at most among exact fits, each of which betters the evidence."""
 FAR_BELOW = 20.0
 """Log evidence below the choice's from which a set is no rival: all of them together weigh less than a millionth."""
+HOPELESS = 100.0
+"""Log evidence below the choice's from which on a set that the linear problem predicts is not fitted at all: five times
+what makes it no rival."""
 ALIKE = 2.2
 """Log evidence, nine to one, within which another effect may stand in the place of a chosen one."""
 GATE = 3.0

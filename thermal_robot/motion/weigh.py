@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, deflated, fitted, ratios, worth
+from thermal_robot.motion.fit import Groups, Point, deflated, fitted, mean_log, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 
 
@@ -59,8 +59,8 @@ class Scales:
         """Weigh sets of parameters near one; only groups of joints whose parameters are others are fitted anew.
 
         A fit starts from the best of the set's starting values. It is left off where the problem that is linear there,
-        and again a step ahead, promises a log evidence below ``least`` and motions held out no gain, unless the second
-        one makes up for half of what the first lacks.
+        and again a step ahead, promises a log evidence below ``least``, unless the second one makes up for half of what
+        the first lacks.
         """
         missing = dict[tuple[bytes, ...], tuple[Groups, Mask, tuple[Array, ...]]]()
         for active, values in sets:
@@ -76,7 +76,7 @@ class Scales:
                 self.far[key] = Point.at(self.model, begun, active, groups).ahead(active)
                 told = self._placed(base, np.where(within, active, base.active))
                 there = np.where(within, self.far[key].values, begun)
-                if told.log_evidence >= least or told.loss <= base.loss:
+                if told.log_evidence >= least:
                     begun = there
                     break
                 if not told.log_evidence - before >= least - told.log_evidence:
@@ -195,19 +195,32 @@ class Weighed:
         return own, matrix[:, :, own[:, None], own], vector[:, :, own] - moved, left
 
     @cached_property
-    def left_out(self) -> Array:
-        """(J,) linearised leave-one-motion-out cross-validation: sum of squared residuals, rad²."""
+    def _left_out(self) -> Array:
+        """(J, M) linearised leave-one-motion-out cross-validation: sums of squared residuals by motion, rad²."""
         own, whole, along, left = self._smooth
         if len(own):
             found = deleted(whole.sum(axis=0), along.sum(axis=0), self.point.model.sizes[own])
             fitted = np.einsum("mp,jmpq,mq->jm", found, whole, found, optimize=True)
             left = left + fitted - 2.0 * (found * along).sum(axis=2)
-        return np.asarray(left.sum(axis=1) * self.point.noise**2)
+        return np.asarray(left * self.point.noise[:, None] ** 2)
 
     @property
+    def left_out(self) -> Array:
+        """(J,) linearised leave-one-motion-out cross-validation: sum of squared residuals, rad²."""
+        return np.asarray(self._left_out.sum(axis=1))
+
+    @cached_property
     def loss(self) -> float:
-        """Negative log likelihood of motions held out, of as many independent readings as all are worth."""
-        return float(0.5 * self.scales.worth @ np.log(np.maximum(self.left_out, 1e-300)))
+        """Negative log likelihood of motions held out, each with its own noise, of as many readings as all are worth.
+
+        With one noise for all the motion that a model explains least would decide alone.
+        """
+        model = self.point.model
+        each = [
+            mean_log(one / np.maximum(count, 1), noise)
+            for one, count, noise in zip(self._left_out, model.counts, model.noises, strict=True)
+        ]
+        return float(self.scales.worth @ each)
 
     @cached_property
     def seen(self) -> Mask:
@@ -216,7 +229,7 @@ class Weighed:
         What is of a simulator, and not told of the robot, need not.
         """
         model, log = self.point.model, self.point.model.log
-        least = np.array([log.visible_from(log.joints[joint], model.noise(joint)) for joint in model.joints])
+        least = np.array([log.visible_from(log.joints[joint], model.noises[joint]) for joint in model.joints])
         found = np.zeros(len(self.active), dtype=bool)
         found[self.own] = model.of_effects(SIMULATOR)[self.own] | (
             model.moved(self.point.values, self.own) >= least
