@@ -240,13 +240,13 @@ def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     another effect stands in for it.
     """
     model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
-    free, abrupt, least = allowed & ~own.active, model.of_effects(ABRUPT), own.log_evidence - settings.FAR_BELOW
+    free, abrupt, least = allowed & ~own.active, model.of_effects(ABRUPT), own.log_evidence - settings.ALIKE
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
     for b, rest in zip(own.own.tolist(), _drops(scales, own), strict=True):
         alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
         groups = [group for group in model.groups if joint[b] in (*group, SHARED)]
-        sets += _added(scales, rest, [free & alike], groups, abrupt & abrupt[b], least)
+        sets += _added(scales, rest, [free & alike], groups, abrupt & abrupt[b] & (joint == joint[b]), least)
     return sets
 
 
