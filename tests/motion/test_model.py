@@ -1,6 +1,7 @@
 """The servo model of a log, its fit and its evidence: derivatives, recovery, and what counts as independent."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ pytest.importorskip("mujoco", reason="worlds are simulated by MuJoCo")
 
 from thermal_robot.blind.motions.fault import Fault
 from thermal_robot.blind.motions.world import draw_world
-from thermal_robot.motion.diagnose import diagnose_motion
+from thermal_robot.motion.diagnose import _gate, diagnose_motion
 from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
@@ -306,6 +307,20 @@ def test_what_is_asked_of_a_choice_changes_no_probability():
         assert choice.own.log_evidence > choice.fewer(p).log_evidence + np.log(9.0)
     assert [choice.probability(p) for p in range(len(names))] == told
     assert "dead_zone" not in rivals
+
+
+def test_the_gate_refuses_the_worst_kind_alone_and_leaves_more_than_so_many_motions():
+    """Of what a fit leaves in five kinds, by motion: 0.9 to 1.1 are usual, 5 and 9 are not."""
+    left = {"slow": 1.0, "fast": 1.1, "wide": 0.9, "chirp": 5.0, "steps": 9.0}
+    motions = [SimpleNamespace(name=f"{kind} {k}", kind=kind) for kind in left for k in range(3)]
+    index = np.repeat(np.arange(len(motions)), 50)
+    one = SimpleNamespace(residual=np.repeat(list(left.values()), 150), motion=index)
+    model = SimpleNamespace(log=SimpleNamespace(motions=motions))
+    point = SimpleNamespace(model=model, rows=[one], noise=np.array([2.0]))
+    refused = _gate(point, 11)
+    assert list(refused) == ["steps"]
+    assert refused["steps"] > 3.0
+    assert _gate(point, 12) == {}
 
 
 @pytest.mark.slow

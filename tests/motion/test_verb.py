@@ -29,7 +29,7 @@ def asked(monkeypatch):
     calls = []
 
     def answer(log, *, only, without, progress):
-        progress("all effects of the servos, round 1")
+        progress("plain servos")
         calls.append((log, only, without))
         return replace(found(), log=log, summary="", advice="")
 
@@ -50,7 +50,7 @@ def test_a_log_a_file_and_its_folder_are_diagnosed_alike(folder, asked):
 def test_the_stages_are_told(folder, asked):
     stages = []
     tr.diagnose(folder, progress=stages.append)
-    assert stages == ["reading the log", "all effects of the servos, round 1"]
+    assert stages == ["reading the log", "plain servos"]
 
 
 def test_a_campaign_is_read_as_before(tmp_path):

@@ -145,7 +145,7 @@ class JointModel(ABC):
         return Parameter("payload", SHARED, "mass", "kg", size, 1.0, -np.inf, "payload")
 
     def start(self) -> Array:
-        """(P,) starting values of the fit of all effects; zero by default, as for a nearly linear problem."""
+        """(P,) starting values of fits; zero by default, as for a nearly linear problem."""
         return np.zeros(len(self.parameters))
 
     @abstractmethod

@@ -186,8 +186,12 @@ def _gain(own: Weighed, one: Weighed) -> float:
 
 def _drops(scales: Scales, own: Weighed) -> list[Weighed]:
     """Weigh the set without each of its parameters."""
-    ahead = [own.ahead(without(own.active, b)) for b in own.own.tolist()]
-    return scales.others(own, [(one.active, (own.point.values, one.point.values)) for one in ahead])
+    return _refitted(scales, own, [own.ahead(without(own.active, b)) for b in own.own.tolist()], -np.inf)
+
+
+def _refitted(scales: Scales, own: Weighed, ahead: Sequence[Weighed], least: float) -> list[Weighed]:
+    """Weigh at their own fits sets that the linear problem predicts, begun at its fit or where it predicts theirs."""
+    return scales.others(own, [(one.active, (own.point.values, one.point.values)) for one in ahead], least)
 
 
 def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
@@ -197,24 +201,22 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     then all are fitted anew.
     """
     placed, least = scales.model.placed, own.log_evidence - np.log(settings.ODDS)
-    ahead = {b: own.ahead(without(own.active, b)).log_evidence for b in own.own.tolist()}
-    hopeless = own.log_evidence - settings.HOPELESS
-    order = [b for b in sorted(ahead, key=lambda b: -ahead[b]) if ahead[b] > hopeless or not own.seen[b]]
+    ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
+    order, hopeless = sorted(ahead, key=lambda b: -ahead[b].log_evidence), own.log_evidence - settings.HOPELESS
+    order = [b for b in order if ahead[b].log_evidence > hopeless or not own.seen[b]]
 
-    def queue(joints: Sequence[int]) -> list[list[int]]:
+    def queue(joints: Sequence[int]) -> list[Weighed]:
         every = [b for b in order if placed[b] in joints]
-        many = [every[:n] for n in settings.AT_ONCE if n <= len(every) and SHARED not in joints]
-        many = [some for some in many if own.ahead(without(own.active, some)).log_evidence > least]
-        return many + [[b] for b in every]
+        sizes = [n for n in settings.AT_ONCE if n <= len(every) and SHARED not in joints]
+        many = [own.ahead(without(own.active, every[:n])) for n in sizes]
+        return [one for one in many if one.log_evidence > least] + [ahead[b] for b in every]
 
     turns = zip_longest(*(queue(group) for group in scales.model.groups))
-    for turn in (*turns, *([drop] for drop in queue((SHARED,)))):
-        found = list[Weighed]()
+    for turn in (*turns, *([one] for one in queue((SHARED,)))):
+        tried, found = [one for one in turn if one is not None], list[Weighed]()
         for hidden, far in ((False, own.log_evidence - settings.FAR_BELOW), (True, -np.inf)):
-            drops = [drop for drop in turn if drop and own.seen[drop].any() != hidden]
-            rests = [without(own.active, drop) for drop in drops]
-            sets = [(rest, (own.point.values, own.ahead(rest).point.values)) for rest in rests]
-            found += [one for one in scales.others(own, sets, far) if hidden or one.log_evidence > least]
+            some = [one for one in tried if own.seen[own.active & ~one.active].any() != hidden]
+            found += [one for one in _refitted(scales, own, some, far) if hidden or one.log_evidence > least]
         if found:
             return _together(scales, own, found)
     return None

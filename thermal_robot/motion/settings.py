@@ -104,12 +104,12 @@ FEW = 0.999
 SCAN = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Times the expected size at which a torque limit is looked for first: from 0.8 rad of error to 25 mrad."""
 REFRESHES = 2
-"""Times that loads are taken anew where the joints go, and all effects fitted: a third moves a residual by 1 %."""
+"""Times that loads are taken anew where the joints go, and plain servos fitted: a third moves a residual by 1 %."""
 ODDS = 9.0
 """Against nothing in its place, from which an effect is kept: nine to one, as for poses."""
 AT_ONCE = (32, 16, 8, 4, 2)
 """Parameters of a group of joints that elimination drops at once, if linear problem and evidence agree: plain servos
-have twice as many as are needed."""
+of seven joints that move each other have about fifty."""
 RIVALS = 2
 """Effects that are fitted in the place of each that is chosen, and beside those of each joint: the likeliest of the
 linear problem, which orders what is near and not what is far."""

@@ -45,7 +45,7 @@ class Scales:
 
     @classmethod
     def of(cls, point: Point) -> Scales:
-        """Take the scales at a fit of all parameters."""
+        """Take the scales at a fit that is linearised by all parameters."""
         deflation = ratios(point)
         return cls(point.model, deflation, worth(point, deflation))
 
