@@ -87,7 +87,8 @@ def diagnose_motion(
 def _gate(point: Point, least: int) -> dict[str, float]:
     """Return the kind of motion whose rms residual over noise exceeds GATE times the kinds' median, with that ratio.
 
-    The worst one, if any; figures are rms over the joints' noise. More than ``least`` motions must remain.
+    The worst one, if any; figures are rms of all joints, each over its noise: of a joint that most motions hardly move
+    those that do leave more. More than ``least`` motions must remain.
     """
     if parts(point.model.log) > 1:  # what one motion leaves has no others to be compared with
         return {}
@@ -95,7 +96,7 @@ def _gate(point: Point, least: int) -> dict[str, float]:
     each = np.zeros((len(kinds), len(point.rows)))
     for j, (one, noise) in enumerate(zip(point.rows, point.noise, strict=True)):
         each[:, j] = mean_squares(one.residual / noise, one.motion, len(kinds))
-    square = {kind: float(each[kinds == kind].max(axis=1).mean()) for kind in dict.fromkeys(kinds.tolist())}
+    square = {kind: float(each[kinds == kind].mean()) for kind in dict.fromkeys(kinds.tolist())}
     usual, worst = float(np.median(list(square.values()))), max(square, key=square.__getitem__)
     far, remain = square[worst] > settings.GATE**2 * usual, int((kinds != worst).sum())
     return {worst: float(np.sqrt(square[worst] / usual))} if far and remain > least else {}
