@@ -129,8 +129,9 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     assert (ratio >= 1.0).all()
     assert ratio.max() > 1.5  # rounded readings of a slow joint err together
     readings = worth(point, ratio)
-    gram = deflated(point, ratio, readings)
-    white = deflated(point, np.ones(len(ratio)), readings)
+    every = np.arange(len(ratio))
+    gram = deflated(point, every, ratio, readings)
+    white = deflated(point, every, np.ones(len(ratio)), readings)
     np.testing.assert_allclose(np.diag(gram.matrix) * ratio, np.diag(white.matrix), rtol=1e-9)
     found = np.linalg.lstsq(white.matrix, white.vector, rcond=1e-13)[0]
     near = 1e-3 * np.abs(gram.vector).max()

@@ -318,27 +318,26 @@ def worth(point: Point, deflation: Array) -> Array:
     return np.array([len(one.residual) / float(np.median(deflation[one.columns])) for one in point.rows])
 
 
-def deflated(point: Point, deflation: Array, worth: Array) -> Gram:
+def deflated(point: Point, own: NDArray[np.int64], deflation: Array, worth: Array) -> Gram:
     """Return normal equations in units of prior sizes, deflated to the independent information of the motions.
 
-    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays. Each parameter is a block.
+    G′ = S G S and b′ = G′ θ̂ with S the inverse root of the ratios, so that θ̂ stays, that of the parameters ``own`` (K,)
+    alone: what else the point is linearised by tells nothing of them. Each is a block.
     """
-    matrix, vector = point.whole
-    sizes, parameters = point.model.sizes, point.model.parameters
-    wide = np.diag((settings.WIDE * sizes) ** -2.0)
-    found = np.linalg.solve(matrix + wide, vector)
-    less = np.diag(sizes / np.sqrt(deflation))
+    matrix, vector = point.whole[0][np.ix_(own, own)], point.whole[1][own]
+    sizes, parameters = point.model.sizes[own], [point.model.parameters[p] for p in own]
+    found = np.linalg.solve(matrix + np.diag((settings.WIDE * sizes) ** -2.0), vector)
+    less = np.diag(sizes / np.sqrt(deflation[own]))
     whole = less @ matrix @ less
-    along = whole @ (found / sizes)
-    equations = float(worth.sum())
-    k = range(len(sizes))
+    along, equations = whole @ (found / sizes), float(worth.sum())
+    k = range(len(own))
     return Gram(
         whole,
         along,
         equations + float(found / sizes @ along),
         tuple(slice(i, i + 1) for i in k),
         tuple(np.eye(1) for _ in k),
-        point.model.least == 0.0,
+        point.model.least[own] == 0.0,
         tuple(int(whole[i, i] > settings.SEEN) for i in k),
         np.array([one.spread for one in parameters]),
         equations,

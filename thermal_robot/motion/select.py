@@ -14,7 +14,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, fit, mean_log, mean_squares
+from thermal_robot.motion.fit import Point, fit, mean_log, mean_squares
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed
 
@@ -68,9 +68,10 @@ class Choice:
         return self.own.scales.others(self.own, [(without(self.active, block), (self.point.values,))])[0]
 
     def alternatives(self, block: int) -> list[int]:
-        """Return parameters that could replace one: log evidence no more than ALIKE below the choice's."""
-        rest, least = without(self.active, block), self.own.log_evidence - settings.ALIKE
-        near = [one.active for one in self.rivals if one.log_evidence > least and not one.active[block]]
+        """Return parameters that could replace one: less likely by ODDS at most, by evidence or by motions held out."""
+        rest, least = without(self.active, block), self.own.log_evidence - np.log(settings.ODDS)
+        near = [one for one in self.rivals if not one.active[block]]
+        near = [one.active for one in near if one.log_evidence > least or _alike(self.own, one)]
         added = [np.flatnonzero(one & ~rest).tolist() for one in near if one[rest].all()]
         return [one[0] for one in added if len(one) == 1]
 
@@ -163,10 +164,15 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         own = _together(scales, own, better)
     # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
     least = own.log_evidence - settings.FAR_BELOW
-    near = [one for one in rivals if least < one.log_evidence and one.loss < own.loss + settings.ALIKE]
-    near = [one for one in near if _gain(own, one) <= 0.0 and one.seen[one.own].all()]
+    near = [one for one in rivals if one.log_evidence > least and _gain(own, one) <= 0.0 and one.seen[one.own].all()]
+    near = [one for one in near if one.log_evidence < own.log_evidence or _alike(own, one)]
     whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
     return Choice(whole, (*_drops(scales, own), *near))
+
+
+def _alike(own: Weighed, one: Weighed) -> bool:
+    """Tell whether motions held out are as likely by one set as by another, but for nine to one."""
+    return one.loss < own.loss + np.log(settings.ODDS)
 
 
 def _better(own: Weighed, every: Sequence[Weighed]) -> list[Weighed]:
@@ -202,7 +208,7 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     """
     placed, least = scales.model.placed, own.log_evidence - np.log(settings.ODDS)
     ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
-    order, hopeless = sorted(ahead, key=lambda b: -ahead[b].log_evidence), own.log_evidence - settings.HOPELESS
+    order, hopeless = sorted(ahead, key=lambda b: -ahead[b].log_evidence), own.log_evidence - settings.FAR_BELOW
     order = [b for b in order if ahead[b].log_evidence > hopeless or not own.seen[b]]
 
     def queue(joints: Sequence[int]) -> list[Weighed]:
@@ -236,19 +242,16 @@ def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weigh
 
 
 def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
-    """Propose sets with one parameter exchanged for another one of the same joint.
-
-    What may come in the place of a parameter tells the problem that is linear at the fit without it, and not where
-    another effect stands in for it.
-    """
+    """Propose sets with one parameter exchanged for another one of the same joint."""
     model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
-    free, abrupt, least = allowed & ~own.active, model.of_effects(ABRUPT), own.log_evidence - settings.ALIKE
+    free, abrupt = allowed & ~own.active, model.of_effects(ABRUPT)
+    base = scales.linearised(own, free, model.groups)
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
-    for b, rest in zip(own.own.tolist(), _drops(scales, own), strict=True):
+    for b in own.own.tolist():
         alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
-        groups = [group for group in model.groups if joint[b] in (*group, SHARED)]
-        sets += _added(scales, rest, [free & alike], groups, abrupt & abrupt[b] & (joint == joint[b]), least)
+        always = abrupt & abrupt[b] & (joint == joint[b])
+        sets += _added(base, without(own.active, b), [free & alike], always, own.log_evidence - settings.FAR_BELOW)
     return sets
 
 
@@ -256,28 +259,28 @@ def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     """Propose sets with one parameter more, of each joint and of what all share; all that are abrupt."""
     model, free = scales.model, allowed & ~own.active
     among = [free & (model.placed == j) for j in (*model.joints, SHARED)]
-    return _added(scales, own, among, model.groups, model.of_effects(ABRUPT), -np.inf)
+    base = scales.linearised(own, free, model.groups)
+    return _added(base, own.active, among, model.of_effects(ABRUPT))
 
 
 def _added(
-    scales: Scales, rest: Weighed, among: Sequence[Mask], groups: Groups, always: Mask, least: float
+    base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask, least: float = -np.inf
 ) -> list[Proposed]:
-    """Propose sets with one parameter more of each mask ``among``, and start values of their fits.
+    """Propose sets of parameters ``kept`` (P,) and one more of each mask ``among``, and start values of their fits.
 
-    The RIVALS likeliest by the problem that is linear at a fit, if no less than ``least``, and those of which it tells
-    nothing, ``always`` (P,).
+    The RIVALS likeliest by a linear problem ``base``, if no less than ``least``, and those of which it tells nothing,
+    ``always`` (P,).
     """
-    places, start, sets = np.arange(len(rest.active)), scales.model.start(), list[Proposed]()
-    base = scales.linearised(rest, np.any(among, axis=0), groups)
+    places, start, sets = np.arange(len(kept)), base.point.model.start(), list[Proposed]()
     for added in among:
-        told = [base.ahead(rest.active | (places == k)) for k in places[added]]
+        told = [base.ahead(kept | (places == k)) for k in places[added]]
         told.sort(key=lambda one: -one.log_evidence)
         told = [
             one
             for number, one in enumerate(told)
-            if (number < settings.RIVALS and one.log_evidence >= least) or (always & one.active & ~rest.active).any()
+            if (number < settings.RIVALS and one.log_evidence >= least) or (always & one.active & ~kept).any()
         ]
         for one in told:
-            begun = np.where(rest.active, rest.point.values, np.where(one.active, start, 0.0))
+            begun = np.where(kept, base.point.values, np.where(one.active, start, 0.0))
             sets.append((one.active, (begun, one.point.values)))
     return sets

@@ -116,12 +116,8 @@ linear problem, which orders what is near and not what is far."""
 MOVES = 12
 """Exchanges and additions at most among exact fits, each of which betters the evidence."""
 FAR_BELOW = 20.0
-"""Log evidence below the choice's from which a set is no rival: all of them together weigh less than a millionth."""
-HOPELESS = 100.0
-"""Log evidence below the choice's from which on a set that the linear problem predicts is not fitted at all: five times
-what makes it no rival."""
-ALIKE = 2.2
-"""Log evidence, nine to one, within which another effect may stand in the place of a chosen one."""
+"""Log evidence below the choice's from which a set is no rival, and not fitted if so predicted (linear problem): all of
+them together weigh less than a millionth."""
 GATE = 3.0
 """Times what the other kinds of motion leave: of a kind that leaves more, no verdict is given."""
 FOLDS = 5

@@ -169,8 +169,8 @@ class Weighed:
     @cached_property
     def _laplace(self) -> tuple[float, Array]:
         """Log marginal likelihood with prior odds, but for what whitening costs, and standard deviations (K,)."""
-        gram = deflated(self.point, self.scales.deflation, self.scales.worth)
-        found = evidence(gram, tuple(self.own.tolist()), log_odds() * len(self.own), None)
+        gram = deflated(self.point, self.own, self.scales.deflation, self.scales.worth)
+        found = evidence(gram, tuple(range(len(self.own))), log_odds() * len(self.own), None)
         _, covariance = gram.posterior(found)
         return found.log_evidence, self.point.model.sizes[self.own] * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
