@@ -263,9 +263,7 @@ def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     return _added(base, own.active, among, model.of_effects(ABRUPT))
 
 
-def _added(
-    base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask, least: float = -np.inf
-) -> list[Proposed]:
+def _added(base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask, least: float = -np.inf) -> list[Proposed]:
     """Propose sets of parameters ``kept`` (P,) and one more of each mask ``among``, and start values of their fits.
 
     The RIVALS likeliest by a linear problem ``base``, if no less than ``least``, and those of which it tells nothing,
