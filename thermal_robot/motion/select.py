@@ -70,8 +70,8 @@ class Choice:
     def alternatives(self, block: int) -> list[int]:
         """Return parameters that could replace one: less likely by ODDS at most, by evidence or by motions held out."""
         rest, least = without(self.active, block), self.own.log_evidence - np.log(settings.ODDS)
-        near = [one for one in self.rivals if not one.active[block]]
-        near = [one.active for one in near if one.log_evidence > least or _alike(self.own, one)]
+        other = [one for one in self.rivals if not one.active[block]]
+        near = [one.active for one in other if one.log_evidence > least or _alike(self.own, one)]
         added = [np.flatnonzero(one & ~rest).tolist() for one in near if one[rest].all()]
         return [one[0] for one in added if len(one) == 1]
 
@@ -172,7 +172,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
 
 def _alike(own: Weighed, one: Weighed) -> bool:
     """Tell whether motions held out are as likely by one set as by another, but for nine to one."""
-    return one.loss < own.loss + np.log(settings.ODDS)
+    return bool(one.loss < own.loss + np.log(settings.ODDS))
 
 
 def _better(own: Weighed, every: Sequence[Weighed]) -> list[Weighed]:
