@@ -213,6 +213,16 @@ def test_sets_near_one_weigh_as_if_they_stood_alone(known):
     assert again.point.rows[0] is whole.point.rows[0]
 
 
+def test_what_else_is_linearised_changes_no_evidence(known):
+    """Columns of parameters that a set does not have tell nothing of it."""
+    _, model, values = known
+    scales = Scales.of(Point.at(model, values))
+    own = scales.fitted(values != 0.0, values)
+    more = scales.linearised(own, np.ones(len(values), dtype=bool), model.groups)
+    assert more.log_evidence == pytest.approx(own.log_evidence, abs=1e-6)
+    assert more.ahead(own.active).log_evidence == pytest.approx(own.ahead(own.active).log_evidence, abs=1e-6)
+
+
 def test_two_motions_that_differ_tell_their_mean_no_better_than_they_differ():
     """Of two, one degree of freedom: the ± of their mean is beyond the difference, and that of four alike far below."""
     lags = (0.05, 0.062)
@@ -322,6 +332,18 @@ def test_the_gate_refuses_the_worst_kind_alone_and_leaves_more_than_so_many_moti
     assert list(refused) == ["steps"]
     assert refused["steps"] > 3.0
     assert _gate(point, 12) == {}
+
+
+def test_a_joint_that_one_kind_alone_moves_gets_no_motion_refused():
+    """In a gripper that other motions hardly move it leaves four times as much, and in five joints what they leave."""
+    motions = [SimpleNamespace(name=f"{kind} {k}", kind=kind) for kind in "abcd" for k in range(3)]
+    index = np.repeat(np.arange(12), 50)
+    arm = [SimpleNamespace(residual=np.ones(600), motion=index) for _ in range(5)]
+    gripper = SimpleNamespace(residual=np.repeat([1.0, 1.0, 1.0, 4.0], 150), motion=index)
+    model = SimpleNamespace(log=SimpleNamespace(motions=motions))
+    point = SimpleNamespace(model=model, rows=[*arm, gripper], noise=np.ones(6))
+    assert _gate(point, 1) == {}
+    assert list(_gate(SimpleNamespace(model=model, rows=[gripper], noise=np.ones(1)), 1)) == ["d"]
 
 
 @pytest.mark.slow
