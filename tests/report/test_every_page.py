@@ -158,6 +158,7 @@ def test_nothing_is_cut_at_any_width_and_nothing_complains(browser, kind, tmp_pa
 
 
 @needs_browser
+@needs_reader
 def test_nothing_is_cut_of_a_page_with_the_arm(browser, demo, tmp_path):
     assert looked_at(browser, html(demo), tmp_path) == {}
     assert empty(browser.pdf(), least=2 / 3) == []
