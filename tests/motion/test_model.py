@@ -218,7 +218,7 @@ def test_what_else_is_linearised_changes_no_evidence(known):
     _, model, values = known
     scales = Scales.of(Point.at(model, values))
     own = scales.fitted(values != 0.0, values)
-    more = scales.linearised(own, np.ones(len(values), dtype=bool), model.groups)
+    more = scales.linearised(own, np.ones(len(values), dtype=bool))
     assert more.log_evidence == pytest.approx(own.log_evidence, abs=1e-6)
     assert more.ahead(own.active).log_evidence == pytest.approx(own.ahead(own.active).log_evidence, abs=1e-6)
 

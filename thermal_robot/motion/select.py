@@ -245,7 +245,7 @@ def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     """Propose sets with one parameter exchanged for another one of the same joint."""
     model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
     free, abrupt = allowed & ~own.active, model.of_effects(ABRUPT)
-    base = scales.linearised(own, free, model.groups)
+    base = scales.linearised(own, free)
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
     for b in own.own.tolist():
@@ -259,7 +259,7 @@ def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     """Propose sets with one parameter more, of each joint and of what all share; all that are abrupt."""
     model, free = scales.model, allowed & ~own.active
     among = [free & (model.placed == j) for j in (*model.joints, SHARED)]
-    base = scales.linearised(own, free, model.groups)
+    base = scales.linearised(own, free)
     return _added(base, own.active, among, model.of_effects(ABRUPT))
 
 

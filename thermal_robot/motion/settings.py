@@ -81,7 +81,7 @@ pieces, the less of that is seen."""
 ROUNDS = 12
 """Gauss-Newton steps at most of one fit."""
 SETTLED = 3e-4
-"""Of the sum of squares: a smaller gain ends the fit. It is half a nat where readings are worth 3000 independent ones."""
+"""Of the sum of squares: a smaller gain ends the fit. It is half a nat of what is worth 3000 independent readings."""
 DAMPINGS = (0.0, 1e-2, 1e-1, 1.0, 10.0)
 """Of the information, added to a step (Marquardt): the first that betters the fit is taken."""
 SHIFTS = (-1.0, 1.0, -0.25, 0.25)

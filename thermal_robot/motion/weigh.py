@@ -91,10 +91,10 @@ class Scales:
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
 
-    def linearised(self, base: Weighed, more: Mask, groups: Groups) -> Weighed:
-        """Linearise some groups of joints at a set's fit by ``more`` (P,) parameters besides its own."""
+    def linearised(self, base: Weighed, more: Mask) -> Weighed:
+        """Linearise all joints at a set's fit by ``more`` (P,) parameters besides its own."""
         found, wanted = base.point, base.active | more
-        for group in groups:
+        for group in self.model.groups:
             own = self.model.own(group)
             key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes()
             if key not in self.linear:
