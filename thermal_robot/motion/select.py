@@ -131,7 +131,7 @@ def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) 
     own = scales.fitted(values != 0.0, values)
     for number in range(1, settings.MOVES + 1):
         progress(f"effects added, round {number}")
-        better = _better(own, scales.others(own, _more(scales, own, allowed), own.log_evidence - settings.FAR_BELOW))
+        better = _better(own, scales.others(own, _more(scales, own, allowed), own.rival_from))
         if not better:
             break
         own = _together(scales, own, better)
@@ -153,19 +153,18 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
             own, held = scales.fitted(own.active, own.point.values), own.active[shared].tobytes()
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
-        rivals = scales.others(own, _more(scales, own, allowed), own.log_evidence - settings.FAR_BELOW)
+        rivals = scales.others(own, _more(scales, own, allowed), own.rival_from)
         if not (better := _better(own, rivals)):  # what the linear problem held to be needed may not be
             better = [one for one in _drops(scales, own) if one.log_evidence > own.log_evidence - np.log(settings.ODDS)]
         if not better:
-            rivals += scales.others(own, _exchanged(scales, own, allowed), own.log_evidence - settings.FAR_BELOW)
+            rivals += scales.others(own, _exchanged(scales, own, allowed), own.rival_from)
             better = _better(own, rivals)
         if not better or number == settings.MOVES:
             break
         own = _together(scales, own, better)
     # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
-    least = own.log_evidence - settings.FAR_BELOW
-    near = [one for one in rivals if one.log_evidence > least and _gain(own, one) <= 0.0 and one.seen[one.own].all()]
-    near = [one for one in near if one.log_evidence < own.log_evidence or _alike(own, one)]
+    near = [one for one in rivals if one.log_evidence > own.rival_from and one.seen[one.own].all()]
+    near = [one for one in near if _gain(own, one) <= 0.0 and (one.log_evidence < own.log_evidence or _alike(own, one))]
     whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
     return Choice(whole, (*_drops(scales, own), *near))
 
@@ -208,8 +207,8 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     """
     placed, least = scales.model.placed, own.log_evidence - np.log(settings.ODDS)
     ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
-    order, hopeless = sorted(ahead, key=lambda b: -ahead[b].log_evidence), own.log_evidence - settings.FAR_BELOW
-    order = [b for b in order if ahead[b].log_evidence > hopeless or not own.seen[b]]
+    order = sorted(ahead, key=lambda b: -ahead[b].log_evidence)
+    order = [b for b in order if ahead[b].log_evidence > own.rival_from or not own.seen[b]]
 
     def queue(joints: Sequence[int]) -> list[Weighed]:
         every = [b for b in order if placed[b] in joints]
@@ -220,7 +219,7 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     turns = zip_longest(*(queue(group) for group in scales.model.groups))
     for turn in (*turns, *([one] for one in queue((SHARED,)))):
         tried, found = [one for one in turn if one is not None], list[Weighed]()
-        for hidden, far in ((False, own.log_evidence - settings.FAR_BELOW), (True, -np.inf)):
+        for hidden, far in ((False, own.rival_from), (True, -np.inf)):
             some = [one for one in tried if own.seen[own.active & ~one.active].any() != hidden]
             found += [one for one in _refitted(scales, own, some, far) if hidden or one.log_evidence > least]
         if found:
@@ -251,7 +250,7 @@ def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     for b in own.own.tolist():
         alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
         always = abrupt & abrupt[b] & (joint == joint[b])
-        sets += _added(base, without(own.active, b), [free & alike], always, own.log_evidence - settings.FAR_BELOW)
+        sets += _added(base, without(own.active, b), [free & alike], always, own.rival_from)
     return sets
 
 

@@ -18,6 +18,7 @@ from scipy.special import ndtr, stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
+from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
 from thermal_robot.motion.fit import Groups, Point, deflated, fitted, mean_log, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
@@ -178,6 +179,11 @@ class Weighed:
     def log_evidence(self) -> float:
         """Log marginal likelihood with log prior odds."""
         return float(self._laplace[0] - self.scales.worth @ np.log(self.point.noise))
+
+    @property
+    def rival_from(self) -> float:
+        """Log evidence from which on another set is a rival of this one."""
+        return self.log_evidence - settings.FAR_BELOW
 
     @cached_property
     def _smooth(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
