@@ -141,6 +141,17 @@ def test_dead_zone_leaves_half_its_width_on_either_side():
     assert down[-1] == pytest.approx(-0.97, abs=1e-6)
 
 
+@pytest.mark.parametrize("joints", [1, 2])
+def test_a_starting_force_overcomes_friction_and_carries_as_much_load(joints):
+    """Friction stops a joint 30 mrad from its command, with a starting force of 20 at 10; a load hangs less."""
+    up, _ = moved(lag=0.05, coulomb=0.03, dead_zone=-0.02, joints=joints)
+    assert up[-1] == pytest.approx(0.99, abs=2e-3)
+    loaded, _ = moved(lag=0.05, droop=0.1, load=0.8, dead_zone=-0.02, joints=joints)
+    assert loaded[-1] == pytest.approx(1.0 - (0.08 - 0.02), abs=1e-4)
+    carried, _ = moved(lag=0.05, droop=0.1, load=0.15, dead_zone=-0.02, joints=joints)  # at no error it gives 0 to 20
+    assert carried[-1] == pytest.approx(1.0, abs=1e-4)
+
+
 def test_friction_that_grows_with_load_widens_the_hysteresis():
     stamps = np.array([0.0, 2.0])
     width = []

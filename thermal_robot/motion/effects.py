@@ -22,8 +22,9 @@ class ServoEffect:
     """One number of the servo model, or of the torque channel's, that may differ from what the maker states.
 
     ``size`` is the prior's standard deviation in ``unit``; with ``of_limit`` in shares of torque limit over stiffness,
-    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed; no value is below ``least``. ``torque``: name
-    and unit times the stiffness.
+    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed; no value is below ``least``. A dead zone below
+    zero is a starting force: at any error the drive gives so much more, to overcome friction. ``torque``: name and
+    unit times the stiffness.
     """
 
     name: str
@@ -57,7 +58,9 @@ EFFECTS = (
                 "share of the load", "load_friction", "", 0.15, torque=("share of the load", "")),
     ServoEffect("stribeck", "Stribeck friction", "Stribeck friction", "breakaway", "stribeck", "rad", 0.01,
                 of_limit=True, spread=UNSOURCED, torque=("breakaway torque", "N·m")),
-    ServoEffect("dead_zone", "dead zone or play", "a dead zone or play", "half width", "dead_zone", "rad", 5e-3),
+    ServoEffect("dead_zone", "dead zone, play or starting force",
+                "a dead zone, play or starting force", "half width", "dead_zone", "rad", 5e-3,
+                least=-inf),
     ServoEffect("torque_limit", "saturation of the servos", "the servo's saturation", "inverse of the limit",
                 "saturation", "1/rad", 5.0),
     ServoEffect("speed_limit", "speed limits of the servos", "the servo's speed limit", "inverse of the speed",
@@ -125,6 +128,9 @@ def physical(effect: str, estimate: Estimate, servo: Servo, commanded: Array) ->
         return replace(estimate, name=f"change{place}", value=100.0 * (ratio - 1.0), std=100.0 * ratio * std, unit="%")
     if effect in _SHARES and estimate.unit == "":
         return replace(estimate, value=100.0 * value, std=100.0 * std, unit="%")
+    if effect == "dead_zone" and value < 0.0 and not servo.dead_band:
+        unit, factor = ("N·m", servo.kp) if servo.kp else ("rad", 1.0)
+        return replace(estimate, name=f"starting force{place}", value=-factor * value, std=factor * std, unit=unit)
     if (effect, estimate.unit) in _TIMES_STIFFNESS and servo.kp:
         name, unit = _TIMES_STIFFNESS[effect, estimate.unit]
         return replace(estimate, name=name + place, value=servo.kp * value, std=servo.kp * std, unit=unit)

@@ -286,12 +286,12 @@ def mean_squares(residual: Array, motion: NDArray[np.int64], count: int) -> Arra
     return np.bincount(motion, residual**2, count) / np.maximum(np.bincount(motion, minlength=count), 1)
 
 
-def mean_log(squares: Array, noise: float) -> float:
-    """Mean over motions of the logarithm of rms residuals: minus log likelihood a reading, each motion's noise its own.
+def logs(squares: Array, noise: float) -> Array:
+    """(M,) logarithm of the rms residual of each motion: minus its log likelihood a reading, its noise its own.
 
     ``squares`` (M,) are mean squares by motion; no motion is more exact than the readings' ``noise``.
     """
-    return 0.5 * float(np.log(np.maximum(squares, 0.0) + noise**2).mean())
+    return np.asarray(0.5 * np.log(np.maximum(squares, 0.0) + noise**2))
 
 
 def ratios(point: Point) -> Array:

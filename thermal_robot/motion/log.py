@@ -78,7 +78,8 @@ class Servo:
     limit
         Largest torque, N·m.
     dead_band
-        Error within which the servo does nothing, rad.
+        Error within which the servo does nothing, rad; below zero the starting force over the stiffness, by which its
+        drive exceeds stiffness times error (firmware that overcomes friction).
     gain, zero
         Share of the command and rad that it adds: at rest without load the joint is at (1 + gain) u + zero.
     friction, damping, armature

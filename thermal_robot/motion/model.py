@@ -515,7 +515,8 @@ class ServoModel(JointModel):
     def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
         """Return residual and forward-difference derivatives of the simulation at the parameters (P,)."""
         own = self.own(group, wanted)
-        steps = np.array([settings.DIFFERENCE * self.parameters[p].size for p in own])
+        told = [self.parameters[p] for p in own]
+        steps = np.array([settings.STIFFER if p.number == "kp" else settings.DIFFERENCE * p.size for p in told])
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         rows = []

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 FILE_NAME = "motion.toml"
 _COLUMN = text("the name of a column")
 _PATH = text("the path of a table")
-_OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": NOT_NEGATIVE}
+_OF_A_SERVO = {"kp": POSITIVE, "kd": NOT_NEGATIVE, "limit": POSITIVE, "dead_band": number()}
 _OF_A_SERVO |= {"gain": number(above=-1.0), "zero": number()}
 _OF_A_SERVO |= dict.fromkeys(("friction", "damping", "armature", "delay"), NOT_NEGATIVE)
 TOLERANCE = mapping(NOT_NEGATIVE)

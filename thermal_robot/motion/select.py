@@ -14,9 +14,9 @@ from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import total_probability
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Point, fit, mean_log, mean_squares
+from thermal_robot.motion.fit import Point, fit, logs, mean_squares
 from thermal_robot.motion.model import SHARED, JointModel, Mask
-from thermal_robot.motion.weigh import Scales, Weighed
+from thermal_robot.motion.weigh import Scales, Weighed, without
 
 _COMMON = "zero lag droop coulomb load_friction payload masses offset viscous contact".split()
 PLAIN = (*SIMULATOR, *_COMMON)
@@ -68,17 +68,12 @@ class Choice:
         return self.own.scales.others(self.own, [(without(self.active, block), (self.point.values,))])[0]
 
     def alternatives(self, block: int) -> list[int]:
-        """Return parameters that could replace one: less likely by ODDS at most, by evidence or by motions held out."""
+        """Return parameters that could replace one: less likely by ODDS at most, or alike in motions held out."""
         rest, least = without(self.active, block), self.own.log_evidence - np.log(settings.ODDS)
         other = [one for one in self.rivals if not one.active[block]]
         near = [one.active for one in other if one.log_evidence > least or _alike(self.own, one)]
         added = [np.flatnonzero(one & ~rest).tolist() for one in near if one[rest].all()]
         return [one[0] for one in added if len(one) == 1]
-
-
-def without(active: Mask, block: int | Sequence[int]) -> Mask:
-    """(P,) mask of the parameters without one, or some."""
-    return np.asarray(active & ~np.isin(np.arange(len(active)), block))
 
 
 def plain(model: JointModel, allowed: Mask) -> Array:
@@ -117,7 +112,7 @@ def _of_motions(model: JointModel, values: Array) -> Array:
     squares = (
         mean_squares(one, model.motion_of(j), model.clusters) for j, one in enumerate(model.all_residuals(values))
     )
-    return np.array([mean_log(one, model.noises[j]) for j, one in enumerate(squares)])
+    return np.array([logs(one, model.noises[j]).mean() for j, one in enumerate(squares)])
 
 
 def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) -> Weighed:
@@ -170,8 +165,13 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
 
 
 def _alike(own: Weighed, one: Weighed) -> bool:
-    """Tell whether motions held out are as likely by one set as by another, but for nine to one."""
-    return bool(one.loss < own.loss + np.log(settings.ODDS))
+    """Tell whether motions held out are as likely by one set as by another, within one standard error.
+
+    That of the difference, by its scatter between motions (Breiman and others, *Classification and Regression Trees*,
+    1984, 3.4.3).
+    """
+    more = one.losses - own.losses
+    return bool(more.sum() < len(more) * np.std(more) / np.sqrt(max(len(more) - 1, 1)))
 
 
 def _better(own: Weighed, every: Sequence[Weighed]) -> list[Weighed]:
@@ -241,16 +241,28 @@ def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weigh
 
 
 def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
-    """Propose sets with one parameter exchanged for another one of the same joint."""
+    """Propose sets with one parameter exchanged for another one of the same joint, by their partial correlation.
+
+    Its square is the share of the evidence of the one that goes which another keeps. Of a large one the linear problem
+    tells no more: what another has to be in its place lies far from the fit.
+    """
     model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
-    free, abrupt = allowed & ~own.active, model.of_effects(ABRUPT)
+    free, abrupt, start = allowed & ~own.active, model.of_effects(ABRUPT), model.start()
     base = scales.linearised(own, free)
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
     together = len(model.groups) == 1
     for b in own.own.tolist():
-        alike = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
-        always = abrupt & abrupt[b] & (joint == joint[b])
-        sets += _added(base, without(own.active, b), [free & alike], always, own.rival_from)
+        among = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
+        kept, places = without(own.active, b), np.flatnonzero(free & among)
+        square, values = base.instead(b, places)
+        lost = (1.0 - square) * (own.log_evidence - base.ahead(kept).log_evidence)
+        first = np.argsort(np.argsort(-square)) < settings.RIVALS
+        near = ((square > settings.ALIKE) | (first & (lost < settings.FAR_BELOW))) & (values >= model.least[places])
+        near |= abrupt[places] & abrupt[b] & (joint[places] == joint[b])
+        for k, value in zip(places[near], values[near], strict=True):
+            one = np.arange(len(kept)) == k
+            begun = np.where(kept, own.point.values, np.where(one, start, 0.0))
+            sets.append((kept | one, (begun, np.where(one, max(value, model.least[k]), begun))))
     return sets
 
 
@@ -262,20 +274,17 @@ def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     return _added(base, own.active, among, model.of_effects(ABRUPT))
 
 
-def _added(base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask, least: float = -np.inf) -> list[Proposed]:
+def _added(base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask) -> list[Proposed]:
     """Propose sets of parameters ``kept`` (P,) and one more of each mask ``among``, and start values of their fits.
 
-    The RIVALS likeliest by a linear problem ``base``, if no less than ``least``, and those of which it tells nothing,
-    ``always`` (P,).
+    The RIVALS likeliest by a linear problem ``base``, and those of which it tells nothing, ``always`` (P,).
     """
     places, start, sets = np.arange(len(kept)), base.point.model.start(), list[Proposed]()
     for added in among:
         told = [base.ahead(kept | (places == k)) for k in places[added]]
         told.sort(key=lambda one: -one.log_evidence)
         told = [
-            one
-            for number, one in enumerate(told)
-            if (number < settings.RIVALS and one.log_evidence >= least) or (always & one.active & ~kept).any()
+            one for number, one in enumerate(told) if number < settings.RIVALS or (always & one.active & ~kept).any()
         ]
         for one in told:
             begun = np.where(kept, base.point.values, np.where(one.active, start, 0.0))

@@ -7,13 +7,14 @@ in sticking,
     load = Σ_k M_jk q̈_k + h_j + Σ_k (∂h_j/∂q_k (q − q̄)_k + ∂h_j/∂q̇_k (q̇ − q̄̇)_k) ,
     |F| ≤ w + μ c |load| + w_s e^{−(q̇/v_s)²} ,
 
-u̇ and ü no more than the limits of the servo's profile, D a dead zone, c = 1/K, I the drive's own inertia over K, L the
-torque limit over K. Mass matrix M and bias torques h are those of a reference motion q̄ (Newton's method on waveforms:
-Lelarasmee, Ruehli and Sangiovanni-Vincentelli, *IEEE Transactions on Computer-Aided Design* 1, 1982), so that a motion
-near it needs no rigid-body algorithm. One step of the implicit midpoint rule solves a monotone inclusion for the
-velocities at its middle (Moreau's time stepping: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical
-Systems*, 2008), by semismooth Newton, and a joint that sticks is at rest at its end. A step ends where a command
-changes, or of a single joint averages it, so that the answer is smooth in the delay.
+u̇ and ü no more than the limits of the servo's profile, D a dead zone d, D[e] = e − d sign e beyond it, below zero a
+starting force, c = 1/K, I the drive's own inertia over K, L the torque limit over K. Mass matrix M and bias torques h
+are those of a reference motion q̄ (Newton's method on waveforms: Lelarasmee, Ruehli and Sangiovanni-Vincentelli,
+*IEEE Transactions on Computer-Aided Design* 1, 1982), so that a motion near it needs no rigid-body algorithm. One
+step of the implicit midpoint rule solves a monotone inclusion for the velocities at its middle (Moreau's time
+stepping: Acary and Brogliato, *Numerical Methods for Nonsmooth Dynamical Systems*, 2008), by semismooth Newton, and a
+joint that sticks is at rest at its end. A step ends where a command changes, or of a single joint averages it, so
+that the answer is smooth in the delay.
 
 A log of a simulator has its integrator's errors. Semi-implicit Euler in steps s, with implicit damping, as MuJoCo's,
 is to first order a system whose commands and dampings are s/2 early (modified equation: Hairer, Lubich and Wanner,
@@ -60,6 +61,8 @@ LEVEL, RISES, LIFT = 1e-7, 0.02, 1e-3
 by which a force is thought to lift the tool in a time step, until that is known from the step before."""
 LEAST = 0.1
 """Of a sliding joint's derivative by its load what friction leaves of it at least."""
+HELD = 1e9
+"""s²: slope where the starting force holds a joint at its set point."""
 FASTEST = 1e3
 """rad/s: no joint turns faster, whatever a set of numbers says of its inertia."""
 
@@ -89,15 +92,15 @@ def _breakaway(stribeck, v):  # type: ignore[no-untyped-def]
 
 def _sliding(e, pull, kick, damping, derivative, early, half, dead, limit):  # type: ignore[no-untyped-def]
     """Root of a servo's monotone equation of motion in the velocity, and its slope: unclipped, or else at the limit."""
-    slope = damping + derivative * (1.0 + early)
-    w = (pull + kick) / slope
+    free, edge = damping + derivative * (1.0 + early), max(dead, 0.0)
+    slope = free + half
     # in the piece of D that holds; where that asks for too much, the limit
-    if e - half * w > dead:
-        slope += half
-        w = (pull + kick + e - dead) / slope
-    elif e - half * w < -dead:
-        slope += half
+    w = (pull + kick + e - dead) / slope
+    if e - half * w <= edge:
         w = (pull + kick + e + dead) / slope
+        if e - half * w >= -edge:
+            slope = free if dead >= 0.0 else HELD
+            w = (pull + kick) / free if dead >= 0.0 else 0.5 * e / half
     asked = damping * w - pull
     if abs(asked) > limit:
         slope = damping
@@ -115,9 +118,9 @@ def _middle(  # type: ignore[no-untyped-def]
     """
     e, pull, kick = u - q, inertia * v - load, derivative * early * v
     rest, drive = drag + bend * half, kick
-    if e > dead:
+    if e > max(dead, 0.0):
         drive += e - dead
-    elif e < -dead:
+    elif e < -max(dead, 0.0):
         drive += e + dead
     at_rest = pull + max(min(drive, limit), -limit)
     if hold > 0.0 and most > 0.0:

@@ -20,8 +20,13 @@ from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.motion import settings
 from thermal_robot.motion.effects import ABRUPT, SIMULATOR
-from thermal_robot.motion.fit import Groups, Point, deflated, fitted, mean_log, ratios, worth
+from thermal_robot.motion.fit import Groups, Point, deflated, fitted, logs, ratios, worth
 from thermal_robot.motion.model import SHARED, JointModel, Mask
+
+
+def without(active: Mask, block: int | Sequence[int]) -> Mask:
+    """(P,) mask of the parameters without one, or some."""
+    return np.asarray(active & ~np.isin(np.arange(len(active)), block))
 
 
 @dataclass(eq=False)
@@ -162,6 +167,15 @@ class Weighed:
         """Predict the weighing of some of its parameters (P,) alone, by the problem that is linear at its fit."""
         return Weighed(self.scales, active, self.point.ahead(active))
 
+    def instead(self, block: int, others: NDArray[np.int64]) -> tuple[Array, Array]:
+        """(K,) squared partial correlations of one parameter's derivative with others', and values that replace it."""
+        rest, ends = without(self.active, block), np.array([block, *others])
+        matrix = self.point.whole[0] + np.diag(self.point.model.sizes**-2.0)
+        cross = matrix[np.ix_(rest, ends)]
+        left = matrix[np.ix_(ends, ends)] - cross.T @ np.linalg.solve(matrix[np.ix_(rest, rest)], cross)
+        told, own = left[0, 1:], np.diag(left)
+        return told**2 / (own[0] * own[1:]), self.point.values[block] * told / own[1:]
+
     @property
     def effects(self) -> frozenset[str]:
         """Names of the effects whose parameters are active."""
@@ -216,17 +230,22 @@ class Weighed:
         return np.asarray(self._left_out.sum(axis=1))
 
     @cached_property
-    def loss(self) -> float:
-        """Negative log likelihood of motions held out, each with its own noise, of as many readings as all are worth.
+    def losses(self) -> Array:
+        """(M,) minus log likelihood of motions held out, each with its own noise, of as many readings as all are worth.
 
         With one noise for all the motion that a model explains least would decide alone.
         """
         model = self.point.model
         each = [
-            mean_log(one / np.maximum(count, 1), noise)
+            logs(one / np.maximum(count, 1), noise)
             for one, count, noise in zip(self._left_out, model.counts, model.noises, strict=True)
         ]
-        return float(self.scales.worth @ each)
+        return np.asarray(self.scales.worth @ np.array(each) / model.clusters)
+
+    @property
+    def loss(self) -> float:
+        """Negative log likelihood of all motions held out."""
+        return float(self.losses.sum())
 
     @cached_property
     def seen(self) -> Mask:

@@ -32,7 +32,7 @@ _FAR = 1e3
 _POINT = 1e-9
 """kg·m²: inertia of a payload of which only the mass is known; MuJoCo wants one."""
 _CANNOT = {
-    "dead_zone": "no joint and no actuator has a dead zone",
+    "dead_zone": "no joint and no actuator has a dead zone or a starting force",
     "load_friction": "its friction does not grow with load",
     "stribeck": "its friction does not fall with speed",
     "acceleration_limit": "no joint and no actuator limits the acceleration of its set point",

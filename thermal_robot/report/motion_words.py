@@ -212,7 +212,8 @@ MEANS = {
     "coulomb": "Friction that does not depend on velocity; the joint stops short: frictionloss in an MJCF.",
     "load_friction": "Friction that grows with the torque the gear carries.",
     "stribeck": "Friction that is larger at rest than in motion: the joint sticks, then jumps.",
-    "dead_zone": "An error within which the servo does nothing, or play in the gear.",
+    "dead_zone": "An error within which the servo does nothing, or play in the gear. Or the contrary, starting force: "
+    "at any error the drive gives so much more, to overcome friction.",
     "torque_limit": "The servo gives no more torque: beyond it the joint falls behind. forcerange in an MJCF.",
     "speed_limit": "The servo leads its set point to the command no faster than this: its profile's speed, or a ramp.",
     "acceleration_limit": "The servo leads its set point with no more acceleration than this: its profile's.",
