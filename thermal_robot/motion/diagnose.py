@@ -233,7 +233,7 @@ def _unexplained(choice: Choice, left: float) -> Unexplained:
     ]
     curves = sorted((one for one in curves if one[0] > settings.STRUCTURE), reverse=True)
     worst = max(above, key=above.__getitem__)
-    said = [f"{above[worst]:.2g} times the noise of its readings stays in {model.log.joints[worst]}"]
+    said = [f"{float(f'{above[worst]:.2g}'):g} times the noise of its readings stays in {model.log.joints[worst]}"]
     if left > 1.0 - settings.MOST:
         stays = f"{100.0 * left:.0f} %" if left < 1.0 else "all"
         said.insert(0, f"{stays} of the gap stays in motions held out, whatever is fitted")

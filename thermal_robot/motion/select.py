@@ -157,9 +157,10 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         if not better or number == settings.MOVES:
             break
         own = _together(scales, own, better)
-    # what the evidence would rather have, and motions held out refuse or nobody could see, is no rival
+    # what the evidence would far rather have, and motions held out refuse or nobody could see, is no rival
+    most = own.log_evidence + np.log(settings.ODDS)
     near = [one for one in rivals if one.log_evidence > own.rival_from and one.seen[one.own].all()]
-    near = [one for one in near if _gain(own, one) <= 0.0 and (one.log_evidence < own.log_evidence or _alike(own, one))]
+    near = [one for one in near if _gain(own, one) <= 0.0 and (one.log_evidence < most or _alike(own, one))]
     whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
     return Choice(whole, (*_drops(scales, own), *near))
 
