@@ -18,8 +18,8 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import Choice, searched, settled, without
-from thermal_robot.motion.weigh import Scales
+from thermal_robot.motion.select import Choice, searched, settled
+from thermal_robot.motion.weigh import Scales, without
 
 
 def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT, command=None):
