@@ -19,7 +19,7 @@ from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
 from thermal_robot.motion.select import Choice, searched, settled
-from thermal_robot.motion.weigh import Scales, without
+from thermal_robot.motion.weigh import Scales, Weighed, without
 
 
 def driven(true, motions=9, seconds=8.0, seed=3, joints=("joint_1", "joint_2"), noise=COUNT, command=None):
@@ -314,6 +314,20 @@ def test_what_evidence_or_motions_held_out_make_as_likely_could_replace_a_parame
     rivals = (weighed(1, -1.0, 9, 9, 8, 10), weighed(2, -9.0, 9, -9, 9, -8), weighed(3, -9.0, 9, 9, 8, 10))
     assert Choice(weighed(0, 0.0, 0, 0, 0, 0), rivals).alternatives(0) == [1, 2]
     assert Choice(weighed(0, 0.0, 0, 0, 0, 0), rivals).alternatives(4) == []
+
+
+def test_what_does_the_same_beside_the_rest_has_a_partial_correlation_of_one():
+    """Column 2 is half of column 0 and a share of 1, which adapts itself; column 3 is neither's."""
+    rng = np.random.default_rng(11)
+    columns = rng.standard_normal((200, 4))
+    columns[:, 2] = 0.5 * columns[:, 0] + 3.0 * columns[:, 1]
+    model = SimpleNamespace(sizes=np.full(4, 1e3))
+    point = SimpleNamespace(whole=(columns.T @ columns, None), model=model, values=np.array([0.2, 1.0, 0.0, 0.0]))
+    own = Weighed(None, np.array([True, True, False, False]), point)
+    square, values = own.instead(0, np.array([2, 3]))
+    assert square[0] == pytest.approx(1.0, abs=1e-6)
+    assert values[0] == pytest.approx(0.4, rel=1e-5)
+    assert square[1] < 0.1
 
 
 @pytest.mark.slow
