@@ -18,7 +18,7 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import Choice, searched, settled
+from thermal_robot.motion.select import Choice, plain, searched, settled
 from thermal_robot.motion.weigh import Scales, Weighed, without
 
 
@@ -87,11 +87,25 @@ def test_derivatives_are_those_of_a_step_a_tenth_as_long(known, monkeypatch):
     _, model, values = known
     coarse = model.rows((1,), values)[0]
     monkeypatch.setattr("thermal_robot.motion.settings.DIFFERENCE", 0.005)
+    monkeypatch.setattr("thermal_robot.motion.settings.COARSE", 0.05)
     fine = model.rows((1,), values)[0]
     for k, p in enumerate(fine.columns):
         if model.parameters[p].effect in ("zero", "lag", "delay", "droop", "gain"):
             far = np.linalg.norm(coarse.derivative[:, k] - fine.derivative[:, k])
             assert far < 0.1 * np.linalg.norm(fine.derivative[:, k]), model.parameters[p]
+
+
+def test_a_secant_is_what_a_whole_expected_size_changes(known):
+    """A gain of one size, 1 %, moves a joint without a load by a hundredth of how it goes, whatever the step."""
+    _, model, values = known
+    whole, part = (model.rows((0,), values, secant=one)[0] for one in (True, False))
+    for k, p in enumerate(whole.columns):
+        changed = values + np.where(np.arange(len(values)) == p, model.sizes, 0.0)
+        left = model.residuals((0,), np.stack([values, changed]))[0]
+        np.testing.assert_allclose(model.sizes[p] * whole.derivative[:, k], left[0] - left[1], atol=1e-12)
+    gain = list(whole.columns).index(model.index("gain", 0))
+    far = np.linalg.norm(whole.derivative[:, gain] - part.derivative[:, gain])
+    assert far < 0.02 * np.linalg.norm(part.derivative[:, gain])
 
 
 def test_the_fit_returns_to_the_true_values(known):
@@ -119,6 +133,17 @@ def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it()
     allowed = ~model.of_effects(("dead_zone",))  # at its limit a servo with a dead zone is one with friction
     found = settled(searched(model, allowed, print), allowed, print).point.values
     assert found[model.index("torque_limit", 0)] == pytest.approx(20.0, rel=0.1)
+    assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
+
+
+def test_steps_that_saturate_start_with_a_limit_and_a_delay():
+    """A lag in the place of a delay leaves much where a servo saturates, and there is a local minimum of a profile."""
+    true = {("lag", 0): 0.15, ("coulomb", 0): 0.001, ("delay", 0): 0.035, ("torque_limit", 0): 4.2}
+    log, _ = driven(true, 3, 6.0, joints=("joint_1",), command=lambda u: 0.6 * np.sign(u.values))
+    model = ServoModel(log)
+    found = plain(model, ~model.of_effects(("kp",)))
+    assert found[model.index("torque_limit", 0)] == pytest.approx(4.2, rel=0.1)
+    assert found[model.index("delay", 0)] == pytest.approx(0.035, abs=0.012)
     assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
 
 
@@ -309,11 +334,17 @@ def test_what_evidence_or_motions_held_out_make_as_likely_could_replace_a_parame
 
     def weighed(place, evidence, *losses):
         active = np.isin(np.arange(5), [place, 4])
-        return SimpleNamespace(active=active, log_evidence=evidence, losses=np.array(losses))
+        likely = evidence - np.log(9.0)
+        return SimpleNamespace(active=active, log_evidence=evidence, likely_from=likely, losses=np.array(losses))
 
     rivals = (weighed(1, -1.0, 9, 9, 8, 10), weighed(2, -9.0, 9, -9, 9, -8), weighed(3, -9.0, 9, 9, 8, 10))
     assert Choice(weighed(0, 0.0, 0, 0, 0, 0), rivals).alternatives(0) == [1, 2]
     assert Choice(weighed(0, 0.0, 0, 0, 0, 0), rivals).alternatives(4) == []
+
+
+def test_a_set_that_motions_held_out_refused_weighs_no_more_than_the_choice():
+    own, refused, other = (SimpleNamespace(log_evidence=one) for one in (0.0, 7.0, -np.log(3.0)))
+    assert [weight for _, weight in Choice(own, (refused, other)).weights] == pytest.approx([3 / 7, 3 / 7, 1 / 7])
 
 
 def test_what_does_the_same_beside_the_rest_has_a_partial_correlation_of_one():

@@ -87,14 +87,17 @@ class Point:
     rows: list[Part]
 
     @classmethod
-    def at(cls, model: JointModel, values: Array, wanted: Mask | None = None, groups: Groups | None = None) -> Point:
+    def at(
+        cls, model: JointModel, values: Array, wanted: Mask | None = None, groups: Groups | None = None,
+        secant: bool = False,
+    ) -> Point:  # fmt: skip
         """Linearise the model at some values by the parameters of the mask ``wanted``, by default all.
 
-        With ``groups`` it has the rows of these joints alone.
+        With ``groups`` it has the rows of these joints alone. See :meth:`JointModel.rows` for ``secant``.
         """
 
         def parts(group: Sequence[int]) -> list[Part]:
-            return [Part.of(one, values, model.clusters) for one in model.rows(group, values, wanted)]
+            return [Part.of(one, values, model.clusters) for one in model.rows(group, values, wanted, secant)]
 
         return cls(model, values, model.by_joint(parts, groups))
 

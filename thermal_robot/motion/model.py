@@ -157,8 +157,11 @@ class JointModel(ABC):
         """Residual (S, N) of each joint of a group, measured minus model, for S sets (S, P) of all parameters."""
 
     @abstractmethod
-    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
-        """Return residual and derivatives of each joint of a group at the parameters (P,), by those of ``wanted``."""
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None, secant: bool = False) -> list[Rows]:
+        """Return residual and derivatives of each joint of a group at the parameters (P,), by those of ``wanted``.
+
+        With ``secant`` what an expected size more of each changes, over that size.
+        """
 
     @abstractmethod
     def noise(self, joint: int) -> float:
@@ -512,11 +515,14 @@ class ServoModel(JointModel):
         self.each(simulated, parts)
         return found
 
-    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None, secant: bool = False) -> list[Rows]:
         """Return residual and forward-difference derivatives of the simulation at the parameters (P,)."""
         own = self.own(group, wanted)
         told = [self.parameters[p] for p in own]
-        steps = np.array([settings.STIFFER if p.number == "kp" else settings.DIFFERENCE * p.size for p in told])
+        steps = np.array(
+            [(settings.COARSE if p.number in ("kp", "delay") else settings.DIFFERENCE) * p.size for p in told]
+        )
+        steps = self.sizes[own] if secant else steps
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         rows = []

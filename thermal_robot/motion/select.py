@@ -18,9 +18,12 @@ from thermal_robot.motion.fit import Point, fit, logs, mean_squares
 from thermal_robot.motion.model import SHARED, JointModel, Mask
 from thermal_robot.motion.weigh import Scales, Weighed, without
 
-_COMMON = "zero lag droop coulomb load_friction payload masses offset viscous contact".split()
+_COMMON = "zero lag droop coulomb load_friction masses offset viscous contact".split()
 PLAIN = (*SIMULATOR, *_COMMON)
 """Effects from which a fit starts: what every servo has, and little that does the same."""
+
+SATURATION = ("torque_limit", "delay")
+"""What a saturated servo has: it moves at its fastest whatever its error, and no lag does what a delay does there."""
 
 PROFILE = ("speed_limit", "acceleration_limit")
 """Limits of the profile along which a servo leads its set point."""
@@ -48,9 +51,10 @@ class Choice:
 
     @cached_property
     def weights(self) -> list[tuple[Weighed, float]]:
-        """Posterior probability of each set, the choice first."""
+        """Posterior probability of each set, the choice first: what motions held out refused is no likelier."""
         every = (self.own, *self.rivals)
-        return list(zip(every, softmax([one.log_evidence for one in every]).tolist(), strict=True))
+        likely = [min(one.log_evidence, self.own.log_evidence) for one in every]
+        return list(zip(every, softmax(likely).tolist(), strict=True))
 
     @property
     def nothing(self) -> Choice:
@@ -69,9 +73,9 @@ class Choice:
 
     def alternatives(self, block: int) -> list[int]:
         """Return parameters that could replace one: less likely by ODDS at most, or alike in motions held out."""
-        rest, least = without(self.active, block), self.own.log_evidence - np.log(settings.ODDS)
+        rest = without(self.active, block)
         other = [one for one in self.rivals if not one.active[block]]
-        near = [one.active for one in other if one.log_evidence > least or _alike(self.own, one)]
+        near = [one.active for one in other if one.log_evidence > self.own.likely_from or _alike(self.own, one)]
         added = [np.flatnonzero(one & ~rest).tolist() for one in near if one[rest].all()]
         return [one[0] for one in added if len(one) == 1]
 
@@ -79,10 +83,12 @@ class Choice:
 def plain(model: JointModel, allowed: Mask) -> Array:
     """Fit plain servos by maximum a posteriori: (P,) values; the loads are recomputed before each of REFRESHES rounds.
 
-    From fits with torque limits and with limits of a profile the best of each group of joints.
+    From fits with torque limits and with limits of a profile, with and without a payload, the best of each group of
+    joints: each is a local minimum of the others.
     """
     begun = _scanned(model, np.where(allowed, model.start(), 0.0), allowed & model.of_effects(("torque_limit",)))
-    starts = [(begun, allowed & model.of_effects((*PLAIN, *limits))) for limits in (("torque_limit",), PROFILE)]
+    every = [(*PLAIN, *limits, *loads) for limits in (SATURATION, PROFILE) for loads in ((), ("payload",))]
+    starts = [(begun, allowed & model.of_effects(effects)) for effects in every]
     fits = [fit(model, *start) for start in starts]
     left = np.stack([_of_motions(model, values) for values in fits])
     best = np.full(len(begun), left.sum(axis=1).argmin())
@@ -137,9 +143,12 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
     """Drop, exchange and add parameters, one at a time in each group, until no set beside the choice is better.
 
     A parameter goes at odds below nine to one, or if nobody could see it; another comes in its place, or beside it,
-    where motions held out and the evidence are better, by nine to one of one more.
+    where motions held out and the evidence are better, by nine to one of one more. Readings are worth what they are at
+    the fit that is settled, not at that of plain servos.
     """
-    scales, shared, held = own.scales, own.scales.model.placed == SHARED, None
+    scales = Scales.of(Point.at(own.scales.model, own.point.values))
+    shared, held = scales.model.placed == SHARED, None
+    own = scales.fitted(own.active, own.point.values)
     for number in range(1, settings.MOVES + 1):
         progress(f"sets of effects fitted, round {number}")
         if own.active[shared].tobytes() != held or len(scales.model.groups) == 1:  # loads change little with the rest
@@ -150,17 +159,17 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
             own = fewer
         rivals = scales.others(own, _more(scales, own, allowed), own.rival_from)
         if not (better := _better(own, rivals)):  # what the linear problem held to be needed may not be
-            better = [one for one in _drops(scales, own) if one.log_evidence > own.log_evidence - np.log(settings.ODDS)]
+            better = [one for one in _drops(scales, own) if one.log_evidence > own.likely_from]
         if not better:
             rivals += scales.others(own, _exchanged(scales, own, allowed), own.rival_from)
             better = _better(own, rivals)
         if not better or number == settings.MOVES:
             break
         own = _together(scales, own, better)
-    # what the evidence would far rather have, and motions held out refuse or nobody could see, is no rival
-    most = own.log_evidence + np.log(settings.ODDS)
+    # one parameter more that the evidence would far rather have, and motions held out refuse, is no rival
     near = [one for one in rivals if one.log_evidence > own.rival_from and one.seen[one.own].all()]
-    near = [one for one in near if _gain(own, one) <= 0.0 and (one.log_evidence < most or _alike(own, one))]
+    near = [one for one in near if own.log_evidence > one.likely_from or len(one.own) <= len(own.own)]
+    near = [one for one in near if _gain(own, one) <= 0.0]
     whole = Weighed(scales, own.active, Point.at(scales.model, own.point.values, own.active))
     return Choice(whole, (*_drops(scales, own), *near))
 
@@ -206,7 +215,7 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
     The linear problem tells the order, and of which several at once it promises so; what joints share comes last, as
     then all are fitted anew.
     """
-    placed, least = scales.model.placed, own.log_evidence - np.log(settings.ODDS)
+    placed = scales.model.placed
     ahead = {b: own.ahead(without(own.active, b)) for b in own.own.tolist()}
     order = sorted(ahead, key=lambda b: -ahead[b].log_evidence)
     order = [b for b in order if ahead[b].log_evidence > own.rival_from or not own.seen[b]]
@@ -215,14 +224,14 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
         every = [b for b in order if placed[b] in joints]
         sizes = [n for n in settings.AT_ONCE if n <= len(every) and SHARED not in joints]
         many = [own.ahead(without(own.active, every[:n])) for n in sizes]
-        return [one for one in many if one.log_evidence > least] + [ahead[b] for b in every]
+        return [one for one in many if one.log_evidence > own.likely_from] + [ahead[b] for b in every]
 
     turns = zip_longest(*(queue(group) for group in scales.model.groups))
     for turn in (*turns, *([one] for one in queue((SHARED,)))):
         tried, found = [one for one in turn if one is not None], list[Weighed]()
         for hidden, far in ((False, own.rival_from), (True, -np.inf)):
             some = [one for one in tried if own.seen[own.active & ~one.active].any() != hidden]
-            found += [one for one in _refitted(scales, own, some, far) if hidden or one.log_evidence > least]
+            found += [one for one in _refitted(scales, own, some, far) if hidden or one.log_evidence > own.likely_from]
         if found:
             return _together(scales, own, found)
     return None
@@ -244,50 +253,45 @@ def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weigh
 def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
     """Propose sets with one parameter exchanged for another one of the same joint, by their partial correlation.
 
-    Its square is the share of the evidence of the one that goes which another keeps. Of a large one the linear problem
-    tells no more: what another has to be in its place lies far from the fit.
+    Its square is the share of the evidence of the one that goes which another keeps, of their derivatives, and of what
+    an expected size of each does: of joints that stick and slip one or the other is mostly of moments of slips.
     """
-    model, joint, sets = scales.model, scales.model.placed, list[Proposed]()
-    free, abrupt, start = allowed & ~own.active, model.of_effects(ABRUPT), model.start()
-    base = scales.linearised(own, free)
+    model, joint, abrupt = scales.model, scales.model.placed, scales.model.of_effects(ABRUPT)
+    free, begun = allowed & ~own.active, _begun(own)
     # joints that go their own ways would all be fitted anew for what they share in the place of each of their effects
-    together = len(model.groups) == 1
-    for b in own.own.tolist():
-        among = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
-        kept, places = without(own.active, b), np.flatnonzero(free & among)
-        square, values = base.instead(b, places)
-        lost = (1.0 - square) * (own.log_evidence - base.ahead(kept).log_evidence)
-        first = np.argsort(np.argsort(-square)) < settings.RIVALS
-        near = ((square > settings.ALIKE) | (first & (lost < settings.FAR_BELOW))) & (values >= model.least[places])
-        near |= abrupt[places] & abrupt[b] & (joint[places] == joint[b])
-        for k, value in zip(places[near], values[near], strict=True):
-            one = np.arange(len(kept)) == k
-            begun = np.where(kept, own.point.values, np.where(one, start, 0.0))
-            sets.append((kept | one, (begun, np.where(one, max(value, model.least[k]), begun))))
-    return sets
+    together, found = len(model.groups) == 1, dict[tuple[int, int], list[Array]]()
+    for base in (scales.linearised(own, free), scales.linearised(own, free, secant=True)):
+        for b in own.own.tolist():
+            among = (joint == joint[b]) | (joint[b] == SHARED) | ((joint == SHARED) & together)
+            places = np.flatnonzero(free & among)
+            square, values = base.instead(b, places)
+            square = np.where(values < model.least[places], 0.0, square)
+            near = (square > settings.ALIKE) | (np.argsort(np.argsort(-square)) < settings.RIVALS)
+            near |= abrupt[places] & abrupt[b] & (joint[places] == joint[b])
+            for k, value in zip(places[near].tolist(), values[near], strict=True):
+                there = np.where(np.arange(len(begun)) == k, max(value, model.least[k]), begun)
+                found.setdefault((b, k), [begun]).append(there)
+    sets = [(own.active ^ np.isin(np.arange(len(begun)), pair), starts) for pair, starts in found.items()]
+    return [(active, tuple(np.where(active, one, 0.0) for one in starts)) for active, starts in sets]
+
+
+def _begun(own: Weighed) -> Array:
+    """(P,) start of a fit of a set's parameters and others: the values of its own fit, and where the others begin."""
+    return np.where(own.active, own.point.values, own.scales.model.start())
 
 
 def _more(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
-    """Propose sets with one parameter more, of each joint and of what all share; all that are abrupt."""
-    model, free = scales.model, allowed & ~own.active
-    among = [free & (model.placed == j) for j in (*model.joints, SHARED)]
-    base = scales.linearised(own, free)
-    return _added(base, own.active, among, model.of_effects(ABRUPT))
+    """Propose sets with one parameter more: of each joint, and of what all share, the RIVALS likeliest ones.
 
-
-def _added(base: Weighed, kept: Mask, among: Sequence[Mask], always: Mask) -> list[Proposed]:
-    """Propose sets of parameters ``kept`` (P,) and one more of each mask ``among``, and start values of their fits.
-
-    The RIVALS likeliest by a linear problem ``base``, and those of which it tells nothing, ``always`` (P,).
+    By the problem that is linear at the fit; of what is abrupt, which it tells nothing of, all.
     """
-    places, start, sets = np.arange(len(kept)), base.point.model.start(), list[Proposed]()
-    for added in among:
-        told = [base.ahead(kept | (places == k)) for k in places[added]]
-        told.sort(key=lambda one: -one.log_evidence)
+    model, free, begun = scales.model, allowed & ~own.active, _begun(own)
+    base, abrupt, sets = scales.linearised(own, free), model.of_effects(ABRUPT), list[Proposed]()
+    for joint in (*model.joints, SHARED):
         told = [
-            one for number, one in enumerate(told) if number < settings.RIVALS or (always & one.active & ~kept).any()
+            base.ahead(own.active | (np.arange(len(free)) == k)) for k in np.flatnonzero(free & (model.placed == joint))
         ]
-        for one in told:
-            begun = np.where(kept, base.point.values, np.where(one.active, start, 0.0))
-            sets.append((one.active, (begun, one.point.values)))
+        told.sort(key=lambda one: -one.log_evidence)
+        some = told[: settings.RIVALS] + [one for one in told[settings.RIVALS :] if (one.active & free & abrupt).any()]
+        sets += [(one.active, (np.where(one.active, begun, 0.0), one.point.values)) for one in some]
     return sets

@@ -72,9 +72,10 @@ STEP_ALONE = 5.5e-3
 """s: longest time step of joints that go their own ways, whose servos nobody states: a tenth of a hobby servo's lag. Of
 an SO-101 paths then err by 0.8 to 1.6 mrad rms, and in steps of 4 ms by as much but a seventh; 4 to 8 stay unexplained.
 """
-DIFFERENCE, STIFFER = 0.05, 0.1
+DIFFERENCE, COARSE = 0.05, 0.5
 """Of an expected size: step of the finite differences, small beside it and large beside rounding of a stuck joint; and
-of the logarithm of a stiffness: a hundredth tells little but which of a joint's slips come a moment later."""
+of a stiffness and a delay: less tells but which slip comes a moment later, and which step of the simulation a command
+falls into."""
 CLUSTERS = 8
 """Motions from which they count as independent: fewer give no standard error worth the name. Fewer are cut into pieces
 until there are so many, and ± is said to be weak. No more: errors hang together within a motion, and the shorter the
@@ -116,7 +117,7 @@ RIVALS = 2
 linear problem, which orders what is near and not what is far."""
 ALIKE = 0.75
 """Squared partial correlation from which an effect is fitted in another's place, however much that explains: it leaves
-less than half of its amplitude. Joints that stick and slip hide true aliases: stiffness and payload have 0.8 to 1."""
+less than half of its amplitude."""
 MOVES = 12
 """Exchanges and additions at most among exact fits, each of which betters the evidence."""
 FAR_BELOW = 20.0

@@ -105,7 +105,7 @@ class TorqueModel(JointModel):
     def _factor(self, joint: int, values: Array) -> float:
         return 1.0 + float(values[self.index("torque_constant", joint)])
 
-    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None) -> list[Rows]:
+    def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None, secant: bool = False) -> list[Rows]:
         """Return residual and model derivatives of each joint at the parameters (P,), by those of ``wanted``."""
         return [self._rows(joint, values, wanted) for joint in group]
 

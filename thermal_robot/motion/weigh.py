@@ -97,14 +97,14 @@ class Scales:
         self.known |= {key: one for key, one in found.items() if one is not None}
         return [self._placed(base, active) for active, _ in sets]
 
-    def linearised(self, base: Weighed, more: Mask) -> Weighed:
-        """Linearise all joints at a set's fit by ``more`` (P,) parameters besides its own."""
+    def linearised(self, base: Weighed, more: Mask, secant: bool = False) -> Weighed:
+        """Linearise all joints at a set's fit by ``more`` (P,) parameters besides its own, by ``secant`` slopes."""
         found, wanted = base.point, base.active | more
         for group in self.model.groups:
             own = self.model.own(group)
-            key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes()
+            key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes(), bytes(secant)
             if key not in self.linear:
-                self.linear[key] = Point.at(self.model, base.point.values, wanted, [group]).without_residuals()
+                self.linear[key] = Point.at(self.model, base.point.values, wanted, [group], secant).without_residuals()
             found = found.with_rows(self.linear[key], [group])
         return Weighed(self, base.active, found)
 
@@ -198,6 +198,11 @@ class Weighed:
     def rival_from(self) -> float:
         """Log evidence from which on another set is a rival of this one."""
         return self.log_evidence - settings.FAR_BELOW
+
+    @property
+    def likely_from(self) -> float:
+        """Log evidence from which on another set is less likely than this one by ODDS at most."""
+        return float(self.log_evidence - np.log(settings.ODDS))
 
     @cached_property
     def _smooth(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
