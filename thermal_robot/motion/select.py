@@ -83,12 +83,11 @@ class Choice:
 def plain(model: JointModel, allowed: Mask) -> Array:
     """Fit plain servos by maximum a posteriori: (P,) values; the loads are recomputed before each of REFRESHES rounds.
 
-    From fits with torque limits and with limits of a profile, with and without a payload, the best of each group of
-    joints: each is a local minimum of the others.
+    From fits with torque limits and with limits of a profile the best of each group of joints. Without a payload: with
+    one, a servo that saturates has a local minimum where it falls instead.
     """
     begun = _scanned(model, np.where(allowed, model.start(), 0.0), allowed & model.of_effects(("torque_limit",)))
-    every = [(*PLAIN, *limits, *loads) for limits in (SATURATION, PROFILE) for loads in ((), ("payload",))]
-    starts = [(begun, allowed & model.of_effects(effects)) for effects in every]
+    starts = [(begun, allowed & model.of_effects((*PLAIN, *limits))) for limits in (SATURATION, PROFILE)]
     fits = [fit(model, *start) for start in starts]
     left = np.stack([_of_motions(model, values) for values in fits])
     best = np.full(len(begun), left.sum(axis=1).argmin())
