@@ -18,7 +18,7 @@ from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
-from thermal_robot.motion.select import Choice, plain, searched, settled
+from thermal_robot.motion.select import Choice, searched, settled
 from thermal_robot.motion.weigh import Scales, Weighed, without
 
 
@@ -136,15 +136,18 @@ def test_a_limit_that_most_of_a_motion_needs_is_found_and_no_soft_servo_for_it()
     assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
 
 
-def test_steps_that_saturate_start_with_a_limit_and_a_delay():
-    """A lag in the place of a delay leaves much where a servo saturates, and there is a local minimum of a profile."""
-    true = {("lag", 0): 0.15, ("coulomb", 0): 0.001, ("delay", 0): 0.035, ("torque_limit", 0): 4.2}
-    log, _ = driven(true, 3, 6.0, joints=("joint_1",), command=lambda u: 0.6 * np.sign(u.values))
+@pytest.mark.parametrize(("lag", "delay"), [(0.05, 0.045), (0.05, 0.03), (0.1, 0.03)])
+def test_steps_that_saturate_tell_limit_lag_and_delay_and_nothing_else(lag, delay):
+    """A longer lag in the place of a delay is a local minimum of steps that saturate; a profile is another one."""
+    true = {("lag", 0): lag, ("coulomb", 0): 0.001, ("delay", 0): delay, ("torque_limit", 0): 4.2}
+    log, values = driven(true, 3, 6.0, joints=("joint_1",), command=lambda u: 0.6 * np.sign(u.values))
     model = ServoModel(log)
-    found = plain(model, ~model.of_effects(("kp",)))
-    assert found[model.index("torque_limit", 0)] == pytest.approx(4.2, rel=0.1)
-    assert found[model.index("delay", 0)] == pytest.approx(0.035, abs=0.012)
-    assert np.sqrt(np.mean(model.all_residuals(found)[0] ** 2)) < COUNT
+    allowed = ~model.of_effects(("dead_zone",))
+    found = settled(searched(model, allowed, print), allowed, print)
+    assert (found.active == (values != 0.0)).all()
+    for name, value in (("lag", lag), ("delay", delay), ("torque_limit", 4.2)):
+        assert found.point.values[model.index(name, 0)] == pytest.approx(value, rel=0.02), name
+    assert found.point.noise[0] < COUNT / np.sqrt(12.0) * 1.1
 
 
 def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known):
