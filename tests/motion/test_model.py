@@ -14,7 +14,7 @@ pytest.importorskip("mujoco", reason="worlds are simulated by MuJoCo")
 from thermal_robot.blind.motions.fault import Fault
 from thermal_robot.blind.motions.world import draw_world
 from thermal_robot.motion.diagnose import _gate, diagnose_motion
-from thermal_robot.motion.fit import Part, Point, deflated, fit, ratios, worth
+from thermal_robot.motion.fit import Part, Point, _ahead, deflated, fit, ratios, worth
 from thermal_robot.motion.following import clusters
 from thermal_robot.motion.log import Channel
 from thermal_robot.motion.model import SHARED, ServoModel
@@ -106,6 +106,18 @@ def test_a_secant_is_what_a_whole_expected_size_changes(known):
     gain = list(whole.columns).index(model.index("gain", 0))
     far = np.linalg.norm(whole.derivative[:, gain] - part.derivative[:, gain])
     assert far < 0.02 * np.linalg.norm(part.derivative[:, gain])
+
+
+def test_no_step_leaves_a_bound_by_rounding():
+    """Least squares with bounds end at -1e-21 for a bound of zero, and a limit below zero is no servo at all."""
+    rng = np.random.default_rng(5)
+    for _ in range(500):
+        columns = rng.standard_normal((40, 12)) * 10.0 ** rng.uniform(-3.0, 3.0, 12)
+        columns[:, 1] = 3.0 * columns[:, 0] + 1e-6 * columns[:, 1]
+        target = columns @ rng.standard_normal(12) + rng.standard_normal(40)
+        least = np.where(rng.random(12) < 0.7, 0.0, -np.inf)
+        found, _ = _ahead((columns.T @ columns, columns.T @ target, np.full(12, 1e-6), least), np.zeros(12), 0.0)
+        assert (found >= least).all()
 
 
 def test_the_fit_returns_to_the_true_values(known):

@@ -279,7 +279,8 @@ def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]
     whole = inside + np.diag(held + prior)
     root = np.linalg.cholesky(whole)
     pull = np.linalg.solve(root, along + held * here)
-    found = np.asarray(lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x)
+    found = lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x
+    found = np.maximum(found, least)  # it rounds: a limit of -1e-21 is none
     cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
     return found, float(cost[0] - cost[1])
 
