@@ -83,8 +83,8 @@ class Choice:
 def plain(model: JointModel, allowed: Mask) -> Array:
     """Fit plain servos by maximum a posteriori: (P,) values; the loads are recomputed before each of REFRESHES rounds.
 
-    From fits with torque limits and with limits of a profile the best of each group of joints. Without a payload: with
-    one, a servo that saturates has a local minimum where it falls instead.
+    From fits with torque limits and with limits of a profile the best of each group of joints. A payload comes
+    after: with one at once, a servo that saturates has a local minimum where it falls instead.
     """
     begun = _scanned(model, np.where(allowed, model.start(), 0.0), allowed & model.of_effects(("torque_limit",)))
     starts = [(begun, allowed & model.of_effects((*PLAIN, *limits))) for limits in (SATURATION, PROFILE)]
@@ -95,6 +95,7 @@ def plain(model: JointModel, allowed: Mask) -> Array:
         best[np.isin(model.placed, group)] = left[:, list(group)].sum(axis=1).argmin()
     values, active = np.array(fits), np.array([own for _, own in starts])
     values, active = (one[best, np.arange(len(best))] for one in (values, active))
+    active |= allowed & model.of_effects(("payload",))
     for _ in range(settings.REFRESHES):  # what was at zero with other loads may not be there with these
         model.refreshed(values)
         values = fit(model, values, active)
