@@ -518,11 +518,8 @@ class ServoModel(JointModel):
     def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None, secant: bool = False) -> list[Rows]:
         """Return residual and forward-difference derivatives of the simulation at the parameters (P,)."""
         own = self.own(group, wanted)
-        told = [self.parameters[p] for p in own]
-        steps = np.array(
-            [(settings.COARSE if p.number in ("kp", "delay") else settings.DIFFERENCE) * p.size for p in told]
-        )
-        steps = self.sizes[own] if secant else steps
+        shares = np.where(self.of_effects(("kp", "delay")), settings.COARSE, settings.DIFFERENCE)
+        steps = self.sizes[own] * (1.0 if secant else shares[own])
         sets = np.tile(values, (1 + len(own), 1))
         sets[1 + np.arange(len(own)), own] += steps
         rows = []

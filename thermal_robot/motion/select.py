@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
 
@@ -148,7 +148,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
     """
     scales = Scales.of(Point.at(own.scales.model, own.point.values))
     shared, held = scales.model.placed == SHARED, None
-    own = scales.fitted(own.active, own.point.values)
+    own = replace(own, scales=scales)
     for number in range(1, settings.MOVES + 1):
         progress(f"sets of effects fitted, round {number}")
         if own.active[shared].tobytes() != held or len(scales.model.groups) == 1:  # loads change little with the rest
@@ -166,7 +166,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
         if not better or number == settings.MOVES:
             break
         own = _together(scales, own, better)
-    # one parameter more that the evidence would far rather have, and motions held out refuse, is no rival
+    # nothing is a rival that nobody could see, nor one parameter more that evidence wants and motions held out refuse
     near = [one for one in rivals if one.log_evidence > own.rival_from and one.seen[one.own].all()]
     near = [one for one in near if own.log_evidence > one.likely_from or len(one.own) <= len(own.own)]
     near = [one for one in near if _gain(own, one) <= 0.0]

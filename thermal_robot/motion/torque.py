@@ -106,7 +106,7 @@ class TorqueModel(JointModel):
         return 1.0 + float(values[self.index("torque_constant", joint)])
 
     def rows(self, group: Sequence[int], values: Array, wanted: Mask | None = None, secant: bool = False) -> list[Rows]:
-        """Return residual and model derivatives of each joint at the parameters (P,), by those of ``wanted``."""
+        """Return residual and model derivatives of each joint at the parameters (P,), which are its secants, too."""
         return [self._rows(joint, values, wanted) for joint in group]
 
     def _rows(self, joint: int, values: Array, wanted: Mask | None) -> Rows:

@@ -98,11 +98,11 @@ class Scales:
         return [self._placed(base, active) for active, _ in sets]
 
     def linearised(self, base: Weighed, more: Mask, secant: bool = False) -> Weighed:
-        """Linearise all joints at a set's fit by ``more`` (P,) parameters besides its own, by ``secant`` slopes."""
+        """Linearise all joints at a set's fit by its own parameters and ``more`` (P,); see :meth:`JointModel.rows`."""
         found, wanted = base.point, base.active | more
         for group in self.model.groups:
             own = self.model.own(group)
-            key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes(), bytes(secant)
+            key = bytes(group), wanted[own].tobytes(), base.point.values[own].tobytes(), bytes([secant])
             if key not in self.linear:
                 self.linear[key] = Point.at(self.model, base.point.values, wanted, [group], secant).without_residuals()
             found = found.with_rows(self.linear[key], [group])
