@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import combinations, product
 
+import mpmath
 import numpy as np
 import pytest
 from inference.densities import alike, direct, seen_of, volume
@@ -305,3 +306,15 @@ def test_what_many_that_point_the_wrong_way_bring_is_nothing():
 def test_columns_that_are_no_matrix_of_products_are_refused():
     with pytest.raises(EstimationError):
         Posterior.at(Columns(-9.0 * np.eye(2), np.ones(2), np.zeros(2, int), np.zeros(2, bool)), np.ones(1), 1.0)
+
+
+def test_a_value_of_many_times_its_deviation_keeps_its_digits():
+    rng = np.random.default_rng(4)
+    design = 1e5 * rng.normal(size=(60, 8)) @ np.diag(np.logspace(-4, 0, 8)) @ rng.normal(size=(8, 8))
+    matrix, vector = design.T @ design, design.T @ (design @ np.full(8, 50.0))
+    columns = Columns(matrix, vector, np.zeros(8, dtype=int), np.zeros(8, dtype=bool))
+    with mpmath.workdps(40):
+        exact = mpmath.lu_solve(mpmath.matrix(matrix) + mpmath.eye(8) / 25, mpmath.matrix(vector))
+    found = Posterior.at(columns, np.array([5.0]), 1.0)
+    away = found.values - np.array(exact, dtype=float).ravel()
+    assert away @ matrix @ away < 1e-6  # of the squares of what is left, in units of the noise

@@ -25,6 +25,14 @@ def test_exponentials_are_rigid_motions_and_the_logarithm_undoes_them(angle):
     twists = np.concatenate([RNG.normal(size=(200, 3)), angle * AXES], axis=1)
     theirs = np.array([pinocchio.exp6(twist).homogeneous for twist in twists])
     np.testing.assert_allclose(kin.exp6(twists), theirs, rtol=0.0, atol=3e-15)
+    np.testing.assert_allclose(kin.log6(theirs), twists, rtol=1e-13, atol=atol + 1e-14)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.5, 2.0, 3.1])
+def test_the_left_jacobian_is_the_derivative_of_the_exponential(angle):
+    twist, step = np.concatenate([[0.3, -0.2, 0.5], angle * AXES[0]]), 1e-6 * np.eye(6)
+    after = kin.log6(kin.exp6(twist + step) @ kin.exp6(-twist)) - kin.log6(kin.exp6(twist - step) @ kin.exp6(-twist))
+    np.testing.assert_allclose(kin.left_jacobian(twist), after.T / 2e-6, atol=1e-9)
 
 
 def test_half_turn_has_length_pi_about_either_sense_of_its_axis():

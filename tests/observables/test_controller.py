@@ -7,6 +7,9 @@ import pytest
 from helpers import some
 
 import thermal_robot as tr
+from thermal_robot import kinematics as kin
+
+_TWISTS = [f"{kind} {axis}" for kind in ("translation", "rotation") for axis in "xyz"]
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +41,38 @@ def test_what_is_set_is_named(ur5, effect, value, said):
     (cause,) = (f for f in found.effects if f.name == effect)
     ((_, told),) = value.items()
     assert max(abs(p.value) for p in cause.parameters) == pytest.approx(told, rel=1e-3)
+
+
+def turned(angle, shift=(0.0, 0.0, 0.0)):
+    """A frame turned about z, rad, and shifted, m."""
+    return kin.homogeneous(kin.exp3([0.0, 0.0, angle]), np.array(shift))
+
+
+@pytest.mark.parametrize(
+    ("base", "tool", "verdict"),
+    [
+        (turned(0.0), turned(np.pi / 2), {"tool_frame"}),  # tool0 and the flange of a UR
+        (turned(np.pi), turned(0.0), {"base_frame"}),  # its base_link and its base
+        (turned(np.pi), turned(np.pi / 2, (0.05, 0.02, 0.1)), {"base_frame", "tool_frame"}),
+    ],
+)
+def test_frames_that_are_turned_are_no_fault_of_a_joint(ur5, base, tool, verdict):
+    own = reported(ur5)
+    poses = base @ kin.tool_poses(ur5, own.q) @ tool
+    place, turn = np.round(poses[:, :3, 3], 6), kin.rotation_to_quaternion(poses[:, :3, :3])
+    found = tr.diagnose(replace(own, position=place, orientation=turn))
+    assert set(found.verdict) == verdict
+    if "tool_frame" in verdict:  # the place where a pendant has it, and not the twist that leads there
+        told = [p.value for p in found.finding("tool_frame").parameters]
+        np.testing.assert_allclose(told, [*tool[:3, 3], *kin.log3(tool[:3, :3])], atol=5e-6)
+
+
+def test_a_tool_is_told_from_the_calibration_of_an_arm(ur5):
+    rng = np.random.default_rng(1)
+    calibrated = {f"{what} of {s.name}": 5e-4 * rng.normal() for s in ur5.segments if s.movable for what in _TWISTS}
+    found = tr.diagnose(reported(ur5, {"tool_frame": {"translation z": 0.12}, "geometric": calibrated}))
+    assert set(found.verdict) == {"tool_frame", "geometric"}
+    assert found.finding("tool_frame").parameters[2].value == pytest.approx(0.12, abs=2e-3)
 
 
 def test_the_same_model_differs_in_nothing(ur5):

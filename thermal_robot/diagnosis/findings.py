@@ -53,8 +53,8 @@ def divided_effects(fit: Fit) -> dict[str, Inside]:
 
 def estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
     """Estimates of one block of the best combination in its own parameters."""
-    parameters = fit.explanation.linear.blocks[block].parameters
-    return _estimates(parameters, fitted_values(fit, block), *_deviations(fit, block))
+    own = fit.explanation.linear.blocks[block]
+    return _estimates(own.parameters, own.effect.told(fitted_values(fit, block)), *_deviations(fit, block))
 
 
 def fitted_values(fit: Fit, block: int) -> Array:

@@ -12,7 +12,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import gate
 from thermal_robot.effects.effect import Channel, Effect, Parameter, Response
 from thermal_robot.errors import EffectError, ThermalRobotError
-from thermal_robot.kinematics import Displacement
+from thermal_robot.kinematics import Displacement, left_jacobian
 from thermal_robot.observables import instrument_rows
 
 if TYPE_CHECKING:
@@ -32,12 +32,23 @@ def sensitivity(observations: Observations, channel: Channel, index: int) -> Arr
     if channel == "segment":
         return observations.segment_sensitivity[:, :, index, :]
     if channel == "base":
-        return observations.base_sensitivity
+        return observations.base_sensitivity @ _onwards(observations, channel, 1.0)
     if channel == "tool":
-        return observations.tool_sensitivity
+        return observations.tool_sensitivity @ _onwards(observations, channel, -1.0)
     shifts = np.zeros((observations.campaign.samples, 6, 3))
     shifts[instrument_rows(observations.campaign), :3] = observations.frames.base[:3, :3].T
     return shifts
+
+
+def _onwards(observations: Observations, channel: Channel, side: float) -> Array:
+    """Return the derivative (6, 6) of a displaced frame by its own twist, on the left (1) or right (−1).
+
+    Of one that is the same in all rows: such as follow a quantity are small.
+    """
+    moved = np.asarray(getattr(observations.displacement, channel, None))
+    if moved.ndim != 2 or not moved.any() or (moved != moved[0]).any():
+        return np.eye(6)
+    return left_jacobian(side * moved[0])
 
 
 def column(observations: Observations, response: Response, measures: int) -> Array:

@@ -67,6 +67,16 @@ class Geometric(Effect):
             for k, (component, unit) in enumerate(TWIST)
         )
 
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Return the settings: all segments; where another model says the pose, without the ends that its frames move.
+
+        A tool of 0.1 m that is set there would else be a calibration of the last segment by as much.
+        """
+        if not of_model(observations.campaign):
+            return (self,)
+        first, *_, last = (s.parent_link for s in observations.robot.segments)
+        return (self, *(replace(self, excluded=ends) for ends in ((last,), (first,), (first, last))))
+
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
         """Denavit-Hartenberg parameter errors (1955) without the joint zeros, which are ``joint_offset``.
 
@@ -167,6 +177,7 @@ class BaseFrame(Effect):
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
     in_model: ClassVar[str] = "a base frame set in the controller"
+    frame: ClassVar[str] = "base"
     in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
@@ -215,6 +226,7 @@ class ToolFrame(Effect):
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
     in_model: ClassVar[str] = "a tool or flange frame set in the controller"
+    frame: ClassVar[str] = "tool"
     in_model_times: ClassVar[float] = IN_MODEL
     size_spread: ClassVar[float] = UNSOURCED
 

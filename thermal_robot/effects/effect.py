@@ -36,6 +36,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.kinematics import exp6
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -212,6 +213,9 @@ class Effect(ABC):
     holds, such as wear."""
     in_model_times: ClassVar[float] = 1.0
     """Times of its expected size that it has there."""
+    frame: ClassVar[str] = ""
+    """Frame, ``base`` or ``tool``, that its first setting displaces by any twist: it begins where registration has it
+    if another model says the pose."""
     singular: ClassVar[str] = ""
     """The same of a single joint; the title where a class states none."""
     sided_by: ClassVar[tuple[str, ...]] = ()
@@ -308,6 +312,12 @@ class Effect(ABC):
             ``None`` where no quantity can be named: the one that goes with the error most is then drawn.
         """
         return None
+
+    def told(self, values: Array) -> Array:
+        """Return the fitted values (P,) as a finding tells them; a frame's twist as its place and rotation vector."""
+        if self.frame and len(values) == len(TWIST):
+            return np.concatenate([exp6(values)[:3, 3], values[3:]])
+        return values
 
     def delivered(self, observations: Observations) -> Effect:
         """Equivalent effect for prediction at other rows."""

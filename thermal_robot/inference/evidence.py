@@ -201,7 +201,10 @@ def _unconstrained(columns: Columns, scale: Array, variance: float) -> tuple[Arr
     lower, _ = dpotri(factor, lower=1, overwrite_c=1)
     covariance = lower + lower.T  # above the diagonal it is zero
     covariance.ravel(order="K")[:: size + 1] *= 0.5
-    return covariance @ columns.vector / variance, covariance, log_det
+    mean = covariance @ columns.vector / variance
+    # refined once, as an inverse loses digits where values are many times their deviations
+    mean += covariance @ ((columns.vector - columns.matrix @ mean) / variance - prior_precision * mean)
+    return mean, covariance, log_det
 
 
 def _truncated(

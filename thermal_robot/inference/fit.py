@@ -24,6 +24,7 @@ from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.exact import (
     ExactSelection,
     at_exact_model,
+    corrected_observations,
     gauss_newton,
     refined_blocks,
     select_exactly,
@@ -36,8 +37,11 @@ from thermal_robot.inference.registration import found_frames, frames_known, mov
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.variance_components import reweighted
 from thermal_robot.inference.weights import Noise, first_whitening, reweigh
-from thermal_robot.observables import components
+from thermal_robot.kinematics import log6
+from thermal_robot.observables import components, of_model
 from thermal_robot.observations import Frames, Observations, observe
+
+Held = list[tuple[Effect, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +99,25 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
         nominal = observe(campaign, register(campaign))
         needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
         variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
-        return _fitted(campaign, select_exactly(nominal, variants, progress), needs, variants)
+        held = _set_frames(nominal, variants) if of_model(campaign) else []
+        begun = corrected_observations(campaign, nominal.frames, held) if held else nominal
+        selection = select_exactly(begun, variants, progress, held=held)
+        if held:  # what stood in for frames was linearised beside them
+            selection = select_exactly(selection.observations, variants, progress, held=selection.held)
+        return _fitted(campaign, selection, needs, variants)
 
     return _reweighted(campaign, selected, progress)
+
+
+def _set_frames(nominal: Observations, variants: Mapping[str, tuple[Effect, ...]]) -> Held:
+    """Register the frames that another model has set: effects that displace them, with their twists (6,).
+
+    A turn by 90 degrees, or the length of a tool, is no small error: linearised elsewhere it hides all others.
+    """
+    free = replace(nominal.campaign, base_known=False, tool_known=False)
+    found, own = register(free), nominal.frames
+    twists = {"base": log6(np.linalg.inv(own.base) @ found.base), "tool": log6(found.tool @ np.linalg.inv(own.tool))}
+    return [(each[0], twists[each[0].frame]) for each in variants.values() if each[0].frame]
 
 
 def _reweighted(campaign: Campaign, solve: Callable[[Campaign], Fit], progress: Callable[[str], None]) -> Fit:
@@ -174,9 +194,6 @@ def require_enough(campaign: Campaign) -> None:
             f"{poses} different poses are too few: {unknown} unknowns of the frames need at least {fewest} of them, "
             "and effects many more"
         )
-
-
-Held = list[tuple[Effect, Array]]
 
 
 def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import expm
 
 from thermal_robot.arrays import Array
 
@@ -105,6 +106,41 @@ def log3(rotations: ArrayLike) -> Array:
     factor = np.divide(2.0 * half_angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
     vector: Array = factor * imaginary
     return vector
+
+
+def log6(motions: ArrayLike) -> Array:
+    """Logarithm of SE(3): twist of each rigid motion, its rotation vector of length at most π.
+
+    Parameters
+    ----------
+    motions
+        (..., 4, 4) homogeneous matrices.
+
+    Returns
+    -------
+    ndarray
+        (..., 6), linear part in m, angular part in rad; equal to ``pinocchio.log6``.
+    """
+    found = np.asarray(motions, dtype=float)
+    angular = log3(found[..., :3, :3])
+    units = np.concatenate(np.broadcast_arrays(np.eye(3), angular[..., None, :]), axis=-1)
+    left_jacobian = exp6(units)[..., :3, 3].swapaxes(-1, -2)
+    linear: Array = np.linalg.solve(left_jacobian, found[..., :3, 3:])[..., 0]
+    return np.concatenate([linear, angular], axis=-1)
+
+
+def left_jacobian(twist: Array) -> Array:
+    """Left Jacobian (6, 6) of SE(3) at a twist (6,): exp(ξ + δ) = exp(J δ) exp(ξ) to first order.
+
+    J = ∫ exp(s ad ξ) ds over 0…1, from one exponential of a block matrix (Van Loan, *IEEE TAC* 23, 1978). The right
+    Jacobian at a twist is the left one at its opposite.
+    """
+    blocks = np.zeros((12, 12))
+    blocks[:3, :3] = blocks[3:6, 3:6] = skew(twist[3:])
+    blocks[:3, 3:6] = skew(twist[:3])
+    blocks[:6, 6:] = np.eye(6)
+    found: Array = expm(blocks)[:6, 6:]
+    return found
 
 
 def quaternion_to_rotation(quaternions: ArrayLike) -> Array:

@@ -25,6 +25,7 @@ from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.inference.registration import BaseAndTarget, alternate, middle, starts
 from thermal_robot.inference.settings import LEVER, START_ROUNDS
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
+from thermal_robot.observables import of_model
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
 
@@ -50,7 +51,7 @@ class Readings:
 
     @classmethod
     def of(cls, campaign: Campaign) -> Readings:
-        """Take the columns of a campaign with measurements."""
+        """Take the columns of a campaign with measurements; frames that another model has set are unknown."""
         return cls(
             campaign.robot,
             campaign.q,
@@ -59,8 +60,8 @@ class Readings:
             campaign.orientation if campaign.targets is None else None,
             campaign.simulated_position,
             campaign.covariates.get("time"),
-            campaign.base_known,
-            campaign.tool_known,
+            campaign.base_known and not of_model(campaign),
+            campaign.tool_known and not of_model(campaign),
             Frames.declared(campaign),
             campaign.units.length,
             np.ones(campaign.samples, dtype=bool),
