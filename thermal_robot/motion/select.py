@@ -238,16 +238,22 @@ def _fewer(scales: Scales, own: Weighed) -> Weighed | None:
 
 
 def _together(scales: Scales, own: Weighed, changed: Sequence[Weighed]) -> Weighed:
-    """Return the set with the first change of each group of joints; with one of what all share, that alone."""
-    placed, active, taken = scales.model.placed, own.active, set[int]()
+    """Return the set with the first change of each joint; with one of what all share, that alone.
+
+    Of joints that move each other the first change alone, where that is likelier.
+    """
+    placed, active, values, taken = scales.model.placed, own.active, own.point.values, set[int]()
     for one in changed:
         other = one.active ^ own.active
-        groups = {k for k, group in enumerate(scales.model.groups) if np.isin(placed[other], group).any()}
-        if SHARED in placed[other] and not taken:
+        joints = set(placed[other].tolist())
+        if SHARED in joints and not taken:
             return one
-        if SHARED not in placed[other] and not groups & taken:
-            active, taken = active ^ other, taken | groups
-    return scales.others(own, [(active, (own.point.values,))])[0]
+        if SHARED not in joints and not joints & taken:
+            active, taken = active ^ other, taken | joints
+            values = np.where(other, one.point.values, values)
+    several = scales.others(own, [(active, (values,))])[0]
+    alone = len(scales.model.groups) == 1 and several.log_evidence < changed[0].log_evidence
+    return changed[0] if alone else several
 
 
 def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
