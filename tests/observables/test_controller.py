@@ -103,3 +103,11 @@ def test_poses_of_a_controller_are_read_from_a_file(ur5, tmp_path):
     assert again.base_known
     assert again.tool_known
     assert np.allclose(again.position, campaign.position, atol=1e-12)
+
+
+def test_an_arm_of_one_joint_has_poses_too():
+    urdf = """<robot name="arm"><link name="base"/><link name="tip"/>
+    <joint name="j" type="revolute"><parent link="base"/><child link="tip"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+    found = tr.diagnose(reported(tr.load_robot(urdf, "tip"), {"tool_frame": {"translation x": 0.1}}))
+    assert "tool_frame" in found.verdict

@@ -72,9 +72,10 @@ class Geometric(Effect):
 
         A tool of 0.1 m that is set there would else be a calibration of the last segment by as much.
         """
-        if not of_model(observations.campaign):
+        links = [segment.parent_link for segment in observations.robot.segments]
+        if not of_model(observations.campaign) or len(links) < 3:
             return (self,)
-        first, *_, last = (s.parent_link for s in observations.robot.segments)
+        first, last = links[0], links[-1]
         return (self, *(replace(self, excluded=ends) for ends in ((last,), (first,), (first, last))))
 
     def independent(self, observations: Observations) -> tuple[Parameter, ...]:
