@@ -39,7 +39,7 @@ def model(seed=1, rows=ROWS, scale=1e4):
     linear, _, _ = drawn(np.random.default_rng(seed), rows)
     found = Model.of(explained(linear), np.arange(rows) * 20 // rows)
     linear = replace(linear, blocks=linear.blocks[2:5])
-    return replace(found, linear=linear, scales=(scale,) * 3, kept=np.ones(rows, dtype=bool))
+    return replace(found, linear=linear, scales=(scale,) * 3, kept=np.ones(rows, dtype=bool), near=np.inf)
 
 
 def fitted(linear, blocks, weights, rows):
@@ -60,6 +60,19 @@ def test_rows_held_out_are_predicted_by_a_fit_to_the_others():
             right = fitted(known.linear, chosen, known.whitening.weights, ~test)[test]
             np.testing.assert_allclose(left[test[validation.numbers]], right, atol=1e-6)
         assert validation.squares(chosen)[0] == pytest.approx((left**2).sum(), rel=1e-9)
+
+
+def test_frames_that_the_other_rows_hardly_tell_stay_near():
+    known = model()
+    frames, rng = known.linear.frames.copy(), np.random.default_rng(3)
+    frames[:, :, 1] = frames[:, :, 0] + 1e-4 * rng.normal(size=frames.shape[:2])  # a place of the tool, and of a table
+    gap, blocks = 1e-3 * rng.normal(size=known.linear.gap.shape), known.linear.blocks
+    own = replace(known, linear=Linear(gap, frames, blocks), variance=1e-6)
+    rows = [~each(known.block)[0]]
+    free, held = (np.abs(replace(own, near=near).fits(rows, ())[0, :9]) for near in (np.inf, 5e-3))
+    assert free[:2].max() > 0.1
+    assert held[:2].max() < 5e-3
+    np.testing.assert_allclose(held[2:], free[2:], atol=1e-4)
 
 
 @pytest.mark.parametrize("tests", ["blocks", "regions"])

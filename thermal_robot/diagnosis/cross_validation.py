@@ -25,6 +25,7 @@ from scipy.special import stdtrit
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turning import moves
+from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.errors import EstimationError
@@ -48,7 +49,8 @@ class Model:
     ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), tiny for
     those held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows that count
     in the score; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations are weighted
-    by their own residuals, as in a registration, and not by their noise.
+    by their own residuals, as in a registration, and not by their noise. ``near``: prior standard deviation of the
+    frames about those of all rows, m and rad.
     """
 
     linear: Linear
@@ -58,6 +60,7 @@ class Model:
     kept: Rows
     block: Labels
     apart: bool = False
+    near: float = diagnosis_settings.NEAR
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
@@ -192,17 +195,17 @@ class Model:
         # the gap of the nominal robot is what registration leaves
         variance = np.maximum(whole[:, -1, -1] / equations if self.apart else 0.0, np.full(len(whole), self.variance))
         for _ in range(settings.FOLD_ROUNDS):
-            signed = _signed(whole, variance, self.flat, tight)
+            signed = self._signed(whole, variance, tight)
             variance = np.maximum(np.einsum("i,gij,j->g", signed, whole, signed) / equations, self.variance)
         different = {used.tobytes(): used for used in rows}
-        solved = {key: _signed(self.products(r)[own], variance, self.flat, tight) for key, r in different.items()}
+        solved = {key: self._signed(self.products(r)[own], variance, tight) for key, r in different.items()}
         return np.stack([solved[used.tobytes()] for used in rows])
 
-
-def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
-    # in units of the first variance, so that one kind alone is not rescaled
-    weighted = np.einsum("g,gij->ij", variance[0] / variance, products)
-    return np.append(-ridge(weighted, flat, variance[0] * tight), 1.0)
+    def _signed(self, products: Array, variance: Array, tight: Array) -> Array:
+        # in units of the first variance, so that one kind alone is not rescaled
+        weighted = np.einsum("g,gij->ij", variance[0] / variance, products)
+        weighted.ravel()[: self.flat * len(weighted) : len(weighted) + 1] += variance[0] / self.near**2
+        return np.append(-ridge(weighted, self.flat, variance[0] * tight), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
