@@ -60,7 +60,7 @@ class Model:
     kept: Rows
     block: Labels
     apart: bool = False
-    near: float = diagnosis_settings.NEAR
+    near: float = diagnosis_settings.FOLD_FRAMES
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:

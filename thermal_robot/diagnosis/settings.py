@@ -9,7 +9,7 @@ BEYOND = 5.0
 """Offset outside the campaign's temperatures, K: a hall on another day."""
 LOOSE = 0.1
 """Prior standard deviation of a frame, m and rad, where the data leave it open."""
-NEAR = 5e-3
+FOLD_FRAMES = 5e-3
 """Prior standard deviation, m and rad, of how far a fold's frames are from those of all rows. A direction that is
 nearly free moves decimetres, where a linear problem predicts nothing; at a metre this bends by 25 µm."""
 TIE = 1e-3
