@@ -31,24 +31,21 @@ def sensitivity(observations: Observations, channel: Channel, index: int) -> Arr
         return observations.joint_sensitivity[:, :, index, None]
     if channel == "segment":
         return observations.segment_sensitivity[:, :, index, :]
-    if channel == "base":
-        return observations.base_sensitivity @ _onwards(observations, channel, 1.0)
-    if channel == "tool":
-        return observations.tool_sensitivity @ _onwards(observations, channel, -1.0)
+    if channel in ("base", "tool"):
+        found, side = (
+            (observations.base_sensitivity, 1.0) if channel == "base" else (observations.tool_sensitivity, -1.0)
+        )
+        twist = _set_twist(observations, channel)
+        return found if twist is None else found @ left_jacobian(side * twist)
     shifts = np.zeros((observations.campaign.samples, 6, 3))
     shifts[instrument_rows(observations.campaign), :3] = observations.frames.base[:3, :3].T
     return shifts
 
 
-def _onwards(observations: Observations, channel: Channel, side: float) -> Array:
-    """Return the derivative (6, 6) of a displaced frame by its own twist, on the left (1) or right (−1).
-
-    Of one that is the same in all rows: such as follow a quantity are small.
-    """
+def _set_twist(observations: Observations, channel: Channel) -> Array | None:
+    """Return the twist (6,) that displaces a frame in all rows alike; none where it follows a quantity, being small."""
     moved = np.asarray(getattr(observations.displacement, channel, None))
-    if moved.ndim != 2 or not moved.any() or (moved != moved[0]).any():
-        return np.eye(6)
-    return left_jacobian(side * moved[0])
+    return moved[0] if moved.ndim == 2 and moved.any() and (moved == moved[0]).all() else None
 
 
 def column(observations: Observations, response: Response, measures: int) -> Array:

@@ -124,8 +124,8 @@ def log6(motions: ArrayLike) -> Array:
     found = np.asarray(motions, dtype=float)
     angular = log3(found[..., :3, :3])
     units = np.concatenate(np.broadcast_arrays(np.eye(3), angular[..., None, :]), axis=-1)
-    left_jacobian = exp6(units)[..., :3, 3].swapaxes(-1, -2)
-    linear: Array = np.linalg.solve(left_jacobian, found[..., :3, 3:])[..., 0]
+    carried = exp6(units)[..., :3, 3].swapaxes(-1, -2)
+    linear: Array = np.linalg.solve(carried, found[..., :3, 3:])[..., 0]
     return np.concatenate([linear, angular], axis=-1)
 
 
