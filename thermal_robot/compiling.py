@@ -19,20 +19,25 @@ MOST_UNKEPT = 50
 """Number of retries where a full disk cannot keep a compiled function; a kernel is made of twenty at most."""
 
 
-def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"})) -> Any:
+def compiled(
+    function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"}), inline: bool = False
+) -> Any:
     """Return a function that Numba compiles at its first call (``nogil``); cached on disk where possible.
 
     ``loosened``: LLVM's fast-math flags; by default only ``contract``, a product and a sum rounded once, so that NaN
-    stays NaN.
+    stays NaN. ``inline``: into the functions that call it, where a call would cost as much as what it does.
     """
     import numba
 
     compiler: Any = numba.njit
     fastmath = loosened if isinstance(loosened, bool) else set(loosened)
+    how: dict[str, Any] = {"nogil": True, "fastmath": fastmath, "error_model": "numpy"}
+    if inline:
+        how["inline"] = "always"
     try:
-        return compiler(cache=True, nogil=True, fastmath=fastmath, error_model="numpy")(function)
+        return compiler(cache=True, **how)(function)
     except RuntimeError:  # numba finds no folder for its cache
-        return compiler(nogil=True, fastmath=fastmath, error_model="numpy")(function)
+        return compiler(**how)(function)
 
 
 @cache

@@ -116,8 +116,11 @@ def test_no_step_leaves_a_bound_by_rounding():
         columns[:, 1] = 3.0 * columns[:, 0] + 1e-6 * columns[:, 1]
         target = columns @ rng.standard_normal(12) + rng.standard_normal(40)
         least = np.where(rng.random(12) < 0.7, 0.0, -np.inf)
-        found, _ = _ahead((columns.T @ columns, columns.T @ target, np.full(12, 1e-6), least), np.zeros(12), 0.0)
+        most = np.where(rng.random(12) < 0.3, 1e-3, np.inf)
+        bounds = np.array([least, most])
+        found, _ = _ahead((columns.T @ columns, columns.T @ target, np.full(12, 1e-6), bounds), np.zeros(12), 0.0)
         assert (found >= least).all()
+        assert (found <= most).all()
 
 
 def test_the_fit_returns_to_the_true_values(known):
@@ -177,7 +180,7 @@ def test_each_parameter_keeps_its_value_and_loses_information_by_its_ratio(known
     near = 1e-3 * np.abs(gram.vector).max()
     np.testing.assert_allclose(gram.matrix @ found, gram.vector, atol=near)
     assert [one.label for one in model.parameters if one.joint == SHARED] == [
-        "mass", "height in the root frame", "friction"
+        "mass", "height in the root frame", "friction", "compliance"
     ]  # fmt: skip
 
 
@@ -197,6 +200,33 @@ def test_a_plane_is_felt_in_sets_that_have_it_and_in_no_other():
     rubbed = model.moved(values, np.array([model.index("contact"), model.keys.index(("contact", "friction"))]))
     assert (rubbed[0] > 1e-3).all()  # a swivelling joint is dragged, though nothing presses it
     assert 0.5 * rubbed[0, 0] < rubbed[1, 0] < 1.1 * rubbed[0, 0]
+
+
+@pytest.mark.parametrize("stuck", [1, 2])
+def test_a_joint_that_friction_holds_leaves_the_plane_to_the_others(stuck):
+    """Together they hold the tool at the plane, less what it flexes, however much of it the springs would have done."""
+    log = arms.log(*arms.tables(3, 8.0)).with_joints(arms.JOINTS[:3])
+    model = ServoModel(log)
+    values, plane = np.zeros(len(model.parameters)), 0.03
+    flex = model.keys.index(("contact", "compliance"))
+    for joint in range(1, 3):
+        values[model.index("droop", joint)] = 0.005
+    values[model.index("load_friction", stuck)] = 0.5
+    values[model.index("contact")], values[flex] = plane, 1e-9
+
+    def below(free):
+        model.refreshed(values)
+        return model.lowest + plane - model.ends.heights(model.path(values, free=free))
+
+    free, held = below(True), below(False)
+    deep = free > 5e-3
+    assert deep.mean() > 0.05
+    assert free[deep].mean() > 0.03
+    assert held[deep].max() < 0.1 * free[deep].max()  # it may stay above, where friction holds it
+    values[model.index("load_friction", stuck)] = 0.0
+    rigid = below(False)[deep].mean()
+    values[flex] = 2e-4
+    assert below(False)[deep].mean() > rigid + 2e-3
 
 
 def test_few_motions_are_cut_into_as_many_pieces_for_the_fit_as_for_faults():

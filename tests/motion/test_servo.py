@@ -21,7 +21,7 @@ def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, 
     row[PARAMETERS.index("low")], row[PARAMETERS.index("high")] = -np.inf, np.inf
     for name, value in numbers.items():
         row[PARAMETERS.index(name)] = value
-    loads, none, slopes = (np.zeros((k, n, *shape)) for k, shape in ((5, (joints,)), *[(2, (joints, joints))] * 2))
+    loads, none, slopes = (np.zeros((k, n, *shape)) for k, shape in ((8, (joints,)), *[(2, (joints, joints))] * 2))
     loads[0], slopes[0] = load, slope * np.eye(joints)
     loads[2, :, -1] = LEVER if joints > 1 else 0.0
     around = loads, none, slopes, none, np.zeros((n, joints)), np.zeros((n, joints)), np.zeros(n)
@@ -29,7 +29,7 @@ def moved(command=1.0, seconds=2.0, load=0.0, slope=0.0, start=0.0, substeps=5, 
     ends = len(times) * np.arange(joints)[:, None] + [0, len(times)]
     command = np.tile(times, joints), np.tile(values, joints), ends
     rows, begun = np.tile(row, (1, joints, 1)), np.full((1, joints), start)
-    weights = np.array([[0.0, plane if joints > 1 else 0.0, 0.0, 0.0]])
+    weights = np.array([[0.0, plane if joints > 1 else 0.0, 0.0, 0.0, 0.0]])
     found = simulate(rows, weights, grid, command, around, begun, STEP, substeps)
     return found[0, :, -1], STEP * np.arange(n)
 
@@ -181,13 +181,13 @@ def test_friction_of_joints_that_move_each_other_obeys_coulombs_law(load_frictio
         for name, value in (("low", -np.inf), ("high", np.inf), ("lag", 0.05), ("droop", 1.0), ("coulomb", most),
                             ("load_friction", load_friction)):  # fmt: skip
             row[:, PARAMETERS.index(name)] = value
-        loads, still = np.zeros((5, 2, joints)), np.zeros((2, joints))
+        loads, still = np.zeros((8, 2, joints)), np.zeros((2, joints))
         masses = np.stack([np.stack([mass, mass]), np.zeros((2, joints, joints))])
         loads[0], none = load, np.zeros_like(masses)
         around = loads, masses, none, none, still, still, still[:, 0]
         given = np.zeros(joints), command * 0.1, np.stack([np.arange(joints), np.arange(1, joints + 1)], axis=1)
         grid = np.array([0, 2]), np.zeros(1)
-        found = simulate(row[None], np.zeros((1, 4)), grid, given, around, np.zeros((1, joints)), h, 1)
+        found = simulate(row[None], np.zeros((1, 5)), grid, given, around, np.zeros((1, joints)), h, 1)
         v = found[0, 1] / h
         pulled = load + (2.0 / h) * (mass - np.diag(np.diag(mass))) @ v
         force = 0.1 * command - 0.5 * h * v - 0.05 * v - (2.0 / h) * mass @ v - load

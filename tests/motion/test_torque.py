@@ -179,10 +179,10 @@ def test_friction_turns_round_over_four_thousandths_of_a_radian(rows):
 def test_the_height_of_the_tool_has_the_derivative_that_is_said():
     model = ServoModel(log())
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 2))
-    height, slope = model._heights(q), model._up @ model._tool(q)
+    height, slope = model.ends.heights(q), model.ends.up @ model.ends.jacobian(q)
     for j in range(2):
         moved = q + 1e-5 * (np.arange(2) == j)
-        np.testing.assert_allclose((model._heights(moved) - height) / 1e-5, slope[:, j], atol=1e-5)
+        np.testing.assert_allclose((model.ends.heights(moved) - height) / 1e-5, slope[:, j], atol=1e-5)
 
 
 def test_the_drag_of_a_strong_gear_is_found_whose_torque_limit_nobody_stated():

@@ -22,9 +22,9 @@ class ServoEffect:
     """One number of the servo model, or of the torque channel's, that may differ from what the maker states.
 
     ``size`` is the prior's standard deviation in ``unit``; with ``of_limit`` in shares of torque limit over stiffness,
-    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed; no value is below ``least``. A dead zone below
-    zero is a starting force: at any error the drive gives so much more, to overcome friction. ``torque``: name and
-    unit times the stiffness.
+    rad, or of the limit, N·m, with ``of_speed`` over the fastest speed; no value is below ``least`` or above ``most``.
+    A dead zone below zero is a starting force: at any error the drive gives so much more, to overcome friction.
+    ``torque``: name and unit times the stiffness.
     """
 
     name: str
@@ -38,6 +38,7 @@ class ServoEffect:
     of_speed: bool = False
     spread: float = SOURCED
     least: float = 0.0
+    most: float = inf
     torque: tuple[str, str] | None = None
 
 
@@ -55,7 +56,8 @@ EFFECTS = (
     ServoEffect("coulomb", "Coulomb friction", "Coulomb friction", "half width", "coulomb", "rad", 0.02, of_limit=True,
                 torque=("torque", "N·m")),
     ServoEffect("load_friction", "friction that grows with load", "friction that grows with load",
-                "share of the load", "load_friction", "", 0.15, torque=("share of the load", "")),
+                "share of the load", "load_friction", "", 0.15, most=settings.SELF_LOCKING,
+                torque=("share of the load", "")),
     ServoEffect("stribeck", "Stribeck friction", "Stribeck friction", "breakaway", "stribeck", "rad", 0.01,
                 of_limit=True, spread=UNSOURCED, torque=("breakaway torque", "N·m")),
     ServoEffect("dead_zone", "dead zone, play or starting force",

@@ -126,7 +126,7 @@ class Point:
         """Predict the linearised model at the maximum a posteriori values of some parameters (P,), the others zero."""
         own, (matrix, vector), values = np.flatnonzero(active), self.whole, np.zeros(len(active))
         if len(own):
-            problem = matrix[np.ix_(own, own)], vector[own], self.model.sizes[own] ** -2.0, self.model.least[own]
+            problem = matrix[np.ix_(own, own)], vector[own], self.model.sizes[own] ** -2.0, self.model.bounds[:, own]
             values[own], _ = _ahead(problem, values[own], 0.0)
         return Point(self.model, values, [one.at(values) for one in self.rows])
 
@@ -241,7 +241,7 @@ class _Descent:
         if not len(own):
             return None
         matrix, vector = (one[:, self.motions].sum(axis=(0, 1)) for one in point.products[:2])
-        problem = matrix[np.ix_(own, own)], vector[own], sizes[own] ** -2.0, self.model.least[own]
+        problem = matrix[np.ix_(own, own)], vector[own], sizes[own] ** -2.0, self.model.bounds[:, own]
         steps = (_ahead(problem, here[own], damping) for damping in settings.DAMPINGS)
         first, promised = next(steps)
         if promised < settings.SETTLED * before:
@@ -271,16 +271,16 @@ def _with(values: Array, own: NDArray[np.int64], some: Array) -> Array:
 def _ahead(problem: Problem, here: Array, damping: float) -> tuple[Array, float]:
     """Return values (K,) after a Levenberg-Marquardt step, bounded, and by how much −2 log posterior falls.
 
-    ``problem``: information (K, K), right side (K,), the priors' precisions and least values (K,).
+    ``problem``: information (K, K), right side (K,), the priors' precisions (K,), least and largest values (2, K).
     """
-    inside, along, prior, least = problem
+    inside, along, prior, (least, most) = problem
     own = np.diag(inside)
     held = damping * (own + np.median(own / prior) * prior)
     whole = inside + np.diag(held + prior)
     root = np.linalg.cholesky(whole)
     pull = np.linalg.solve(root, along + held * here)
-    found = lsq_linear(root.T, pull, bounds=(least, np.inf), method="bvls").x
-    found = np.maximum(found, least)  # it rounds: a limit of -1e-21 is none
+    found = lsq_linear(root.T, pull, bounds=(least, most), method="bvls").x
+    found = np.clip(found, least, most)  # it rounds: a limit of -1e-21 is none
     cost = [x @ (inside @ x + prior * x - 2.0 * along) for x in (here, found)]
     return found, float(cost[0] - cost[1])
 

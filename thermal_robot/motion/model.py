@@ -16,14 +16,13 @@ from scipy.signal import savgol_filter
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import threads
-from thermal_robot.kinematics.frames import frame_jacobians, tool_poses
 from thermal_robot.kinematics.loads import Dynamics, Loads
 from thermal_robot.motion import settings
-from thermal_robot.motion.contact import contact_yields
+from thermal_robot.motion.contact import Ends, contact_yields
 from thermal_robot.motion.effects import EFFECTS, SIMULATOR, size
 from thermal_robot.motion.following import parts
 from thermal_robot.motion.log import MotionLog
-from thermal_robot.motion.servo import PARAMETERS, simulate
+from thermal_robot.motion.servo import NEAR, PARAMETERS, plane_forces, simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,8 +33,8 @@ _POOL = "joints"
 """Name of the threads of a model's pool, in which it asks for no more of them."""
 SHARED = -1
 """Joint of a parameter that all joints share."""
-RUBBING = "contact", "friction"
-"""Key of the parameter of friction on a plane that the tool touches."""
+RUBBING, FLEXING = ("contact", "friction"), ("contact", "compliance")
+"""Keys of the parameters of a plane that the tool touches: its friction, and how far it and the links flex."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +53,7 @@ class Parameter:
     least: float
     number: str
     of: str = ""
+    most: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +97,11 @@ class JointModel(ABC):
     def least(self) -> Array:
         """(P,) least values of the parameters, −∞ where they have none."""
         return np.array([one.least for one in self.parameters])
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, P) least and largest values of the parameters, infinite where they have none."""
+        return np.array([self.least, [one.most for one in self.parameters]])
 
     @cached_property
     def placed(self) -> NDArray[np.int64]:
@@ -269,7 +274,8 @@ class ServoModel(JointModel):
             self.groups = (tuple(self.joints),)
         self.about = self._read() if self.coupled else np.clip(self.commanded, *self.reach)
         self.loads = self._loads()
-        self.lowest = float(self._heights(self.commanded).min())
+        self.ends = Ends(log.robot, log.joints)
+        self.lowest = float(self.ends.heights(self.commanded).min())
         self.motions = [samples[3] for samples in self._samples]
         self.parameters = self._parameters()
         self._press(np.zeros(len(self.parameters)))
@@ -339,7 +345,7 @@ class ServoModel(JointModel):
 
     def _parameters(self) -> tuple[Parameter, ...]:
         found = [
-            Parameter(e.name, j, e.label, e.unit, size(e, servo), e.spread, e.least, e.number)
+            Parameter(e.name, j, e.label, e.unit, size(e, servo), e.spread, e.least, e.number, most=e.most)
             for j, servo in enumerate(self.servos)
             for e in EFFECTS
             if e.number not in (("droop",) if servo.kp else ("kp",))
@@ -351,8 +357,8 @@ class ServoModel(JointModel):
             found.append(self.payload(self.loads.torque[1]))
             found.append(Parameter("contact", SHARED, "height in the root frame", "m", 0.1, 1.5, 0.0, "contact"))
             if not self.held:
-                effect, of = RUBBING
-                found.append(Parameter(effect, SHARED, of, "", settings.PLANE_FRICTION, 1.0, 0.0, "rubbing", of))
+                usual = (RUBBING, "", settings.PLANE_FRICTION), (FLEXING, "m/N", settings.FLEX)
+                found += [Parameter(name, SHARED, of, unit, one, 1.0, 0.0, of, of) for (name, of), unit, one in usual]
         return tuple(found)
 
     def start(self) -> Array:
@@ -372,7 +378,7 @@ class ServoModel(JointModel):
     @cached_property
     def _raised(self) -> float:
         """Height, m, above its lowest command to which the tool comes down."""
-        height = self._heights(self.measured[np.isfinite(self.measured).all(axis=1)])
+        height = self.ends.heights(self.measured[np.isfinite(self.measured).all(axis=1)])
         return max(float(np.quantile(height, 1.0 - settings.FEW)) - self.lowest, 0.0)
 
     @cached_property
@@ -406,39 +412,10 @@ class ServoModel(JointModel):
         most = [np.quantile(np.abs(one), settings.FEW, axis=0) for one in self._moved[1:]]
         return np.maximum(most, settings.STIRRED / settings.STRIDE)
 
-    @cached_property
-    def _up(self) -> Array:
-        """(3,) direction against gravity."""
-        gravity = self.log.robot.gravity
-        return np.asarray(-gravity / max(float(np.linalg.norm(gravity)), 1e-12))
-
-    @cached_property
-    def _chain(self) -> tuple[list[int], list[int]]:
-        """Joints of the log that move the tool, and their places in the chain."""
-        names, chain = self.log.joints, self.log.robot.joint_names
-        own = [j for j, name in enumerate(names) if name in chain]
-        return own, [chain.index(names[j]) for j in own]
-
-    def _whole(self, q: Array) -> Array:
-        """Positions of the tool's chain from those of the log's joints (n, J); others are held at zero."""
-        found, (own, at) = np.zeros((len(q), self.log.robot.n)), self._chain
-        found[:, at] = q[:, own]
-        return found
-
-    def _heights(self, q: Array) -> Array:
-        """Height of the tool (n,), m, against gravity, at positions (n, J)."""
-        return tool_poses(self.log.robot, self._whole(q))[:, :3, 3] @ self._up
-
-    def _tool(self, q: Array) -> Array:
-        """(n, 3, J) Jacobian of the tool's position by the log's joints, at positions (n, J)."""
-        found, (own, at) = np.zeros((len(q), 3, q.shape[1])), self._chain
-        found[:, :, own] = frame_jacobians(self.log.robot, self._whole(q))[:, :3, at]
-        return found
-
     def numbers(self, joint: int, values: Array) -> tuple[Array, Array]:
-        """(S, 18) inputs of the simulation and (S, 4) weights of payload and contact, for S sets (S, P)."""
+        """(S, 18) inputs of the simulation and (S, 5) weights of payload and contact, for S sets (S, P)."""
         servo, x = self.servos[joint], dict.fromkeys((*PARAMETERS, "kp", "creep"), np.zeros(len(values)))
-        weights = np.zeros((len(values), 4))
+        weights = np.zeros((len(values), 5))
         for p, parameter in enumerate(self.parameters):
             if parameter.joint == joint:
                 x[parameter.number] = values[:, p]
@@ -452,8 +429,9 @@ class ServoModel(JointModel):
                     weights[:, 1] = np.where(there > 0.0, self.lowest + there, -np.inf)
                 else:
                     weights[:, 1:3] = np.stack([there > 0.0, (there > 0.0) * (there - self.touching)], axis=1)
-            elif parameter.number == "rubbing":
-                weights[:, 3] = weights[:, 1] * (values[:, p] - self.rubbing)
+            elif parameter.number in self.touch:
+                k = 3 + (*self.touch,).index(parameter.number)
+                weights[:, k] = weights[:, 1] * (values[:, p] - self.touch[parameter.number])
         if servo.kp:  # a servo whose gain is stated is one with another stiffness, not one that follows its command
             stiffness = servo.kp * np.minimum(np.exp(x["kp"]), settings.SOFTER)
             x["droop"], x["derivative"] = 1.0 / stiffness, (servo.kd or 0.0) / stiffness
@@ -480,20 +458,25 @@ class ServoModel(JointModel):
             weights[:, 1:] = 0.0
         matrices = [one if self.coupled else one[:, :, at, None] for one in (parts.inertia, parts.slope, parts.drag)]
         around = loads, *matrices, self.reference[0][:, at], self.reference[1][:, at], self.heights
+        command, start = self._driven(group)
+        numbers = np.ascontiguousarray(np.stack([one for one, _ in each], axis=1))
+        grid = self.begins, self.first
+        return simulate(numbers, weights, grid, command, around, start, self.step, self.substeps)
+
+    def _driven(self, group: Sequence[int]) -> tuple[tuple[Array, Array, NDArray[np.int64]], Array]:
+        """Stamps, values and begins (J', M + 1) of a group's commands, and where its joints start (M, J')."""
+        at = slice(group[0], group[-1] + 1)
         start = np.empty((len(self.first), len(group)))
         for k, motion in enumerate(self.log.motions):
             begun = [motion.position.of(j)[1][0] for j in group]
             start[k] = np.where(np.isfinite(begun), begun, self.commanded[self.begins[k], at])
         commands = [self._commands[j] for j in group]
         offsets = np.cumsum([0, *(len(times) for times, _, _ in commands[:-1])])
-        command = (
+        return (
             np.concatenate([times for times, _, _ in commands]),
             np.concatenate([values for _, values, _ in commands]),
             np.array([begins + offset for (_, _, begins), offset in zip(commands, offsets, strict=True)]),
-        )
-        numbers = np.ascontiguousarray(np.stack([one for one, _ in each], axis=1))
-        grid = self.begins, self.first
-        return simulate(numbers, weights, grid, command, around, start, self.step, self.substeps)
+        ), start
 
     def path(self, values: Array, free: bool = False) -> Array:
         """(n, J) simulated positions of all joints on the grid at the parameters (P,); ``free``: without contact."""
@@ -564,13 +547,19 @@ class ServoModel(JointModel):
 
     def _loads(self) -> Loads:
         """Return the loads in the middle of the steps, and keep as ``reference`` (n, J) position and velocity there."""
-        q, v = (np.zeros_like(self.about, order="C" if self.coupled else "F") for _ in range(2))
-        q[:] = self.about
+        q, v = self._midway(self.about), np.zeros_like(self.about, order="C" if self.coupled else "F")
         for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
-            q[a + 1 : b] = 0.5 * (self.about[a : b - 1] + self.about[a + 1 : b])
             v[a + 1 : b] = np.diff(self.about[a:b], axis=0) / self.step
         self.reference = q, v if self.coupled else np.zeros_like(v)
         return self.dynamics.along(q, v) if self.coupled else self.dynamics.at_rest(q)
+
+    def _midway(self, path: Array) -> Array:
+        """(n, J) positions in the middle of the steps to the points of a path (n, J)."""
+        found = np.zeros_like(path, order="C" if self.coupled else "F")
+        found[:] = path
+        for a, b in zip(self.begins[:-1], self.begins[1:], strict=True):
+            found[a + 1 : b] = 0.5 * (path[a : b - 1] + path[a + 1 : b])
+        return found
 
     def _press(self, values: Array) -> None:
         """Compute the loads by contact of the tool with a plane, to which the joints' springs yield.
@@ -578,25 +567,53 @@ class ServoModel(JointModel):
         Of joints that move each other the simulation itself finds the plane's force.
         """
         p, (q, _) = self.index("contact"), self.reference
-        self.touching, self.rubbing, self.heights = 0.0, 0.0, np.zeros(len(q))
+        self.touching, self.heights, self.touch = 0.0, np.zeros(len(q)), dict[str, float]()
         # in memory a joint's follow each other
-        self.given = np.zeros((5, *q.shape)) if self.coupled else np.zeros((5, *q.shape[::-1])).transpose(0, 2, 1)
+        self.given = np.zeros((8, *q.shape)) if self.coupled else np.zeros((8, *q.shape[::-1])).transpose(0, 2, 1)
         self.given[:2] = self.loads.torque
         self.loads = replace(self.loads, torque=self.given[:2])  # of a long log one copy is large
         if p is None:
             return
         if self.held:
-            self.heights, self.given[2] = self._heights(q), self._up @ self._tool(q)
+            self.heights, self.given[2] = self.ends.heights(q), self.ends.up @ self.ends.jacobian(q)
             return
         # of a tool that touches nothing it tells what a plane would do where it is looked for
-        self.touching, self.rubbing = values[p].item() or self._raised, values[self.keys.index(RUBBING)].item()
-        deep = self.lowest + self.touching - self._heights(q)
-        at = np.flatnonzero(deep > 0.0)
-        first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)
-        soft = np.array([self.numbers(j, values[None])[0][0, PARAMETERS.index("droop")] for j in self.joints])
-        limits = np.array([servo.limit or np.inf for servo in self.servos])
+        values = np.where(self.of_effects(("contact",)) & (values[p] == 0.0), self.start(), values)
+        self.touching = float(values[p])
+        self.touch = {of: float(values[self.keys.index((effect, of))]) for effect, of in (RUBBING, FLEXING)}
+        self._yield(values)
+
+    def _yield(self, values: Array) -> None:
+        """Write what joints that go their own ways yield to the plane, and its derivatives: loads over stiffness."""
+        (q, _), plane, path = self.reference, self.lowest + self.touching, self.about
+        each, (command, start) = [self.numbers(j, values[None]) for j in self.joints], self._driven(self.joints)
+        numbers, drag = np.array([one[0] for one, _ in each]), np.zeros_like(q)
+        soft = numbers[:, PARAMETERS.index("droop")]
         # the compliance of a joint that gravity does not load is thought to be the others'
         usual = float(np.median(soft[soft > 0.0])) if (soft > 0.0).any() else 1.0 / settings.STIFFNESS
-        told = q[at], self._tool(q[at]), self._up, deep[at], first, np.where(soft > 0.0, soft, usual), limits
-        for k, part in zip((2, 3, 4), contact_yields(*told, self.rubbing), strict=True):
-            self.given[k][at] = part
+        soft, weight = np.where(soft > 0.0, soft, usual), np.array([1.0, each[0][1][0, 0]])  # of payload
+        # no servo gives more than its limit, and none is turned by more than what is near
+        limits = np.minimum([one.limit or np.inf for one in self.servos], NEAR / soft)
+        parts = self.given[:2], self.loads.inertia, self.loads.slope
+        around = [np.tensordot(weight, one, 1).reshape(q.shape) for one in parts]
+        for _ in range(settings.PRESSED):
+            tool = self.ends.jacobian(path)
+            rise = self.ends.up @ tool
+            gap = plane - self.ends.heights(path) + (rise * path).sum(axis=1)
+            force = plane_forces(
+                numbers, soft, (self.begins, self.first), command, (drag, *around, q),
+                (gap, rise, self.touch["compliance"], (limits / np.maximum(np.abs(rise), 1e-12)).min(axis=1)), start,
+                self.step, self.substeps,
+            )  # fmt: skip
+            at = np.flatnonzero(force)
+            first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)
+            yields = contact_yields(q[at], tool[at], self.ends.up, force[at], first, soft, *self.touch.values())
+            # each joint alone sees the plane and the other joints' springs behind it
+            own = soft * rise[at] ** 2
+            whole = own.sum(axis=1, keepdims=True) + self.touch["compliance"]
+            others = np.maximum(whole - own, settings.LEAST_SPRING * whole)
+            self.given[2:] = 0.0
+            for k, part in enumerate(yields, start=2):
+                self.given[k][at] = part if k in (2, 4) else part * whole / others
+            drag, path = self.given[2] + soft * rise * force[:, None], self.path(values)
+        self.given[6][at], self.given[7] = own / others, path

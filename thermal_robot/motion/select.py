@@ -132,7 +132,7 @@ def searched(model: JointModel, allowed: Mask, progress: Callable[[str], None]) 
     own = scales.fitted(values != 0.0, values)
     for number in range(1, settings.MOVES + 1):
         progress(f"effects added, round {number}")
-        better = _better(own, scales.others(own, _more(scales, own, allowed), own.rival_from))
+        better = _better(own, scales.others(own, _more(scales, own, allowed), own.likely_from))
         if not better:
             break
         own = _together(scales, own, better)
@@ -157,7 +157,7 @@ def settled(own: Weighed, allowed: Mask, progress: Callable[[str], None]) -> Cho
             own, held = scales.fitted(own.active, own.point.values), own.active[shared].tobytes()
         while (fewer := _fewer(scales, own)) is not None:
             own = fewer
-        rivals = scales.others(own, _more(scales, own, allowed), own.rival_from)
+        rivals = scales.others(own, _more(scales, own, allowed), own.likely_from)
         if not (better := _better(own, rivals)):  # what the linear problem held to be needed may not be
             better = [one for one in _drops(scales, own) if one.log_evidence > own.likely_from]
         if not better:

@@ -55,6 +55,8 @@ STEPS, SWEEPS, EXACT = 10, 100, 1e-9
 velocity, rad/s, below which they end: in a step of 4 ms a millionth of what the finest encoder reads."""
 FINER, NEARLY = 8, 0.5
 """Parts of a step in which a servo may saturate, where its torque bends, and share of its limit from which it may."""
+TRIES = 30
+"""Forces of a plane that are tried in a time step: six are usual."""
 _ONE = Lock()
 LEVEL, RISES, LIFT = 1e-7, 0.02, 1e-3
 """m: by which a tool on a plane may stand beside it; s: in which one below rises to a third, as MuJoCo's contacts; m/N:
@@ -174,51 +176,120 @@ def _held(times, commands, command_begins):  # type: ignore[no-untyped-def]
     return integral, until
 
 
+def _advanced(  # type: ignore[no-untyped-def]
+    x, state, k, last, t, end, h, substeps, times, commands, integral, until, push, spring, there, force, mass, slope,
+    about,
+):  # fmt: skip
+    """Integrate a joint of numbers x (18,) from an instant to the next point of the grid at ``end`` by its own clock.
+
+    Return what ``state`` has, position, velocity, the command's integral, set point and its velocity, and its stamp k.
+    A plane's ``push`` is that at ``there``, beside which the others yield as a ``spring``; it does not pull.
+    """
+    q, v, before, led, rate = state
+    half, heavy, bend = 0.5 * h, 2.0 * max(x[5] * mass + x[4], 0.0) / h, x[5] * slope + spring
+    # without inertia the midpoint rule would ring about a command that is followed at once
+    drag = max(x[3], half - x[13]) if heavy < half else x[3]
+    limit = 1.0 / x[10] if x[10] > 0.0 else 1e9
+    for _ in range(substeps):
+        t += h
+        k = _latest(times, k, last, t)  # type: ignore[no-untyped-call]
+        late = integral[k] + commands[k] * (t - times[k])
+        u, led, rate = _led(led, rate, (late - before) / h, x[16], x[17], h)  # type: ignore[no-untyped-call]
+        u, before = (1.0 + x[1]) * u + x[0], late
+        plane = push + spring * (q - there)
+        load = (plane if plane * push > 0.0 else 0.0) + x[5] * force
+        load += x[5] * slope * max(min(q - about, NEAR), -NEAR)
+        most = x[6] + x[7] * abs(load) + _breakaway(x[8], v)  # type: ignore[no-untyped-call]
+        middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
+            q, v, u, load, most, 0.0, 0.0, heavy, drag, x[13], 0.0, bend, half, x[9], limit, 0.0
+        )
+        then = q + h * middle
+        if then < x[11] or then > x[12]:
+            then, middle = max(min(then, x[12]), x[11]), 0.0
+        still = v == 0.0 and middle == 0.0 and abs(led - commands[k]) < EXACT
+        v, q = 2.0 * middle - v if middle != 0.0 else 0.0, then
+        if still and until[k] >= end:  # nothing changes until then
+            before = late + commands[k] * (end - t)
+            break
+    return (q, v, before, led, rate), k
+
+
 def _alone(  # type: ignore[no-untyped-def]
     numbers, weights, begins, first, step, substeps, times, commands, command_begins, loads, masses, slopes, about,
     start, out,
 ):  # fmt: skip
     """Integrate all motions of a single joint; a command is averaged over a step, in which it may change."""
-    h, half = step / substeps, 0.5 * step / substeps
+    h = step / substeps
     integral, until = _held(times, commands, command_begins)  # type: ignore[no-untyped-call]
     for s in range(numbers.shape[0]):
-        zero, gain, delay, lag, inertia, droop = numbers[s, :6]
-        coulomb, load_friction, stribeck, dead, saturation, low, high, derivative = numbers[s, 6:14]
-        limit = 1.0 / saturation if saturation > 0.0 else 1e9
+        x = numbers[s]
         for m in range(len(begins) - 1):
-            q, v, t = start[m], 0.0, first[m] - delay
-            k, last = command_begins[m], command_begins[m + 1] - 1
-            k = _latest(times, k, last, t)  # type: ignore[no-untyped-call]
-            before, led, rate = integral[k] + commands[k] * (t - times[k]), q, 0.0
-            out[s, begins[m]] = q
+            t, last = first[m] - x[2], command_begins[m + 1] - 1
+            k = _latest(times, command_begins[m], last, t)  # type: ignore[no-untyped-call]
+            state = start[m], 0.0, integral[k] + commands[k] * (t - times[k]), start[m], 0.0
+            out[s, begins[m]] = start[m]
             for n in range(begins[m] + 1, begins[m + 1]):
+                push = weights[s, 1] * loads[2, n] + weights[s, 2] * loads[3, n]
+                push += weights[s, 3] * loads[4, n] + weights[s, 4] * loads[5, n]
                 force = loads[0, n] + weights[s, 0] * loads[1, n]
-                push = weights[s, 1] * loads[2, n] + weights[s, 2] * loads[3, n] + weights[s, 3] * loads[4, n]
                 mass, slope = masses[0, n] + weights[s, 0] * masses[1, n], slopes[0, n] + weights[s, 0] * slopes[1, n]
-                heavy, bend = 2.0 * max(droop * mass + inertia, 0.0) / h, droop * slope
-                # without inertia the midpoint rule would ring about a command that is followed at once
-                drag = max(lag, half - derivative) if heavy < half else lag
-                for _ in range(substeps):
-                    t += h
-                    k = _latest(times, k, last, t)  # type: ignore[no-untyped-call]
-                    late = integral[k] + commands[k] * (t - times[k])
-                    u, led, rate = _led(led, rate, (late - before) / h, numbers[s, 16], numbers[s, 17], h)  # type: ignore[no-untyped-call]
-                    u, before = (1.0 + gain) * u + zero, late
-                    load = push + droop * force + bend * max(min(q - about[n], NEAR), -NEAR)
-                    most = coulomb + load_friction * abs(load) + _breakaway(stribeck, v)  # type: ignore[no-untyped-call]
-                    middle, _slope, _side = _middle(  # type: ignore[no-untyped-call]
-                        q, v, u, load, most, 0.0, 0.0, heavy, drag, derivative, 0.0, bend, half, dead, limit, 0.0
-                    )
-                    then = q + h * middle
-                    if then < low or then > high:
-                        then, middle = max(min(then, high), low), 0.0
-                    still = v == 0.0 and middle == 0.0 and abs(led - commands[k]) < EXACT
-                    v, q = 2.0 * middle - v if middle != 0.0 else 0.0, then
-                    end = first[m] - delay + step * (n - begins[m])
-                    if still and until[k] >= end:  # nothing changes until then
-                        before, t = late + commands[k] * (end - t), end
-                        break
-                out[s, n] = q
+                end = first[m] - x[2] + step * (n - begins[m])
+                state, k = _advanced(  # type: ignore[no-untyped-call]
+                    x, state, k, last, end - step, end, h, substeps, times, commands, integral, until, push,
+                    weights[s, 1] * loads[6, n], loads[7, n], force, mass, slope, about[n],
+                )  # fmt: skip
+                out[s, n] = state[0]
+
+
+def _pressing(  # type: ignore[no-untyped-def]
+    numbers, soft, begins, first, step, substeps, times, commands, command_begins, drag, forces, masses, slopes, about,
+    gap, rise, flex, most, start, out,
+):  # fmt: skip
+    """Write the force (n,), N, of a plane on J joints that go their own ways: none, or what holds the tool there.
+
+    The tool is below the plane by ``gap`` less ``rise`` times positions and ``flex`` times the force, m: by regula
+    falsi (Illinois) in each step, up to a force ``most``, with which the tool passes.
+    """
+    joints, h = len(numbers), step / substeps
+    integral, until = _held(times, commands, command_begins.ravel())  # type: ignore[no-untyped-call]
+    for m in range(len(begins) - 1):
+        now, then = np.zeros((joints, 5)), np.zeros((joints, 5))
+        ks, news = np.zeros(joints, dtype=np.int64), np.zeros(joints, dtype=np.int64)
+        for j in range(joints):
+            t = first[m] - numbers[j, 2]
+            k = _latest(times, command_begins[j, m], command_begins[j, m + 1] - 1, t)  # type: ignore[no-untyped-call]
+            ks[j] = k
+            now[j, 0], now[j, 3], now[j, 2] = start[m, j], start[m, j], integral[k] + commands[k] * (t - times[k])
+        for n in range(begins[m] + 1, begins[m + 1]):
+            force, low, high, below, above = 0.0, 0.0, 0.0, 0.0, 0.0
+            for number in range(TRIES):
+                left = gap[n] - flex * force
+                for j in range(joints):
+                    x = numbers[j]
+                    end = first[m] - x[2] + step * (n - begins[m])
+                    state = now[j, 0], now[j, 1], now[j, 2], now[j, 3], now[j, 4]
+                    state, news[j] = _advanced(  # type: ignore[no-untyped-call]
+                        x, state, ks[j], command_begins[j, m + 1] - 1, end - step, end, h, substeps, times, commands,
+                        integral, until, drag[n, j] - soft[j] * rise[n, j] * force, 0.0, 0.0, forces[n, j],
+                        masses[n, j], slopes[n, j], about[n, j],
+                    )  # fmt: skip
+                    then[j, 0], then[j, 1], then[j, 2], then[j, 3], then[j, 4] = state
+                    left -= rise[n, j] * state[0]
+                if (number == 0 and left <= 0.0) or abs(left) < LEVEL or (left > 0.0 and force >= most[n]):
+                    break
+                if left > 0.0:
+                    above *= 0.5 if low > 0.0 else 1.0
+                    low, below = force, left
+                else:
+                    below *= 0.5 if high > 0.0 else 1.0
+                    high, above = force, left
+                if high > 0.0:
+                    force = low + (high - low) * below / (below - above)
+                else:
+                    force = min(max(2.0 * force, out[n - 1], 1.0), most[n])
+            now, then = then, now
+            ks, news = news, ks
+            out[n] = force
 
 
 def _couple(  # type: ignore[no-untyped-def]
@@ -388,12 +459,13 @@ def _together(  # type: ignore[no-untyped-def]
 
 
 @cache
-def _kernels() -> tuple[Any, Any]:
-    """Return the loops of one joint and of several, compiled at the first call.
+def _kernels() -> tuple[Any, Any, Any]:
+    """Return the loops of one joint, of several and of several on a plane, compiled at the first call.
 
     Raises :class:`EstimationError` without numba.
     """
     global _latest, _led, _breakaway, _held, _sliding, _middle, _solve, _lead, _couple, _velocities, _height, _above
+    global _advanced
     if find_spec("numba") is None:
         raise EstimationError('servos are simulated by numba, which is missing: pip install "thermal-robot[fast]"')
     with _ONE:  # threads ask at once
@@ -401,8 +473,8 @@ def _kernels() -> tuple[Any, Any]:
             _led, _breakaway, _sliding = (compiled(one) for one in (_led, _breakaway, _sliding))
             _middle, _solve, _held, _latest = (compiled(one) for one in (_middle, _solve, _held, _latest))
             _lead, _couple, _velocities = (compiled(one) for one in (_lead, _couple, _velocities))
-            _height, _above = compiled(_height), compiled(_above)
-    return compiled(_alone), compiled(_together)
+            _height, _above, _advanced = compiled(_height), compiled(_above), compiled(_advanced, inline=True)
+    return compiled(_alone), compiled(_together), compiled(_pressing)
 
 
 def simulate(
@@ -411,15 +483,16 @@ def simulate(
 ) -> Array:  # fmt: skip
     """Forward simulation of J joints by time stepping in all motions, for S sets of numbers: (S, n, J) rad on the grid.
 
-    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 4) of payload, kg, and contact; ``grid`` begins of
+    ``numbers`` (S, J, 18) as :data:`PARAMETERS`, ``weights`` (S, 5) of payload, kg, and contact; ``grid`` begins of
     motions and their first instants; ``command`` stamps, values and begins (J, M + 1); ``around``, in the
-    middle of the step that ends at each grid point: ``loads`` (5, n, J), N·m, of the model and of 1 kg of payload, then
-    what a joint yields to contact, rad, and by height and friction, of several joints first the gradient of the tool's
-    height; of the first two mass matrices, derivatives by position and by velocity (2, n, J, J); positions and
-    velocities (n, J) at which they hold, and heights there (n,), m; ``start`` (M, J) rad. Of contact several joints
-    have a plane's height, single ones a factor and changes of height and friction.
+    middle of the step that ends at each grid point: ``loads`` (8, n, J), N·m, of the model and of 1 kg of payload, then
+    what a joint yields to contact, rad, its derivatives by height, friction and flex, by how much less for a rad from
+    which position, of several joints first the gradient of the tool's height; of the first two mass matrices,
+    derivatives by position and by velocity (2, n, J, J); positions and velocities (n, J) at which they hold, and
+    heights there (n,), m; ``start`` (M, J) rad. Of contact several joints have a plane's height, single ones a factor
+    and changes of height, friction and flex.
     """
-    out, (alone, together) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
+    out, (alone, together, _) = np.empty((len(numbers), grid[0][-1], numbers.shape[1])), _kernels()
     if numbers.shape[1] > 1:
         together(numbers, weights, *grid, step, *command, *around, start, out)
         return out
@@ -427,4 +500,20 @@ def simulate(
     times, values, begins = command
     own = (np.ascontiguousarray(one[..., 0]) for one in (loads, masses[..., 0], slopes[..., 0], about, start))
     alone(numbers[:, 0], weights, *grid, step, substeps, times, values, begins[0], *own, out[..., 0])
+    return out
+
+
+def plane_forces(
+    numbers: Array, soft: Array, grid: tuple[Any, ...], command: tuple[Any, ...], around: tuple[Array, ...],
+    plane: tuple[Array, Array, float, Array], start: Array, step: float, substeps: int,
+) -> Array:  # fmt: skip
+    """Force (n,), N, of a plane in the step that ends at each grid point, on J joints that go their own ways.
+
+    ``numbers`` (J, 18), ``soft`` (J,) compliances by which the force moves them, ``plane``: what the tool is below it
+    with all joints at zero (n,), its height's derivatives by them (n, J), the flex, m/N, and the largest force (n,).
+    ``around``: further loads,
+    rad, torques, masses, slopes and positions (n, J). The others as in :func:`simulate`.
+    """
+    out = np.zeros(grid[0][-1])
+    _kernels()[2](numbers, soft, *grid, step, substeps, *command, *around, *plane, start, out)
     return out

@@ -101,6 +101,14 @@ SOFTER = 20.0
 of a stiffer one cannot be seen."""
 PLANE_FRICTION = 0.3
 """Expected coefficient of friction of a tool on a table: plastics and rubber on wood and metal have 0.2 to 0.5."""
+SELF_LOCKING = 2.0
+"""Largest friction of a gear over its load: a train that passes on a third of what drives it; from 1 on it locks."""
+PRESSED = 3
+"""Rounds in which a plane's force is found: the first where the tool would be without it, and without its friction."""
+LEAST_SPRING = 0.1
+"""Of the compliance of all joints and a plane, what a joint sees beside its own at least: a rigid plane would ring."""
+FLEX = 1e-3
+"""m/N: expected compliance of a plane and of links beyond the encoders, of a printed arm of 0.3 m; metal has less."""
 FEW = 0.999
 """Quantile of the tracking error from which a saturation is looked for."""
 SCAN = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
