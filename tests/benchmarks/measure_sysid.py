@@ -53,6 +53,7 @@ def ours(log, held):
     values = fit(model, begun, active, ~out)
     model.refreshed(values)
     values = fit(model, values, active, ~out)
+    model.refreshed(values)  # a plane presses as these servos let it
     left = [one[out[model.motion_of(j)]] for j, one in enumerate(model.all_residuals(values))]
     return found, [float(np.sqrt(np.mean(one**2))) for one in left]
 
