@@ -608,13 +608,12 @@ class ServoModel(JointModel):
             at = np.flatnonzero(force)
             first = np.isin(at, self.begins) | (np.diff(at, prepend=-2) > 1)
             yields = contact_yields(q[at], tool[at], self.ends.up, force[at], first, soft, *self.touch.values())
-            # each joint alone sees the plane, and behind it the springs of the others that friction does not hold
-            own, slides = soft * rise[at] ** 2, np.diff(path, axis=0, prepend=path[:1])[at] != 0.0
+            # each joint alone sees the plane and the other joints' springs behind it
+            own = soft * rise[at] ** 2
             whole = own.sum(axis=1, keepdims=True) + self.touch["compliance"]
-            others = (slides * own).sum(axis=1, keepdims=True) - slides * own + self.touch["compliance"]
-            others = np.maximum(others, settings.LEAST_SPRING * whole)
+            others = np.maximum(whole - own, settings.LEAST_SPRING * whole)
             self.given[2:] = 0.0
             for k, part in enumerate(yields, start=2):
                 self.given[k][at] = part if k in (2, 4) else part * whole / others
             drag, path = self.given[2] + soft * rise * force[:, None], self.path(values)
-        self.given[6][at], self.given[7] = own / others, self._midway(path)
+        self.given[6][at], self.given[7] = own / others, path
