@@ -31,9 +31,7 @@ def compiled(
 
     compiler: Any = numba.njit
     fastmath = loosened if isinstance(loosened, bool) else set(loosened)
-    how: dict[str, Any] = {"nogil": True, "fastmath": fastmath, "error_model": "numpy"}
-    if inline:
-        how["inline"] = "always"
+    how = {"nogil": True, "fastmath": fastmath, "error_model": "numpy", "inline": "always" if inline else "never"}
     try:
         return compiler(cache=True, **how)(function)
     except RuntimeError:  # numba finds no folder for its cache

@@ -34,10 +34,12 @@ class Ends:
         self.up = -robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-12)
         self._chains = [(robot, *_places(robot, joints))]
         for leaf in leaf_links(robot.urdf, robot.name):
+            if leaf == robot.tool_frame:
+                continue
             with suppress(RobotError):  # a link may have a chain that is no robot
                 other = load_robot(robot.urdf, leaf, root_frame=robot.root_frame, gravity=robot.gravity)
-                if leaf != robot.tool_frame and _places(other, joints)[0]:
-                    self._chains.append((other, *_places(other, joints)))
+                if (places := _places(other, joints))[0]:
+                    self._chains.append((other, *places))
 
     def _each(self, q: Array) -> Array:
         """Heights (E, n), m, of all ends at positions (n, J); joints that are not in the log are at zero."""
@@ -48,15 +50,16 @@ class Ends:
         """Height of the lowest end (n,), m, against gravity, at positions (n, J)."""
         return np.asarray(self._each(q).min(axis=0))
 
-    def jacobian(self, q: Array) -> Array:
-        """(n, 3, J) Jacobian of the lowest end's position by the log's joints, at positions (n, J)."""
-        found, lowest = np.zeros((len(q), 3, q.shape[1])), self._each(q).argmin(axis=0)
+    def lowest(self, q: Array) -> tuple[Array, Array]:
+        """Height of the lowest end (n,), m, and Jacobian (n, 3, J) of its position, at positions (n, J)."""
+        found, each = np.zeros((len(q), 3, q.shape[1])), self._each(q)
+        lowest = each.argmin(axis=0)
         for k, (robot, own, at) in enumerate(self._chains):
             rows = np.flatnonzero(lowest == k)
             told = np.zeros((len(rows), *found.shape[1:]))
             told[:, :, own] = frame_jacobians(robot, _whole(robot, own, at, q[rows]))[:, :3, at]
             found[rows] = told
-        return found
+        return each.min(axis=0), found
 
 
 def _places(robot: Robot, joints: Sequence[str]) -> tuple[list[int], list[int]]:

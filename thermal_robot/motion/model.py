@@ -575,7 +575,8 @@ class ServoModel(JointModel):
         if p is None:
             return
         if self.held:
-            self.heights, self.given[2] = self.ends.heights(q), self.ends.up @ self.ends.jacobian(q)
+            self.heights, tool = self.ends.lowest(q)
+            self.given[2] = self.ends.up @ tool
             return
         # of a tool that touches nothing it tells what a plane would do where it is looked for
         values = np.where(self.of_effects(("contact",)) & (values[p] == 0.0), self.start(), values)
@@ -597,9 +598,9 @@ class ServoModel(JointModel):
         parts = self.given[:2], self.loads.inertia, self.loads.slope
         around = [np.tensordot(weight, one, 1).reshape(q.shape) for one in parts]
         for _ in range(settings.PRESSED):
-            tool = self.ends.jacobian(path)
+            height, tool = self.ends.lowest(path)
             rise = self.ends.up @ tool
-            gap = plane - self.ends.heights(path) + (rise * path).sum(axis=1)
+            gap = plane - height + (rise * path).sum(axis=1)
             force = plane_forces(
                 numbers, soft, (self.begins, self.first), command, (drag, *around, q),
                 (gap, rise, self.touch["compliance"], (limits / np.maximum(np.abs(rise), 1e-12)).min(axis=1)), start,

@@ -275,7 +275,7 @@ def _exchanged(scales: Scales, own: Weighed, allowed: Mask) -> list[Proposed]:
             near = (square > settings.ALIKE) | (np.argsort(np.argsort(-square)) < settings.RIVALS)
             near |= abrupt[places] & abrupt[b] & (joint[places] == joint[b])
             for k, value in zip(places[near].tolist(), values[near], strict=True):
-                there = np.where(np.arange(len(begun)) == k, max(value, model.least[k]), begun)
+                there = np.where(np.arange(len(begun)) == k, np.clip(value, *model.bounds[:, k]), begun)
                 found.setdefault((b, k), [begun]).append(there)
     sets = [(own.active ^ np.isin(np.arange(len(begun)), pair), starts) for pair, starts in found.items()]
     return [(active, tuple(np.where(active, one, 0.0) for one in starts)) for active, starts in sets]

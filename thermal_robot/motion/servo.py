@@ -511,8 +511,7 @@ def plane_forces(
 
     ``numbers`` (J, 18), ``soft`` (J,) compliances by which the force moves them, ``plane``: what the tool is below it
     with all joints at zero (n,), its height's derivatives by them (n, J), the flex, m/N, and the largest force (n,).
-    ``around``: further loads,
-    rad, torques, masses, slopes and positions (n, J). The others as in :func:`simulate`.
+    ``around``: further loads, rad, torques, masses, slopes and positions (n, J). The others as in :func:`simulate`.
     """
     out = np.zeros(grid[0][-1])
     _kernels()[2](numbers, soft, *grid, step, substeps, *command, *around, *plane, start, out)
